@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -11,17 +12,20 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from analyzer.history import plant_clock, stamps
+from analyzer.history import stamps
 from analyzer.history.clock import (
     ELAPSED,
     SINCE_START,
+    WITHOUT_LEAP,
     Clock,
     DateOrder,
     TimeScale,
     counted_s,
     date_and_time,
-    date_order,
+    is_fixed,
+    shown_order,
     time_scale_of,
+    winter_offset_s,
 )
 from analyzer.history.table import (
     COLUMNS,
@@ -39,6 +43,8 @@ from analyzer.history.table import (
 from analyzer.limits import HISTORY
 from identification.errors import InputError
 
+DAY_FIRST_ZONES = ("Europe/", "Africa/", "Australia/", "Asia/")
+"""Zones in which dates have the day first where figures alone would read either way."""
 TIME_OF_DAY = r"^\s*\d{1,2}(:\d\d(:\d\d([.,;]\d+)?)?|\.\d\d\.\d\d([.,]\d+)?)\s*([AaPp]\.?[Mm]\.?)?\s*$"
 LIKE_STAMP = re.compile(
     r"\d[-/. ]\.?\s*\w{1,12}[-/. ,]|\d:\d\d|[^\W\d]{3}\.? \d{1,2}\b|^\s*\d{8}|\d\.\d\d\.\d\d|\d[年년]"
@@ -144,8 +150,65 @@ def _with_order(table: Table, clock: Clock, options: ReadOptions) -> Clock:
     if parts is None or not parts.open.any():
         return clock
     whole = stamps.fields(as_text(date_and_time(table.read(clock.columns))), clock.timezone)
-    order = None if whole is None else date_order(whole, str(head[0].as_py()), clock.timezone)
+    order = None if whole is None else _date_order(whole, str(head[0].as_py()), clock.timezone)
     return replace(clock, order=order)
+
+
+def _date_order(parts: stamps.Fields, example: str, timezone: str | None) -> DateOrder:
+    """The order of all dates of a file, one of which is `example`, in a stated zone.
+
+    Where nothing in them tells, the month first may lie ahead of us, or the day first be usual in the zone.
+    """
+    date = example.split(" ")[0]
+    pointed = "." in date
+    by_year = _with_short_year(parts, pointed and "-" not in date and "/" not in date)
+    if by_year is not None:
+        return by_year
+    shown = shown_order(parts)
+    if shown is not None:
+        return shown
+    if pointed:
+        return DateOrder("day", "dates with points; no day above 12 occurs")
+    limit = time.time() + HISTORY.ahead_s
+    ahead = [bool((stamps.stamp_seconds(parts, first) > limit).any()) for first in ("day", "month")]
+    usual = timezone is not None and timezone.startswith(DAY_FIRST_ZONES)
+    day = ahead[1] if ahead[0] != ahead[1] else usual
+    first, other = ("day", "month") if day else ("month", "day")
+    return DateOrder(first, f"every date fits both orders; state --{other}-first if so", sure=False)
+
+
+def _with_short_year(parts: stamps.Fields, pointed: bool) -> DateOrder | None:
+    """What is decided of dates with years of two digits that may stand in front; None where they do not.
+
+    Dates with points have the year in front only where no other reading fits as well; of others that read several
+    ways the latest counts, for exports are of late.
+    """
+    if not parts.open.any() or not parts.short.all() or (parts.open & ~parts.year_may_begin).any():
+        return None
+    limit = time.time() + HISTORY.ahead_s
+    readings = {first: stamps.stamp_seconds(parts, first) for first in ("year", "day", "month")}
+    possible = {
+        k: found for k, found in readings.items() if np.isfinite(found).all() and found.max() <= limit
+    }
+    if "year" not in possible:
+        return None
+    if len(possible) == 1:
+        return DateOrder("year", "else the stamps would lie ahead of us")
+    leaps = {first: float(np.max(np.abs(np.diff(found)), initial=0.0)) for first, found in possible.items()}
+    latest = {first: found.max() for first, found in possible.items() if leaps[first] == min(leaps.values())}
+    year = latest.pop("year", None)
+    if year is None:
+        return None
+    if not latest:
+        return DateOrder("year", WITHOUT_LEAP)
+    if not pointed and max(latest.values()) <= year:
+        first = "year"
+    elif len(latest) == 1:
+        first = next(iter(latest))
+    else:
+        return None
+    why = "the year may stand in front or behind; state --date-format if it is not so"
+    return DateOrder(first, why, sure=False)
 
 
 def _with_fraction(table: Table, clock: Clock) -> Clock:
@@ -169,10 +232,10 @@ def _in_zone(table: Table, clock: Clock, name: str) -> Clock:
     offset_s, several = stamps.header_zone(name, zone)
     doubt = f", for '{several}' means several zones; state --timezone" if several else ""
     clock = replace(clock, offset_s=offset_s, timezone=zone, doubt=doubt)
-    if not clock.local or offset_s is not None or zone is None or plant_clock.is_fixed(zone):
+    if not clock.local or offset_s is not None or zone is None or is_fixed(zone):
         return clock
     second = clock.seconds(table.read(clock.columns))[0]
-    return replace(clock, winter_s=plant_clock.winter_offset_s(second, zone))
+    return replace(clock, winter_s=winter_offset_s(second, zone))
 
 
 def _is_doubtful(
