@@ -9,7 +9,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import chain, pairwise
+from itertools import chain, pairwise, repeat
 from operator import itemgetter
 from pathlib import Path
 
@@ -174,7 +174,7 @@ def _header(path: Path, lines: Sequence[str], delimiter: str) -> tuple[int, list
     header = next(
         chain(
             (row for row in rows[:data] if data < len(rows) and _names_all(row[1])),
-            (a for a, b in below if _names_time(a[1]) and not _is_data(a[1]) and _is_data(b[1])),
+            (a for a, b in below if not _is_data(a[1]) and _is_data(b[1]) and _names_time(a[1])),
             rows[:data],
         ),
         None,
@@ -224,7 +224,10 @@ def _taken_as(lines: Sequence[str], delimiter: str) -> tuple[str, ...] | None:
     if len(rows) < 3 or len({len(row) for row in rows}) != 1 or len(rows[0]) < 3:
         return None
     columns = [[cell.strip() for cell in column] for column in zip(*rows, strict=True)]
-    kinds = [_kind_of_column(column) for column in columns]
+    # of all columns at once, for the pattern is built anew each time
+    first = stamps.fields(pa.array([column[0] for column in columns]))
+    stamped = repeat(False) if first is None else first.readable.tolist()
+    kinds = list(map(_kind_of_column, columns, stamped))
     if kinds[0] == "stamp" and set(kinds[1:]) == {"number"}:
         return ("timestamp", *(UNNAMED.format(i + 1) for i in range(1, len(columns))))
     if len(columns) > 8 or kinds.count("stamp") != 1 or "text" not in kinds or "number" not in kinds:
@@ -242,15 +245,18 @@ def _taken_as(lines: Sequence[str], delimiter: str) -> tuple[str, ...] | None:
     return tuple(names)
 
 
-def _kind_of_column(cells: Sequence[str]) -> str:
-    """'stamp', 'number', 'quality' or 'text' for what all cells of a column are; '' where they are not alike."""
+def _kind_of_column(cells: Sequence[str], stamped: bool) -> str:
+    """'stamp', 'number', 'quality' or 'text' for what all cells of a column are; '' where they are not alike.
+
+    `stamped` says whether the first one can be read as a stamp.
+    """
     numbers = [float(cell.replace(",", ".")) for cell in cells if NUMBER.match(cell)]
     if NUMBER.match(cells[0]) and len(numbers) >= HISTORY.numbers_share * len(cells):
         scale = time_scale_of(pa.array(numbers))
         return "number" if scale is None or scale in SINCE_START.values() else "stamp"
     if {cell.lower() for cell in cells} <= QUALITIES:
         return "quality"
-    parts = stamps.fields(pa.array(cells))
+    parts = stamps.fields(pa.array(cells)) if stamped else None
     if parts is not None and parts.readable.all():
         return "stamp"
     return "text" if all(cell and not NUMBER.match(cell) for cell in cells) else ""
