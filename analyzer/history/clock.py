@@ -1,10 +1,13 @@
-"""Which columns of a table hold the time, how it is written there, and its seconds."""
+"""Which columns of a table hold the time, how it is written there, and its seconds, of the file's clock and of UTC:
+across the hour that autumn repeats and the one that spring leaves out, and of clocks that know neither."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
+from zoneinfo import ZoneInfo
 
 import numpy as np
 import pandas as pd
@@ -12,10 +15,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from analyzer.history import stamps, zones
-from analyzer.history.names import WORDS
-from analyzer.history.stamps import DateOrder, shown_order
-from analyzer.history.table import as_text, is_text, numbers
+from analyzer.history.stamps import Fields, fields, midnights_told, stamp_seconds
+from analyzer.history.table import WORDS, as_text, is_text, numbers
 from analyzer.limits import HISTORY
 
 TICKS_PER_S = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
@@ -42,14 +43,39 @@ class TimeScale:
         return said + another if self in SINCE_START.values() else said
 
 
-DAY_S = 86400.0
+HOUR_S, DAY_S = 3600.0, 86400.0
+MISSING_HOUR = "samples stand in the hour that the time zone leaves out in spring and are left out"
+REPEATED_HOUR = "samples stand in the hour that the time zone repeats in autumn; told apart by their order"
 SCALES = tuple(TimeScale(**scale) for scale in WORDS["scales"])
 SINCE_START = {unit: TimeScale(**scale) for unit, scale in WORDS["since_start"].items()}
 """Clocks that count from the start, by the unit that the column's name states."""
 ELAPSED = TimeScale("hours, minutes and seconds since the start", 0, 0, 1.0)
 """A clock in text that counts from the start, such as 25:10:03."""
+WITHOUT_LEAP = "so read, the stamps run without a leap"
 MIDNIGHT = r"[ T]0?0:00:00(?:\.0+)?$"
 COUNTED = r"^\s*(?P<h>\d{1,5}):(?P<m>[0-5]\d):(?P<s>[0-5]\d(?:[.,]\d+)?)\s*$"
+
+
+@dataclass(frozen=True, slots=True)
+class DateOrder:
+    """What stands first ('day', 'month' or 'year'), what decided it, and whether that is sure: else another file may
+    decide."""
+
+    first: str
+    why: str
+    sure: bool = True
+
+
+def shown_order(parts: Fields) -> DateOrder | None:
+    """The order that a number above 12 shows, or else that in which alone the stamps run without a leap; or None."""
+    first, second = ((part[parts.open] > 12).any() for part in (parts.a, parts.b))
+    if first != second:
+        return DateOrder(
+            "day" if first else "month", f"the {'first' if first else 'second'} number exceeds 12"
+        )
+    known = (np.unique(stamp_seconds(parts, order)) for order in ("day", "month"))
+    day, month = (np.max(np.diff(second[np.isfinite(second)]), initial=0.0) for second in known)
+    return None if day == month else DateOrder("day" if day < month else "month", WITHOUT_LEAP)
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +146,7 @@ class Clock:
             return second - fixed_s, Counter()
         if not local or self.timezone is None:
             return second, Counter()
-        return zones.to_utc(second, self.timezone)
+        return to_utc(second, self.timezone)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -142,14 +168,14 @@ class Clock:
     def _from_texts(self, texts: pa.Array) -> tuple[NDArray[np.float64], bool]:
         if self.date_format is not None:
             return _formatted(texts, self.date_format)
-        parts = stamps.fields(texts, self.timezone)
+        parts = fields(texts, self.timezone)
         if parts is None:
             return np.full(len(texts), np.nan), True
         order = self.order
         if order is None and parts.open.any():  # the head left nothing open
             order = shown_order(parts)
-        second = stamps.stamp_seconds(parts, "month" if order is None else order.first)
-        return stamps.midnights_told(second, parts), not parts.stated.any()
+        second = stamp_seconds(parts, "month" if order is None else order.first)
+        return midnights_told(second, parts), not parts.stated.any()
 
 
 def time_scale_of(column: pa.Array, unit: str = "") -> TimeScale | None:
@@ -203,3 +229,98 @@ def _formatted(texts: pa.Array, date_format: str) -> tuple[NDArray[np.float64], 
     naive = index.dt.tz_localize(None) if zoned else index
     ticks = naive.to_numpy().astype("datetime64[us]")
     return np.where(np.isnat(ticks), np.nan, ticks.astype(np.int64) / TICKS_PER_S["us"]), not zoned
+
+
+def to_utc(local_s: NDArray[np.float64], zone: str) -> tuple[NDArray[np.float64], Counter[str]]:
+    """Seconds of a local wall clock, in the order of the file, to seconds of UTC, shape (n,), and how many lie in
+    repeated and in missing hours; NaN stays NaN, and becomes of the hour that does not exist."""
+    falling = np.nansum(np.sign(np.diff(local_s))) < 0
+    ordered = local_s[::-1] if falling else local_s
+    summer, winter = _offset_readings(ordered, zone)
+    twice = np.isfinite(summer) & (summer != winter)
+    known = np.isfinite(ordered)
+    second = np.zeros(len(ordered), dtype=bool)
+    second[known] = _second_pass(ordered[known], twice[known])
+    utc = np.where(second, winter, summer)
+    missing = int((np.isfinite(ordered) & np.isnan(utc)).sum())
+    found = +Counter({REPEATED_HOUR: int(twice.sum()), MISSING_HOUR: missing})
+    return (utc[::-1] if falling else utc), found
+
+
+def winter_offset_s(local_s: NDArray[np.float64], zone: str) -> float | None:
+    """The offset of a zone's winter time [s east of Greenwich] where a clock keeps it all the year; else None.
+
+    Such a clock shows the hour that spring leaves out, and the hour that autumn repeats once only; how many samples
+    stand in these hours beside their neighbours tells it, in whatever order the samples are; NaN where unreadable.
+    """
+    hour, count = np.unique(np.floor(local_s[np.isfinite(local_s)] / HOUR_S), return_counts=True)
+    inner = np.flatnonzero(np.diff(hour) <= 2.0)
+    around = np.unique(np.concatenate([hour, hour[inner] + 1.0]))
+    summer, winter = _offset_readings(around * HOUR_S + HOUR_S / 2, zone)
+    held = dict(zip(hour.tolist(), count.tolist(), strict=True))
+    spring = _shares(around[np.isnan(summer)], held, 1)
+    autumn = _shares(around[np.isfinite(summer) & (summer != winter)], held, HISTORY.autumn_samples)
+    keeps = max(spring) > HISTORY.in_spring if spring else bool(autumn) and max(autumn) < HISTORY.in_autumn
+    if not keeps:
+        return None
+    year = 1970 + int(np.median(hour) * HOUR_S / (365.2425 * DAY_S))
+    days = (datetime(year, month, 1, tzinfo=ZoneInfo(zone)).utcoffset() for month in (1, 7))
+    return min(day.total_seconds() for day in days if day is not None)
+
+
+def is_fixed(zone: str) -> bool:
+    """Whether a zone, such as UTC, has no summer time of any year."""
+    return ZoneInfo(zone).utcoffset(None) is not None
+
+
+def _shares(hours: NDArray[np.float64], held: dict[float, int], least: int) -> list[float]:
+    """Samples in some hours over those of the fuller hour beside them, where these are enough to tell."""
+    shares = []
+    for hour in hours.tolist():
+        beside = held.get(hour - 1.0, 0), held.get(hour + 1.0, 0)
+        if min(beside) >= least or (least == 1 and max(beside) >= 1 and hour in held):
+            shares.append(held.get(hour, 0) / max(beside))
+    return shares
+
+
+def _offset_readings(
+    local_s: NDArray[np.float64], zone: str
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Both readings of every stamp: with summer time where the hour is doubtful, and without."""
+    index = pd.DatetimeIndex((np.nan_to_num(local_s) * 1e6).round().astype("datetime64[us]"))
+
+    def reading(summer: bool) -> NDArray[np.float64]:
+        zoned = index.tz_localize(zone, ambiguous=np.full(len(index), summer), nonexistent="NaT")
+        offset = zoned.tz_convert("UTC").tz_localize(None) - index
+        return np.asarray(local_s + offset.total_seconds().to_numpy())
+
+    return reading(True), reading(False)
+
+
+def _second_pass(local_s: NDArray[np.float64], twice: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """True within a repeated hour from where the clock was set back."""
+    second = np.zeros(len(local_s), dtype=bool)
+    doubtful = np.flatnonzero(twice)
+    if doubtful.size == 0:
+        return second
+    steps = np.diff(local_s)
+    typical = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    new_day = np.diff(np.floor(local_s[doubtful] / DAY_S)) != 0
+    for rows in np.split(doubtful, np.flatnonzero(new_day) + 1):
+        second[rows[_set_back(local_s, rows, typical) :]] = True
+    return second
+
+
+def _set_back(local_s: NDArray[np.float64], rows: NDArray[np.intp], typical_s: float) -> int:
+    """How many of the rows of one repeated hour stand before the clock was set back.
+
+    Where it ran backwards most; where it never did, where an hour more makes the least gap.
+    """
+    before = local_s[rows] - local_s[np.maximum(rows - 1, 0)]
+    at_start = before[0] if rows[0] > 0 else -np.inf
+    at_end = local_s[rows[-1] + 1] - local_s[rows[-1]] if rows[-1] + 1 < len(local_s) else -np.inf
+    inner = int(np.argmin(before[1:])) + 1 if rows.size > 1 else 0
+    step = before[inner] if inner else np.inf
+    if step < 0 or (step + HOUR_S <= HISTORY.typical_steps * typical_s and step < min(at_start, at_end)):
+        return inner
+    return 0 if at_start < at_end else len(rows)

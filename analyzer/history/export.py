@@ -19,12 +19,12 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from analyzer.history.converted import converted
 from analyzer.history.files import export_files, is_parquet, packed_beside, unpacked
 from analyzer.history.layouts import Source, source_of, tag_column
-from analyzer.history.parquet import open_parquet
+from analyzer.history.parquet import converted, open_parquet
 from analyzer.history.plant_clock import zone_of
 from analyzer.history.series import MainSpan, NoStampError, Series, joined_pieces
+from analyzer.history.sheet import Sheet
 from analyzer.history.sniff import open_sheet
 from analyzer.history.table import ReadOptions
 from analyzer.limits import HISTORY
@@ -217,14 +217,13 @@ def _opened_tables(path: Path, options: ReadOptions) -> tuple[list[Source], list
 
 
 def _table_source(plain: Path, options: ReadOptions) -> Source:
-    if is_parquet(plain):
-        table = open_parquet(plain)
-        tag = tag_column(table)
+    table = open_parquet(plain) if is_parquet(plain) else open_sheet(plain, options)
+    tag = tag_column(table)
+    if isinstance(table, Sheet):
+        whole = table.bytes < HISTORY.whole_bytes
+    else:
         whole = tag < 0 or table.rows < HISTORY.whole_rows
-        return source_of(table if whole else converted(table, tag, options.place), options)
-    sheet = open_sheet(plain, options)
-    whole = sheet.bytes < HISTORY.whole_bytes
-    return source_of(sheet if whole else converted(sheet, tag_column(sheet), options.place), options)
+    return source_of(table if whole else converted(table, tag, options.place), options)
 
 
 def _agreed(sources: Sequence[Source]) -> tuple[Source, ...]:

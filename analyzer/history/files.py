@@ -11,7 +11,6 @@ import bz2
 import codecs
 import csv
 import gzip
-import importlib.util
 import lzma
 import re
 import shutil
@@ -238,11 +237,6 @@ def _check_size(path: Path, size: int, written: int, folder: Path) -> None:
         raise InputError(f"{path}: no room to unpack it", "free disk", remedy)
 
 
-def can_be_read() -> bool:
-    """Whether the package that reads workbooks is there."""
-    return importlib.util.find_spec("python_calamine") is not None
-
-
 def sheets_as_text(path: Path, folder: Path) -> list[Path]:
     """Each sheet of a workbook that holds a table as a text file of its own under `folder`, in their order.
 
@@ -251,11 +245,12 @@ def sheets_as_text(path: Path, folder: Path) -> list[Path]:
     InputError
         The package is missing, the file is damaged or has a password, or no sheet holds a table.
     """
-    if not can_be_read():
+    try:
+        from python_calamine import CalamineError
+    except ImportError as error:
         remedy = "pip install 'loop-triage[excel]', or save the sheet as CSV and name that file"
-        raise InputError(f"{path}: a workbook", "delimited text or Parquet, or the extra 'excel'", remedy)
-    from python_calamine import CalamineError
-
+        seen, expected = f"{path}: a workbook", "delimited text or Parquet, or the extra 'excel'"
+        raise InputError(seen, expected, remedy) from error
     try:
         found = _sheets(path, folder)
     except BaseException as error:  # a panic of the reader is no Exception

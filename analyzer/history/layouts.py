@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,22 +17,29 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history.clock import Clock
-from analyzer.history.names import COLUMNS, check_once, first_named, plain, stated_column, with_loop
 from analyzer.history.quality import Scheme, mostly_one, not_good, quality_columns, scheme_of
 from analyzer.history.series import MainSpan, NoStampError, Series, main_span
-from analyzer.history.table import ReadOptions, Table, as_text, is_number, is_text
-from analyzer.history.time_columns import check_seconds, find_clock, holds_stamps, stamps_clock
+from analyzer.history.table import (
+    COLUMNS,
+    ReadOptions,
+    Table,
+    any_of,
+    as_text,
+    check_once,
+    first_named,
+    is_number,
+    is_text,
+    plain,
+    stated_column,
+)
+from analyzer.history.time_columns import find_clock, holds_stamps, stamps_clock
 from analyzer.history.values import parsed, values
 from analyzer.limits import HISTORY
 from identification.errors import InputError
 
-TIME_WORDS = re.compile(
-    r"[ ._:/-]*\(?(?:time ?stamp|date ?time|time|date|zeitstempel|zeit|ts)\)?(?:[ ._]\d+)?$", re.IGNORECASE
-)
-TIME_FIRST = re.compile(
-    r"^(?:time ?stamp|date ?time|time|zeitstempel|zeit|aika|heure|czas|tijd)[ ._:/-]+", re.IGNORECASE
-)
-VALUE_WORDS = re.compile(r"(?:^|[ ._:/-])\(?(?:value|val|wert)\)?(?:[ ._]\d+)?$", re.IGNORECASE)
+TIME_WORDS = re.compile(rf"[ ._:/-]*\(?(?:{any_of('time')})\)?(?:[ ._]\d+)?$", re.IGNORECASE)
+TIME_FIRST = re.compile(rf"^(?:{any_of('time_first')})[ ._:/-]+", re.IGNORECASE)
+VALUE_WORDS = re.compile(rf"(?:^|[ ._:/-])\(?(?:{any_of('value')})\)?(?:[ ._]\d+)?$", re.IGNORECASE)
 NUMBERED = re.compile(r"[ ._]\d+$")
 Stamps = tuple[NDArray[np.float64], Counter[str]]
 """Stamps of rows [s since 1970-01-01 UTC], and what was met in them."""
@@ -180,7 +188,6 @@ def _taken(column: pa.Array, rows: Rows) -> pa.Array:
 def open_wide(table: Table, options: ReadOptions) -> Source:
     """Take a table as wide: one time column, and a column for each tag."""
     clock = find_clock(table, options)
-    check_seconds(table, clock)
     free = [i for i in range(len(table.names)) if i not in clock.columns and _holds_values(table, i)]
     partner, said = quality_columns(table, free)
     values_in = [i for i in free if i not in partner.values()]
@@ -189,7 +196,7 @@ def open_wide(table: Table, options: ReadOptions) -> Source:
         raise InputError(seen, "a column of values for each tag, named as the tag", "export the tags' values")
     names = [table.names[i] for i in values_in]
     check_once(table.path, names)
-    tags = with_loop(names, table.path.stem)
+    tags = _with_loop(names, table.path.stem)
     ones = mostly_one(table.head(sorted({*partner.values()})))
     columns = tuple(TagColumn(clock, i, partner.get(i, -1)) for i in values_in)
     layout = [f"wide table, {len(tags)} tags", *said]
@@ -199,6 +206,16 @@ def open_wide(table: Table, options: ReadOptions) -> Source:
     if ones and Scheme.ONE_GOOD in {scheme_of(name, table.head([i])[0], ones) for name, i in used.items()}:
         layout.append(f"quality is read as {Scheme.ONE_GOOD.value}")
     return Source(table, tags, columns, options.good_quality, tuple(layout), ones=ones)
+
+
+def _with_loop(names: Sequence[str], stem: str) -> tuple[str, ...]:
+    """Full tags: bare columns such as 'PV' and 'OP' belong to the loop that the file is named for, and a lone column
+    of values to the tag that it is named for."""
+    if len(names) == 1 and plain(names[0]) in COLUMNS["value"]:
+        return (stem,)
+    if not names or not all(plain(name) in COLUMNS["bare_ending"] for name in names):
+        return tuple(names)
+    return tuple(f"{stem}.{plain(name).upper()}" for name in names)
 
 
 def _any_number(table: Table, columns: Sequence[int]) -> bool:
@@ -241,13 +258,14 @@ def open_pairs(table: Table, options: ReadOptions) -> Source | None:
 
 def _groups(table: Table) -> list[tuple[int, list[int]]]:
     """Each column of stamps with the columns behind it up to the next; none where a column has nothing behind it."""
-    likely = [
-        i
-        for i, kind in enumerate(table.types)
-        if is_text(kind) or pa.types.is_temporal(kind) or _time_name(table, i)
-    ]
+    timed = [_is_time(name) for name in table.names]
+    above = [
+        NUMBERED.sub("", a) != "" and b == "" for a, b in pairwise((*table.names, "."))
+    ]  # a tag, of both
+    texts = [is_text(kind) or pa.types.is_temporal(kind) for kind in table.types]
+    likely = [i for i, may in enumerate(zip(texts, timed, above, strict=True)) if any(may)]
     heads = dict(zip(likely, table.head(likely), strict=True))
-    times = [i for i in likely if holds_stamps(_time_name(table, i), heads[i], _is_time(table.names[i]))]
+    times = [i for i in likely if holds_stamps(heads[i], timed[i], above[i])]
     if len(times) < 2 or times[0] != 0:
         return []
     groups = [
@@ -263,18 +281,14 @@ def _is_time(name: str) -> bool:
     return plain(bare) in COLUMNS["stamp"] or any((TIME_WORDS.search(bare), TIME_FIRST.match(bare)))
 
 
-def _time_name(table: Table, i: int) -> str:
-    """A name under which numbers of a column may count as stamps: its own, or 'time' before a column without one."""
-    name = NUMBERED.sub("", table.names[i][: HISTORY.name_length])
-    unnamed = i + 1 < len(table.names) and table.names[i + 1] == "" and name != ""
-    return "time" if unnamed or _is_time(table.names[i]) else ""
-
-
 def _paired(table: Table, time: int, beside: Sequence[int], options: ReadOptions) -> list[TagColumn]:
     """The tags that share one clock: those behind it that hold values, with their quality."""
     quality = [i for i in beside if plain(NUMBERED.sub("", table.names[i])) in COLUMNS["quality"]]
     held = [i for i in beside if i not in quality]
-    clock = stamps_clock(table, time, options)
+    above = NUMBERED.sub(
+        "", table.names[time]
+    )  # a tag, of which letters behind say nothing, or the time's name
+    clock = stamps_clock(table, time, options, above if plain(above) in COLUMNS["stamp"] else "")
     single = quality[0] if len(quality) == 1 and len(held) == 1 else -1
     return [TagColumn(clock, i, single) for i in held]
 
@@ -298,8 +312,7 @@ def open_long(table: Table, options: ReadOptions) -> Source | None:
     tag, value = tag_column(table), _value_column(table)
     if tag < 0 or value is None:
         return None
-    clock = find_clock(table, options)
-    check_seconds(table, clock, tag)
+    clock = find_clock(table, options, tag)
     met = table.tags or _kinds(table, tag).to_pylist()
     tags = tuple(str(name) for name in met if name not in (None, ""))
     quality, scheme = first_named(table.names, COLUMNS["quality"]), None

@@ -1,33 +1,59 @@
-"""Parquet files: columns by projection, rows of one tag by filter."""
+"""Parquet: columns by projection, rows of one tag by filter.
+
+And copies: exports too big to be read for each loop anew are streamed once into Parquet by loop, in bounded memory. A
+wide table becomes one file, of which each loop reads its columns. Of a long one, whose tags may be interleaved line
+by line, the rows go into some dozens of files by tag, so that a loop's tags are read from a few of them.
+
+A copy is laid whole or not at all, so that a run that goes on takes it up: it is known by the file's name, size and
+both ends, by how it was read, and by this program's version.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import json
 import os
+import shutil
+import tempfile
 import threading
 import zlib
-from collections.abc import Collection, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
+from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
+from pyarrow import csv
 
-from analyzer.history.names import check_once
-from analyzer.history.table import HEAD_ROWS, Table, one_array
+from analyzer.history.files import ends_of
+from analyzer.history.sheet import Sheet, read_through, reading
+from analyzer.history.table import HEAD_ROWS, Table, check_once, one_array, trimmed
 from analyzer.limits import HISTORY
 from identification.errors import InputError
 
 OPEN_FILES = 4
 PIECES = 64
 """Files of a long copy; ours: of 4,500 tags each holds seventy, and a loop's four lie in a sixteenth of all."""
+BATCH_ROWS = 500_000
+"""Rows of a Parquet file that are handed on at a time."""
+HELD_ROWS = 32_768
+"""Rows of a file that are held before they are written: 64 files of 50 bytes a row hold 100 MB."""
+DONE = "done.json"
+"""What a copy says of itself; written last."""
+NAMED = "converted-"
+Said = dict[str, list[str]]
+"""What a pass over an export found out: notes, and the tags of a long table in the order of their first rows."""
 
 
 @dataclass(frozen=True, slots=True)
 class ParquetTable(Table):
-    """A Parquet file, known by its footer; or a copy in a `folder` (converted.py), its columns named by position: one
+    """A Parquet file, known by its footer; or a copy in a `folder`, its columns named by position: one
     piece, or of a long table those in which a row is by its tag."""
 
     rows: int = 0
@@ -154,3 +180,143 @@ def _opened_once(path: Path, changed_ns: int, process: int) -> pq.ParquetFile:
 def _opened(path: Path) -> pq.ParquetFile:
     """The file, opened once by each process: of a footer with thousands of columns that takes as long as a loop."""
     return _opened_once(path, path.stat().st_mtime_ns, os.getpid())
+
+
+def converted(table: Sheet | ParquetTable, tag: int, place: Path) -> ParquetTable:
+    """Stream a table into Parquet, or take up what an earlier process has streamed of the same.
+
+    Parameters
+    ----------
+    table : Sheet or ParquetTable
+        Text, or a long Parquet file, of which each loop's read would decode all.
+    tag : int
+        Column of the tags of a long table, -1 for a wide one.
+    place : Path
+        Where the files are laid.
+
+    Raises
+    ------
+    InputError
+        The disk has no room, or the text cannot be read.
+    """
+    mark = hashlib.blake2b(ends_of(table.path), digest_size=16)
+    mark.update(repr((table.path.name, table, tag, version("loop-triage"))).encode())
+    folder = place / f"{NAMED}{mark.hexdigest()}"
+    done = _said(folder) or _laid(table, tag, folder)
+    first = next(folder.glob("*.parquet"), None)
+    if first is None:
+        expected = "rows of as many columns as the header"
+        raise InputError(f"{table.path}: no row", expected, "export it again")
+    return ParquetTable(
+        table.path,
+        table.names,
+        tuple(pq.read_schema(first).types),
+        (*table.found, *done["notes"]),
+        table.decimal,
+        table.first_row,
+        tuple(done["tags"]),
+        folder=folder,
+    )
+
+
+def holds_copies(place: Path) -> bool:
+    """Whether a directory of copies holds a whole one."""
+    return any(place.glob(f"{NAMED}*/{DONE}"))
+
+
+def forget_halves(place: Path) -> None:
+    """Remove what a process that died left half done in a directory of copies."""
+    for left in place.iterdir():
+        if left.is_dir() and not (left / DONE).exists():
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def _said(folder: Path) -> Said | None:
+    """What a whole copy says of itself; None where there is none, or a file of it lost its end with the power."""
+    try:
+        found = json.loads((folder / DONE).read_text(encoding="utf-8"))
+        for path in folder.glob("*.parquet"):
+            pq.read_metadata(path)
+        return {"notes": [*found["notes"]], "tags": [*found["tags"]]}
+    except (pa.ArrowException, OSError, ValueError, TypeError, KeyError):
+        return None
+
+
+def _laid(table: Sheet | ParquetTable, tag: int, folder: Path) -> Said:
+    """Lay a copy into a folder, which is there once it is whole."""
+    room = table.path.stat().st_size * (1 if isinstance(table, Sheet) else 4)
+    if shutil.disk_usage(folder.parent).free < room:
+        seen = f"{table.path}: no room for a copy of {room / 1e9:.1f} GB in {folder.parent}"
+        raise InputError(seen, "free disk", "make room")
+    made = Path(tempfile.mkdtemp(prefix=NAMED, dir=folder.parent))
+    if isinstance(table, Sheet):
+        tags, notes = read_through(table, partial(_sheet_parted, tag, made))
+    else:
+        tags, notes = _parted(_decoded(table.path), tag, made)[1], []
+    done = {"notes": notes, "tags": tags}
+    (made / DONE).write_text(json.dumps(done), encoding="utf-8")
+    shutil.rmtree(folder, ignore_errors=True)
+    os.replace(made, folder)
+    return done
+
+
+def _sheet_parted(tag: int, folder: Path, sheet: Sheet, texts: Collection[int]) -> tuple[int, int, list[str]]:
+    """How many lines of a sheet were rows and how many were left out, and the tags."""
+    for left in folder.glob("*.parquet"):  # of a pass that was begun anew
+        left.unlink()
+    left_out: list[int] = []
+    with csv.open_csv(sheet.path, **reading(sheet, left_out, {*texts, tag} - {-1})) as reader:
+        batches = ([trimmed(a, sheet.unquoted) for a in batch.columns] for batch in reader)
+        rows, tags = _parted(batches, tag, folder)
+    return rows, len(left_out), tags
+
+
+def _decoded(path: Path) -> Iterator[list[pa.Array]]:
+    """The rows of a Parquet file, dictionaries decoded: their batches are not of one type."""
+    with pq.ParquetFile(path) as file:
+        for batch in file.iter_batches(batch_size=BATCH_ROWS):
+            yield [a.dictionary_decode() if pa.types.is_dictionary(a.type) else a for a in batch.columns]
+
+
+def _parted(batches: Iterable[list[pa.Array]], tag: int, folder: Path) -> tuple[int, list[str]]:
+    """Lay rows into the files of their pieces; how many they are, and the tags in the order in which they are met."""
+    rows, tags = 0, dict[str, None]()
+    held = defaultdict[int, list[pa.RecordBatch]](list)
+    writers: dict[int, pq.ParquetWriter] = {}
+
+    def write(k: int) -> None:
+        table = pa.Table.from_batches(held.pop(k))
+        if k not in writers:
+            path = folder / f"{k:03d}.parquet"
+            writers[k] = opened.enter_context(pq.ParquetWriter(path, table.schema, compression="snappy"))
+        writers[k].write_table(table.combine_chunks())
+
+    with contextlib.ExitStack() as opened:
+        for columns in batches:
+            batch = pa.RecordBatch.from_arrays(columns, names=[str(i) for i in range(len(columns))])
+            rows += batch.num_rows
+            for k, part in _by_piece(batch, tag, tags):
+                held[k].append(part)
+                if sum(some.num_rows for some in held[k]) >= HELD_ROWS:
+                    write(k)
+        for k in list(held):
+            write(k)
+    return rows, list(tags)
+
+
+def _by_piece(batch: pa.RecordBatch, tag: int, tags: dict[str, None]) -> Iterator[tuple[int, pa.RecordBatch]]:
+    """The rows of each piece, all of a wide table of one; the tags that they hold are added to `tags`."""
+    if batch.num_rows == 0:
+        return
+    if tag < 0:
+        yield 0, batch
+        return
+    coded = pc.dictionary_encode(batch.column(tag), null_encoding="encode")
+    names = ["" if name is None else str(name) for name in coded.dictionary.to_pylist()]
+    tags.update(dict.fromkeys(filter(None, names)))
+    of_kind = np.array([piece_of(name) for name in names], dtype=np.uint8)  # small: sorted fast
+    piece = of_kind[coded.indices.to_numpy(zero_copy_only=False)]
+    order = np.argsort(piece, kind="stable")
+    ordered, cuts = batch.take(pa.array(order)), np.searchsorted(piece[order], np.arange(PIECES + 1))
+    for k in np.unique(piece):
+        yield int(k), ordered.slice(cuts[k], cuts[k + 1] - cuts[k])

@@ -18,10 +18,14 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from analyzer.history.names import COLUMNS, QUALITY_OF, WORDS, plain
-from analyzer.history.table import Table, distinct
+from analyzer.history.table import COLUMNS, WORDS, Table, any_of, distinct, plain
 from analyzer.limits import HISTORY
 
+QUALITY_OF = (
+    re.compile(rf"^(?P<tag>.+?)[ ._:/|#-]?\(?(?:{any_of('quality')})\)?$", re.IGNORECASE),
+    re.compile(rf"^(?:{any_of('quality')})(?: of)?[ ._:/|#-]*[(\[]?(?P<tag>.+?)[)\]]?$", re.IGNORECASE),
+)
+"""Names of quality columns that hold the tag's, in front or behind."""
 GOOD, BAD, NOT_BAD, IS_BAD = (
     frozenset(WORDS["quality"][kind]) for kind in ("good", "bad", "not_bad", "is_bad")
 )
@@ -184,10 +188,9 @@ def _numbers(codes: pa.Array) -> NDArray[np.float64]:
 
 
 def _good(kinds: pa.Array, scheme: Scheme) -> NDArray[np.bool_]:
-    if scheme is Scheme.TEXT:
-        return np.array([_good_text(str(text)) for text in kinds.to_pylist()])
-    if scheme is Scheme.BAD_FLAG:
-        return np.array([_code_text(code) in NOT_BAD for code in kinds.to_pylist()])
+    if scheme in (Scheme.TEXT, Scheme.BAD_FLAG):
+        texts = map(_code_text, kinds.to_pylist())
+        return np.array([_good_text(t) if scheme is Scheme.TEXT else t in NOT_BAD for t in texts])
     number = _numbers(kinds)
     return np.isfinite(number) & IS_GOOD[scheme](np.nan_to_num(number, nan=-1).astype(np.int64))
 

@@ -8,14 +8,11 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from analyzer.history.table import any_of
 from analyzer.limits import HISTORY
 
 DELIMITERS = (";", "\t", "|", ",")
-TITLE = re.compile(
-    r"^\W*(?:tag ?name|tag|point ?name|point|item|variable|channel|signal|messstelle|name)\s*[:=]\s*"
-    r"(?P<tag>\S.*)$",
-    re.IGNORECASE,
-)
+TITLE = re.compile(rf"^\W*(?:{any_of('title')})\s*[:=]\s*(?P<tag>\S.*)$", re.IGNORECASE)
 BARE_TITLE = re.compile(r"^\"?(?P<tag>[^\s\",;|A-Za-z]*[A-Za-z][^\s\",;|._:/-]*[._:/-][^\s\",;|]*)\"?$")
 BEHIND = re.compile(r"\W+$")
 STAMPED = re.compile(r"^\s*\"?\d{1,4}[-/. ]\w{1,10}[-/. ]\d{1,4}\b")

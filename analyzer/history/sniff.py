@@ -9,7 +9,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import chain, pairwise, repeat
 from operator import itemgetter
 from pathlib import Path
 
@@ -18,10 +18,10 @@ import pyarrow as pa
 from analyzer.history import stamps
 from analyzer.history.clock import SINCE_START, time_scale_of
 from analyzer.history.files import detect_encoding
-from analyzer.history.names import WORDS, is_stamp, without_unit
 from analyzer.history.rewritten import rewritten
 from analyzer.history.sheet import Sheet, types_of
-from analyzer.history.table import ReadOptions
+from analyzer.history.table import WORDS, ReadOptions
+from analyzer.history.time_columns import is_stamp, without_unit
 from analyzer.limits import HISTORY
 from identification.errors import InputError
 
@@ -164,21 +164,25 @@ def _delimiter(path: Path, lines: Sequence[str]) -> str:
 
 def _header(path: Path, lines: Sequence[str], delimiter: str) -> tuple[int, list[str]]:
     """Line number (from 0) and cells of the header: of the lines as wide as the table above its data the first with a
-    name of a time column; else such a line under a preamble that looks like data; else the first of them."""
+    name of a time column; else such a line over a row of data, under a preamble that looks like data; else the first
+    of them; else one behind a comment sign. A table without a header has none."""
     width = _shape(_data_lines(lines), delimiter)[1]
-    above: list[tuple[int, list[str]]] = []
-    for place, line in enumerate(lines):
-        cells = _cells(line, delimiter)
-        if NO_DATA_LINE.match(line.strip()) or len(cells) < max(2, width - 1):
-            continue
-        if not _is_data(cells):
-            above.append((place, cells))
-            continue
-        named = next(((k, names) for k, names in above if _names_all(names)), None)
-        found = named or _header_below(lines, place, delimiter, width) or next(iter(above), None)
-        return found or _commented(path, lines, place, delimiter)
-    if above:
-        return above[0]
+    split = ((k, _cells(line, delimiter)) for k, line in enumerate(lines) if _data_lines([line]))
+    rows = [(k, cells) for k, cells in split if len(cells) >= max(2, width - 1)]
+    data = next((i for i, (_, cells) in enumerate(rows) if _is_data(cells)), len(rows))
+    below = pairwise(rows[data + 1 : data + 1 + HISTORY.preamble_lines])
+    header = next(
+        chain(
+            (row for row in rows[:data] if data < len(rows) and _names_all(row[1])),
+            (a for a, b in below if not _is_data(a[1]) and _is_data(b[1]) and _names_time(a[1])),
+            rows[:data],
+        ),
+        None,
+    )
+    if header is not None:
+        return header
+    if data < len(rows):
+        return _commented(path, lines, rows[data][0], delimiter)
     raise InputError(f"{path}: no header", f"a line of {width} names above the samples", "add a header line")
 
 
@@ -191,18 +195,6 @@ def _names_all(cells: Sequence[str]) -> bool:
 def _names_time(cells: Sequence[str]) -> bool:
     """Whether one of some cells is the name of a time column; a unit alone is none."""
     return any(is_stamp(cell.strip()) and without_unit(cell.strip()) for cell in cells)
-
-
-def _header_below(
-    lines: Sequence[str], start: int, delimiter: str, width: int
-) -> tuple[int, list[str]] | None:
-    """A line of names within a few lines below a row that looks like data, over a row of data; a table without a
-    header has none."""
-    rows = [(k, _cells(lines[k], delimiter)) for k in range(start + 1, len(lines))][: HISTORY.preamble_lines]
-    for (place, cells), (_, after) in pairwise(rows):
-        if len(cells) >= width - 1 and _names_time(cells) and not _is_data(cells) and _is_data(after):
-            return place, cells
-    return None
 
 
 def _commented(path: Path, lines: Sequence[str], data: int, delimiter: str) -> tuple[int, list[str]]:
@@ -232,7 +224,10 @@ def _taken_as(lines: Sequence[str], delimiter: str) -> tuple[str, ...] | None:
     if len(rows) < 3 or len({len(row) for row in rows}) != 1 or len(rows[0]) < 3:
         return None
     columns = [[cell.strip() for cell in column] for column in zip(*rows, strict=True)]
-    kinds = [_kind_of_column(column) for column in columns]
+    # of all columns at once, for the pattern is built anew each time
+    first = stamps.fields(pa.array([column[0] for column in columns]))
+    stamped = repeat(False) if first is None else first.readable.tolist()
+    kinds = list(map(_kind_of_column, columns, stamped))
     if kinds[0] == "stamp" and set(kinds[1:]) == {"number"}:
         return ("timestamp", *(UNNAMED.format(i + 1) for i in range(1, len(columns))))
     if len(columns) > 8 or kinds.count("stamp") != 1 or "text" not in kinds or "number" not in kinds:
@@ -250,15 +245,18 @@ def _taken_as(lines: Sequence[str], delimiter: str) -> tuple[str, ...] | None:
     return tuple(names)
 
 
-def _kind_of_column(cells: Sequence[str]) -> str:
-    """'stamp', 'number', 'quality' or 'text' for what all cells of a column are; '' where they are not alike."""
+def _kind_of_column(cells: Sequence[str], stamped: bool) -> str:
+    """'stamp', 'number', 'quality' or 'text' for what all cells of a column are; '' where they are not alike.
+
+    `stamped` says whether the first one can be read as a stamp.
+    """
     numbers = [float(cell.replace(",", ".")) for cell in cells if NUMBER.match(cell)]
     if NUMBER.match(cells[0]) and len(numbers) >= HISTORY.numbers_share * len(cells):
         scale = time_scale_of(pa.array(numbers))
         return "number" if scale is None or scale in SINCE_START.values() else "stamp"
     if {cell.lower() for cell in cells} <= QUALITIES:
         return "quality"
-    parts = stamps.fields(pa.array(cells))
+    parts = stamps.fields(pa.array(cells)) if stamped else None
     if parts is not None and parts.readable.all():
         return "stamp"
     return "text" if all(cell and not NUMBER.match(cell) for cell in cells) else ""

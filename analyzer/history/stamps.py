@@ -1,26 +1,26 @@
-"""Written dates to seconds: one pattern for ISO, either order of day and month, month names, offsets.
+"""Written dates to seconds: one pattern for ISO, either order of day and month, month names, offsets and zones.
 
-Dates of exports, of which a whole file tells what stands first where the writing leaves it open; and a time that a
-person wrote in changes.csv, in loops.csv or on the command line.
+Dates of exports, and a time that a person wrote in changes.csv, in loops.csv or on the command line.
 """
 
 from __future__ import annotations
 
-import time
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from functools import lru_cache
 from typing import Any
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from analyzer.history.names import WORDS
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.history.plant_clock import utc_seconds as utc_s
-from analyzer.history.zones import offsets_h
+from analyzer.history.table import WORDS, plain
 from analyzer.limits import HISTORY
 from identification.errors import InputError
 
@@ -36,21 +36,7 @@ PATTERN = (
     r"\s*[(\[]?(?:UTC|GMT)?\s*(?P<z>[A-Z]{1,5}|[+-]\d\d(?::?\d\d)?)?[)\]]?"
     r"(?:\s*[(\[]?(?P<n>[A-Z][A-Za-z]+/[A-Za-z_/]+|[A-Z][A-Za-z]+(?: [A-Za-z]+)+)[)\]]?)?\s*$"
 )
-REARRANGED = (
-    (r"^(\d{4})(\d\d)(\d\d)[T ]?(\d\d):?(\d\d):?(\d\d)", r"\1-\2-\3 \4:\5:\6"),  # ISO without marks
-    (rf"^{LETTER}{{2,12}}\.?,? +({LETTER}|\d+[-/.]|\d+ {LETTER})", r"\1"),  # a day of the week
-    (  # ctime
-        rf"^({LETTER}{{3,12}}\.?) +(\d{{1,2}}) +(\d{{1,2}}:\d\d:\d\d(?:[.,]\d+)?) +([A-Z]+ |[+-]\d{{4}} )?(\d{{4}})$",
-        r"\1 \2 \5 \3 \4",
-    ),
-    (r"^(\d{1,2}:\d\d(?::\d\d)?(?:[.,]\d+)?),? +(\S.*\d{4})$", r"\2 \1"),  # the time of day first
-    (r"[年月년월] ?(\d)", r"-\1"),
-    (r"[일日]", ""),
-    (r" (\d{1,2})[时時시] ?(\d\d)[分분] ?(?:(\d\d)[秒초])?$", r" \1:\2:\3"),
-    (r"(\d)(?:st|nd|rd|th)\b", r"\1"),
-    (r" (?:de|del) ", " "),
-    (r",? (?:at|um|à|kl\.?) (\d{1,2}[:.])", r" \1"),
-)
+REARRANGED = [(way["written"].replace("LETTER", LETTER), way["meant"]) for way in WORDS["rearranged"]]
 """Writings that are brought into the form of the pattern, and what they become."""
 MONTHS = {begins: int(month) for month, words in WORDS["months"].items() for begins in words}
 LONGEST_MONTH = max(map(len, MONTHS))
@@ -61,10 +47,57 @@ OPEN = 3
 """The order of a date whose writing leaves it open, for two numbers stand in front."""
 SHOWN = 40
 """Characters of a time that an error shows."""
-DAY_FIRST_ZONES = ("Europe/", "Africa/", "Australia/", "Asia/")
-"""Zones in which dates have the day first where figures alone would read either way."""
-WITHOUT_LEAP = "so read, the stamps run without a leap"
 EXAMPLE = "a time such as 2026-03-09 08:00 or 2026-03-09T08:00:00Z"
+HEADER_ZONE = re.compile(
+    r"(?:^|[\s(\[_])(?P<name>(?i:UTC|GMT|Z|CEST|CET|EEST|EET)|[A-Z]{3,5})?"
+    r"\s*(?P<offset>[+-]\d{1,2}(?::?\d\d)?)?[)\]]?\s*$"
+)
+NAMED_ZONE = re.compile(r"(?P<zone>[A-Z][A-Za-z]+/[A-Za-z_]+(?:/[A-Za-z_]+)?)[)\]]?\s*$")
+"""A zone of the database of time zones at the end of a stamp or a column's name."""
+OFFSETS_H = {name: float(hours) for hours, names in WORDS["zone_letters"]["hours"].items() for name in names}
+SEVERAL = frozenset(WORDS["zone_letters"]["several"])
+
+
+@lru_cache
+def offsets_h(timezone: str | None) -> Mapping[str, float]:
+    """Hours east of Greenwich by letters, those of a stated zone among them as it means them."""
+    return {**OFFSETS_H, **own_letters(timezone)}
+
+
+@lru_cache
+def own_letters(timezone: str | None) -> Mapping[str, float]:
+    """What a zone's clock calls itself in winter and summer, and its hours east of Greenwich then."""
+    if timezone is None:
+        return {}
+    days = [datetime(datetime.now().year, month, 1, tzinfo=ZoneInfo(timezone)) for month in (1, 7)]
+    known = [(day.strftime("%Z").lower(), day.utcoffset()) for day in days]
+    return {name: at.total_seconds() / 3600.0 for name, at in known if at is not None and name.isalpha()}
+
+
+def named_zone(text: str) -> str | None:
+    """The zone at the end of a stamp or a column's name, as in '[Europe/Berlin]'; None where none is known there."""
+    found = NAMED_ZONE.search(text[-60:])
+    try:
+        return None if found is None else ZoneInfo(found["zone"]).key
+    except (ZoneInfoNotFoundError, ValueError, OSError):
+        return None
+
+
+def header_zone(name: str, timezone: str | None = None) -> tuple[float | None, str]:
+    """The offset from UTC that a time column's name states, as in 'Time (UTC+01:00)' [s]; None where none, or where
+    it is what the stated zone calls itself, which may change within the export. And letters there that mean several
+    zones; '' where there are none, or a zone is stated."""
+    if plain(name) in ("utc", "timeutc", "utctime"):
+        return 0.0, ""
+    found = HEADER_ZONE.search(name[-40:])
+    letters = "" if found is None else found["name"] or ""
+    several = letters if timezone is None and letters.lower() in SEVERAL else ""
+    if found is None or found["offset"] is None:
+        own = letters.lower() in own_letters(timezone)
+        hours = None if own else OFFSETS_H.get(letters.lower())
+        return None if hours is None else 3600.0 * hours, several
+    sign, digits = (-1.0 if found["offset"][0] == "-" else 1.0), found["offset"][1:].replace(":", "")
+    return sign * (3600.0 * float(digits[:2]) + 60.0 * float(digits[2:] or 0)), several
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,85 +255,6 @@ def _offset(zone: pa.Array, known: Mapping[str, float]) -> NDArray[np.float64]:
     return 3600.0 * named + np.where(west, -1.0, 1.0) * (3600 * hour + 60 * minute)
 
 
-@dataclass(frozen=True, slots=True)
-class DateOrder:
-    """What stands first ('day', 'month' or 'year'), what decided it, and whether that is sure: else another file may
-    decide."""
-
-    first: str
-    why: str
-    sure: bool = True
-
-
-def date_order(parts: Fields, example: str, timezone: str | None) -> DateOrder:
-    """The order of all dates of a file, one of which is `example`, in a stated zone.
-
-    Where nothing in them tells, the month first may lie ahead of us, or the day first be usual in the zone.
-    """
-    date = example.split(" ")[0]
-    pointed = "." in date
-    by_year = _with_short_year(parts, pointed and "-" not in date and "/" not in date)
-    if by_year is not None:
-        return by_year
-    shown = shown_order(parts)
-    if shown is not None:
-        return shown
-    if pointed:
-        return DateOrder("day", "dates with points; no day above 12 occurs")
-    limit = time.time() + HISTORY.ahead_s
-    ahead = [bool((stamp_seconds(parts, first) > limit).any()) for first in ("day", "month")]
-    usual = timezone is not None and timezone.startswith(DAY_FIRST_ZONES)
-    day = ahead[1] if ahead[0] != ahead[1] else usual
-    first, other = ("day", "month") if day else ("month", "day")
-    return DateOrder(first, f"every date fits both orders; state --{other}-first if so", sure=False)
-
-
-def shown_order(parts: Fields) -> DateOrder | None:
-    """The order that a number above 12 shows, or else that in which alone the stamps run without a leap; or None."""
-    first, second = ((part[parts.open] > 12).any() for part in (parts.a, parts.b))
-    if first != second:
-        return DateOrder(
-            "day" if first else "month", f"the {'first' if first else 'second'} number exceeds 12"
-        )
-    known = (np.unique(stamp_seconds(parts, order)) for order in ("day", "month"))
-    day, month = (np.max(np.diff(second[np.isfinite(second)]), initial=0.0) for second in known)
-    return None if day == month else DateOrder("day" if day < month else "month", WITHOUT_LEAP)
-
-
-def _with_short_year(parts: Fields, pointed: bool) -> DateOrder | None:
-    """What is decided of dates with years of two digits that may stand in front; None where they do not.
-
-    Dates with points have the year in front only where no other reading fits as well; of others that read several
-    ways the latest counts, for exports are of late.
-    """
-    if not parts.open.any() or not parts.short.all() or (parts.open & ~parts.year_may_begin).any():
-        return None
-    limit = time.time() + HISTORY.ahead_s
-    readings = {first: stamp_seconds(parts, first) for first in ("year", "day", "month")}
-    possible = {
-        k: found for k, found in readings.items() if np.isfinite(found).all() and found.max() <= limit
-    }
-    if "year" not in possible:
-        return None
-    if len(possible) == 1:
-        return DateOrder("year", "else the stamps would lie ahead of us")
-    leaps = {first: float(np.max(np.abs(np.diff(found)), initial=0.0)) for first, found in possible.items()}
-    if leaps["year"] < min(leap for first, leap in leaps.items() if first != "year"):
-        return DateOrder("year", WITHOUT_LEAP)
-    latest = {first: found.max() for first, found in possible.items() if leaps[first] == min(leaps.values())}
-    year = latest.pop("year", None)
-    if year is None:
-        return None
-    if not pointed and max(latest.values()) <= year:
-        first = "year"
-    elif len(latest) == 1:
-        first = next(iter(latest))
-    else:
-        return None
-    why = "the year may stand in front or behind; state --date-format if it is not so"
-    return DateOrder(first, why, sure=False)
-
-
 def parse_time(text: str, where: str, zone: str = UTC_NAME, day_first: bool | None = None) -> float:
     """A time that a person wrote as seconds since 1970-01-01 UTC; one that states no zone is of the plant's clock.
 
@@ -326,37 +280,26 @@ def parse_time(text: str, where: str, zone: str = UTC_NAME, day_first: bool | No
 def parse_times(
     texts: Sequence[str], where: Sequence[str], zone: str = UTC_NAME, day_first: bool | None = None
 ) -> NDArray[np.float64]:
-    """The same of many times at once, shape (n,); the first that is none, or reads two ways, is refused."""
+    """The same of one or more times at once, shape (n,); the first that is none, or reads two ways, is refused."""
     trimmed = [text.strip() for text in texts]
     parts = fields(pa.array(trimmed, pa.string()))
-    readable = np.zeros(len(texts), dtype=bool) if parts is None else parts.readable
-    for at in np.flatnonzero(~readable)[:1]:
-        raise InputError(f"{where[at]}: time {trimmed[at][:SHOWN]!r}", EXAMPLE, "correct the time")
-    if parts is None:
-        return np.empty(0)
-    day, sure = _stated_order(parts, trimmed, day_first)
+
+    def refused(at: int, why: str = "", remedy: str = "correct the time") -> InputError:
+        return InputError(f"{where[at]}: time {trimmed[at][:SHOWN]!r}{why}", EXAMPLE, remedy)
+
+    if parts is None or not parts.readable.all():
+        raise refused(0 if parts is None else int(np.argmin(parts.readable)))
+    either, above = parts.order == OPEN, (parts.a > 12) != (parts.b > 12)
+    pointed = np.array(["." in text.split(" ")[0] for text in trimmed]) | (parts.a == parts.b)
+    day = either & (np.where(above, parts.a > 12, pointed) if day_first is None else day_first)
+    unsure = either & (day_first is None) & (parts.year_may_begin | ~(above | pointed))
     local_s = np.where(day, stamp_seconds(parts, "day"), stamp_seconds(parts, "month"))
     with np.errstate(invalid="ignore"):
         of_our_time = (local_s >= HISTORY.stated_from_s) & (local_s < HISTORY.stated_to_s)
-    for at in np.flatnonzero(~sure | ~of_our_time)[:1]:
-        seen = f"{where[at]}: time {trimmed[at][:SHOWN]!r}"
-        if not sure[at]:
-            raise InputError(f"{seen} reads two ways", EXAMPLE, "write the year first, with four digits")
-        raise InputError(f"{seen} is no such day", EXAMPLE, "correct the time")
+    for at in np.flatnonzero(unsure | ~of_our_time)[:1].tolist():
+        if unsure[at]:
+            raise refused(at, " reads two ways", "write the year first, with four digits")
+        raise refused(at, " is no such day")
     at_s = zip(local_s.tolist(), parts.stated.tolist(), strict=True)
     epoch = datetime(1970, 1, 1)
     return np.array([s if stated else utc_s(epoch + timedelta(seconds=s), zone) for s, stated in at_s])
-
-
-def _stated_order(
-    parts: Fields, texts: Sequence[str], stated: bool | None
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Whether the day stands first in each date, shape (n,), and whether that is sure."""
-    either = parts.order == OPEN
-    if stated is not None:
-        return either & stated, np.ones(len(texts), dtype=bool)
-    above = (parts.a > 12) != (parts.b > 12)
-    pointed = np.array(["." in text.split(" ")[0] for text in texts]) | (parts.a == parts.b)
-    return either & np.where(above, parts.a > 12, pointed), ~either | (
-        ~parts.year_may_begin & (above | pointed)
-    )

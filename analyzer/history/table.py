@@ -1,11 +1,15 @@
-"""A file of named columns, whatever its format, and what a user may state about it."""
+"""A file of named columns, whatever its format, what historians call them, and what a user may state about it."""
 
 from __future__ import annotations
 
+import re
+import tomllib
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -13,9 +17,13 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history.files import own_scratch
+from analyzer.limits import HISTORY
+from identification.errors import InputError
 
 HEAD_ROWS = 1000
 """Rows by which a table is known before it is read."""
+WORDS: dict[str, Any] = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
+COLUMNS: dict[str, tuple[str, ...]] = {kind: tuple(names) for kind, names in WORDS["columns"].items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +100,44 @@ class Table(ABC):
     def each(self, columns: Sequence[int]) -> Iterator[list[pa.Array]]:
         """Whole columns, piece by piece where the table lies in several files."""
         yield self.read(columns)
+
+
+def any_of(kind: str) -> str:
+    """A pattern of any word of a kind in the name of a column, between the marks of a group."""
+    return "|".join(WORDS["in_names"][kind])
+
+
+def plain(name: str) -> str:
+    """Name without case, units in brackets, blanks and underscores: ' Time_Stamp (UTC)' is 'timestamp'."""
+    return re.sub(r"\([^()]*\)|\[[^\[\]]*\]|[\s_\-\"']", "", name[: HISTORY.name_length]).lower()
+
+
+def first_named(names: Sequence[str], wanted: Iterable[str]) -> int | None:
+    """Index of the column whose plain name comes first in `wanted`, or None."""
+    plains = [plain(name) for name in names]
+    return next((plains.index(name) for name in wanted if name in plains), None)
+
+
+def stated_column(path: Path, names: Sequence[str], stated: str, kind: str) -> int:
+    """Index of the column that the user names as that of a kind, time or quality.
+
+    Raises
+    ------
+    InputError
+        There is none of that name.
+    """
+    if stated not in names:
+        seen = f"{path}: no column '{stated}' among {', '.join(names[:8])}"
+        expected = f"the name of the {kind} column as it stands in the header"
+        raise InputError(seen, expected, f"correct --{kind}-column")
+    return names.index(stated)
+
+
+def check_once(path: Path, names: Sequence[str]) -> None:
+    """Raise InputError where a column's name stands twice, for then its tag is not clear."""
+    name, count = max(Counter(names).items(), key=lambda item: item[1], default=("", 1))
+    if count > 1:
+        raise InputError(f"{path}: column '{name}' stands twice", "each tag once", "rename or remove one")
 
 
 def is_text(kind: pa.DataType) -> bool:

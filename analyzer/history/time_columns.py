@@ -3,37 +3,48 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+from numpy.typing import NDArray
 
-from analyzer.history import stamps, zones
+from analyzer.history import stamps
 from analyzer.history.clock import (
     ELAPSED,
     SINCE_START,
+    WITHOUT_LEAP,
     Clock,
+    DateOrder,
     TimeScale,
     counted_s,
     date_and_time,
+    is_fixed,
+    shown_order,
     time_scale_of,
+    winter_offset_s,
 )
-from analyzer.history.names import (
-    BELOW_SECOND,
+from analyzer.history.table import (
     COLUMNS,
-    is_stamp,
+    WORDS,
+    ReadOptions,
+    Table,
+    any_of,
+    as_text,
+    is_number,
+    is_text,
+    numbers,
     plain,
     stated_column,
-    time_unit,
-    without_unit,
 )
-from analyzer.history.stamps import DateOrder, date_order
-from analyzer.history.table import ReadOptions, Table, as_text, is_number, is_text, numbers
 from analyzer.limits import HISTORY
 from identification.errors import InputError
 
+DAY_FIRST_ZONES = ("Europe/", "Africa/", "Australia/", "Asia/")
+"""Zones in which dates have the day first where figures alone would read either way."""
 TIME_OF_DAY = r"^\s*\d{1,2}(:\d\d(:\d\d([.,;]\d+)?)?|\.\d\d\.\d\d([.,]\d+)?)\s*([AaPp]\.?[Mm]\.?)?\s*$"
 LIKE_STAMP = re.compile(
     r"\d[-/. ]\.?\s*\w{1,12}[-/. ,]|\d:\d\d|[^\W\d]{3}\.? \d{1,2}\b|^\s*\d{8}|\d\.\d\d\.\d\d|\d[年년]"
@@ -43,16 +54,41 @@ SHOWN = 60
 """Characters of a cell that an error shows."""
 FINER = "timems"
 """Column of WinCC that holds its text's stamp to the microsecond, in millions of Excel days."""
+BELOW_SECOND = {name: float(unit_s) for unit_s, names in WORDS["below_second"].items() for name in names}
+"""Columns that hold the rest of a stamp below the second, and their unit [s]."""
+UNIT_IN_NAME = re.compile(
+    rf"(?:^|[\s_(\[.,-]+)(?:{'|'.join(f'(?P<{unit}>{any_of(unit)})' for unit in SINCE_START)})[)\].]*$",
+    re.IGNORECASE,
+)
 RANK = {name: i for i, name in enumerate((*COLUMNS["stamp"], *COLUMNS["time_of_day"]))}
 
 
-def find_clock(table: Table, options: ReadOptions) -> Clock:
-    """The time columns of a table, and how they are written.
+def time_unit(name: str) -> str:
+    """The unit that a time column's name states, as in 'Time (min)' or 't_h': ms, s, min, h or d; '' where none."""
+    found = UNIT_IN_NAME.search(name[: HISTORY.name_length])
+    return "" if found is None else str(found.lastgroup)
+
+
+def without_unit(name: str) -> str:
+    """A time column's name without the unit that stands behind it."""
+    return UNIT_IN_NAME.sub("", name[: HISTORY.name_length])
+
+
+def is_stamp(name: str) -> bool:
+    """Whether a column is named as stamps are, with or without a unit behind the name."""
+    if not plain(name):
+        return False
+    bare = plain(without_unit(name))
+    return plain(name) in COLUMNS["stamp"] or bare in COLUMNS["stamp"] or bare in COLUMNS["elapsed"]
+
+
+def find_clock(table: Table, options: ReadOptions, tag: int = -1) -> Clock:
+    """The time columns of a table, and how they are written; `tag` is the column of the tags of a long table.
 
     Raises
     ------
     InputError
-        No column holds a time, or the one that is named so cannot be read.
+        No column holds a time, or the one that is named so cannot be read, or its stamps have lost their seconds.
     """
     columns = _time_candidates(table, options)
     heads = dict(zip(columns, table.head(columns), strict=True))
@@ -64,21 +100,21 @@ def find_clock(table: Table, options: ReadOptions) -> Clock:
     second, local = clock.seconds(table.head(clock.columns))
     if np.isnan(second).all():
         raise _unreadable(table, clock.columns[0])
-    return _with_winter_time(table, _with_zone(table, replace(clock, local=local)))
+    _check_seconds(table, second, tag)
+    return _in_zone(table, replace(clock, local=local), table.names[clock.columns[0]])
 
 
-def stamps_clock(table: Table, column: int, options: ReadOptions) -> Clock:
-    """The clock of one column that is known to hold stamps."""
+def stamps_clock(table: Table, column: int, options: ReadOptions, name: str) -> Clock:
+    """The clock of one column that is known to hold stamps, under a name that may state their zone."""
     head = table.head([column])[0]
     scale = time_scale_of(head, time_unit(table.names[column])) if is_number(head.type) else None
     clock = _with_order(table, Clock((column,), timezone=options.timezone, scale=scale), options)
-    return _with_winter_time(table, replace(clock, local=clock.seconds([head])[1]))
+    return _in_zone(table, replace(clock, local=clock.seconds([head])[1]), name)
 
 
-def check_seconds(table: Table, clock: Clock, tag: int = -1) -> None:
-    """Raise InputError where stamps have lost their seconds, so that the samples of a minute share one; `tag` is the
-    column of the tags of a long table, -1 of a wide one."""
-    second = clock.seconds(table.head(clock.columns))[0]
+def _check_seconds(table: Table, second: NDArray[np.float64], tag: int) -> None:
+    """Raise InputError where the first stamps [s] have lost their seconds, so that the samples of a minute share one;
+    `tag` is the column of the tags of a long table, -1 of a wide one."""
     known = np.isfinite(second)
     if known.sum() < HISTORY.minutes_rows or (second[known] % 60.0 != 0).any():
         return
@@ -93,18 +129,14 @@ def check_seconds(table: Table, clock: Clock, tag: int = -1) -> None:
         raise InputError(seen, "a stamp of its own for each sample", remedy)
 
 
-def holds_stamps(name: str, head: pa.Array, since_start: bool = True) -> bool:
-    """Whether the first rows of a column are stamps; numbers only where the column is named as stamps are.
-
-    With `since_start` numbers may count from the start of the export; else they must lie in our time.
-    """
+def holds_stamps(head: pa.Array, timed: bool, above: bool) -> bool:
+    """Whether the first rows of a column are stamps; numbers only where the column is named as stamps are, or where a
+    tag stands above them: then they must lie in our time, else they may count from the start of the export."""
     filled = head.drop_null()
-    if len(filled) == 0 or pa.types.is_boolean(head.type):
-        return False
+    kind = _kind_of_time("", filled) if len(filled) else ""
     if is_number(head.type):
-        scale = time_scale_of(filled)
-        return name != "" and scale is not None and (since_start or scale not in SINCE_START.values())
-    return _kind_of_time(name, filled) == "full"
+        return isinstance(kind, TimeScale) and (timed or (above and kind not in SINCE_START.values()))
+    return kind == "full"
 
 
 def _with_order(table: Table, clock: Clock, options: ReadOptions) -> Clock:
@@ -118,8 +150,65 @@ def _with_order(table: Table, clock: Clock, options: ReadOptions) -> Clock:
     if parts is None or not parts.open.any():
         return clock
     whole = stamps.fields(as_text(date_and_time(table.read(clock.columns))), clock.timezone)
-    order = None if whole is None else date_order(whole, str(head[0].as_py()), clock.timezone)
+    order = None if whole is None else _date_order(whole, str(head[0].as_py()), clock.timezone)
     return replace(clock, order=order)
+
+
+def _date_order(parts: stamps.Fields, example: str, timezone: str | None) -> DateOrder:
+    """The order of all dates of a file, one of which is `example`, in a stated zone.
+
+    Where nothing in them tells, the month first may lie ahead of us, or the day first be usual in the zone.
+    """
+    date = example.split(" ")[0]
+    pointed = "." in date
+    by_year = _with_short_year(parts, pointed and "-" not in date and "/" not in date)
+    if by_year is not None:
+        return by_year
+    shown = shown_order(parts)
+    if shown is not None:
+        return shown
+    if pointed:
+        return DateOrder("day", "dates with points; no day above 12 occurs")
+    limit = time.time() + HISTORY.ahead_s
+    ahead = [bool((stamps.stamp_seconds(parts, first) > limit).any()) for first in ("day", "month")]
+    usual = timezone is not None and timezone.startswith(DAY_FIRST_ZONES)
+    day = ahead[1] if ahead[0] != ahead[1] else usual
+    first, other = ("day", "month") if day else ("month", "day")
+    return DateOrder(first, f"every date fits both orders; state --{other}-first if so", sure=False)
+
+
+def _with_short_year(parts: stamps.Fields, pointed: bool) -> DateOrder | None:
+    """What is decided of dates with years of two digits that may stand in front; None where they do not.
+
+    Dates with points have the year in front only where no other reading fits as well; of others that read several
+    ways the latest counts, for exports are of late.
+    """
+    if not parts.open.any() or not parts.short.all() or (parts.open & ~parts.year_may_begin).any():
+        return None
+    limit = time.time() + HISTORY.ahead_s
+    readings = {first: stamps.stamp_seconds(parts, first) for first in ("year", "day", "month")}
+    possible = {
+        k: found for k, found in readings.items() if np.isfinite(found).all() and found.max() <= limit
+    }
+    if "year" not in possible:
+        return None
+    if len(possible) == 1:
+        return DateOrder("year", "else the stamps would lie ahead of us")
+    leaps = {first: float(np.max(np.abs(np.diff(found)), initial=0.0)) for first, found in possible.items()}
+    latest = {first: found.max() for first, found in possible.items() if leaps[first] == min(leaps.values())}
+    year = latest.pop("year", None)
+    if year is None:
+        return None
+    if not latest:
+        return DateOrder("year", WITHOUT_LEAP)
+    if not pointed and max(latest.values()) <= year:
+        first = "year"
+    elif len(latest) == 1:
+        first = next(iter(latest))
+    else:
+        return None
+    why = "the year may stand in front or behind; state --date-format if it is not so"
+    return DateOrder(first, why, sure=False)
 
 
 def _with_fraction(table: Table, clock: Clock) -> Clock:
@@ -134,23 +223,19 @@ def _with_fraction(table: Table, clock: Clock) -> Clock:
     return clock
 
 
-def _with_zone(table: Table, clock: Clock) -> Clock:
-    """The clock with the zone that the column's name or its stamps state, where these are local."""
-    name, head = table.names[clock.columns[0]], table.head(clock.columns[:1])[0].drop_null()
+def _in_zone(table: Table, clock: Clock, name: str) -> Clock:
+    """The clock with the zone that a name or its stamps state, where these are local, marked where they show that it
+    keeps the zone's winter time all the year."""
+    head = table.head(clock.columns[:1])[0].drop_null()
     text = str(head[0].as_py()) if clock.local and is_text(head.type) and len(head) else ""
-    zone = zones.named_zone(name) or zones.named_zone(text) or clock.timezone
-    offset_s, several = zones.header_zone(name, zone)
+    zone = stamps.named_zone(name) or stamps.named_zone(text) or clock.timezone
+    offset_s, several = stamps.header_zone(name, zone)
     doubt = f", for '{several}' means several zones; state --timezone" if several else ""
-    return replace(clock, offset_s=offset_s, timezone=zone, doubt=doubt)
-
-
-def _with_winter_time(table: Table, clock: Clock) -> Clock:
-    """The clock, marked where its stamps show that it keeps the stated zone's winter time all the year."""
-    zone = clock.timezone
-    if not clock.local or clock.offset_s is not None or zone is None or zones.is_fixed(zone):
+    clock = replace(clock, offset_s=offset_s, timezone=zone, doubt=doubt)
+    if not clock.local or offset_s is not None or zone is None or is_fixed(zone):
         return clock
     second = clock.seconds(table.read(clock.columns))[0]
-    return replace(clock, winter_s=zones.winter_offset_s(second, zone))
+    return replace(clock, winter_s=winter_offset_s(second, zone))
 
 
 def _is_doubtful(
@@ -252,7 +337,7 @@ def _unreadable(table: Table, column: int) -> InputError:
     place = f"{table.path}: column '{table.names[column]}'{row}"
     seen = f"{place}: '{text[:SHOWN]}' is no time stamp that is known"
     letters = LETTERS_BEHIND.search(text)
-    if letters is not None and letters[1].lower() in zones.SEVERAL:
+    if letters is not None and letters[1].lower() in stamps.SEVERAL:
         return InputError(seen, f"one zone, but '{letters[1]}' means several", "state --timezone")
     remedy = "state the date format, such as --date-format '%y%m%d %H%M%S'"
     return InputError(seen, "stamps such as 2024-11-21 08:00:00 or 21.11.2024 08:00:00", remedy)

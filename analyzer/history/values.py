@@ -10,9 +10,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from analyzer.history.names import WORDS
 from analyzer.history.series import Series
-from analyzer.history.table import distinct, is_text, numbers
+from analyzer.history.table import WORDS, distinct, is_text, numbers
 from analyzer.limits import HISTORY
 
 BLANK = "cells are blank: no value (a historian that reports by exception leaves unchanged values blank)"

@@ -170,13 +170,8 @@ def controller(spec: LoopSpec, pv_span: float | None) -> Pid | None:
     if spec.kp is None or spec.ti is None or spec.kp == 0:
         return None
     kp = 100 / spec.kp if spec.gain_unit == "band" else spec.kp
-    ti_s = (
-        math.inf
-        if spec.ti == 0
-        else 60 / spec.ti
-        if spec.ti_unit == "repeats/min"
-        else spec.ti * _unit_s(spec)
-    )
+    repeats = spec.ti_unit == "repeats/min"
+    ti_s = math.inf if spec.ti == 0 else 60 / spec.ti if repeats else spec.ti * _unit_s(spec)
     td_s = (spec.td or 0.0) * _unit_s(spec)
     if spec.form is Form.PARALLEL:
         ti_s, td_s = abs(kp) * ti_s, td_s / abs(kp)

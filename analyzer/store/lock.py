@@ -23,7 +23,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from analyzer.history.converted import forget_halves, holds_copies
+from analyzer.history.parquet import forget_halves, holds_copies
 from analyzer.limits import STORE
 from analyzer.places import answering, content, is_remote
 from analyzer.store.notes import user

@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-import analyzer.history.converted as converted_module
+from analyzer.history import parquet
 from analyzer.history.export import Export, open_export
 from analyzer.history.parquet import ParquetTable
 from analyzer.history.series import Series
@@ -171,8 +171,8 @@ def test_a_stopped_run_s_copy_is_taken_up(tmp_path: Path, monkeypatch: pytest.Mo
     with pytest.raises(KeyboardInterrupt):
         stop()
     passes: list[Path] = []
-    plain = converted_module._pass
-    monkeypatch.setattr(converted_module, "_pass", lambda *a: passes.append(a[2]) or plain(*a))  # type: ignore[func-returns-value]
+    plain = parquet._sheet_parted
+    monkeypatch.setattr(parquet, "_sheet_parted", lambda *a: passes.append(a[2]) or plain(*a))  # type: ignore[func-returns-value]
     with scratch(store, resume=True) as copies:
         opened = open_export([path], ReadOptions(scratch=copies))
         again = opened.read(TAGS[:4])

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from analyzer.history import stamps
 from analyzer.history.export import open_export
 from identification.errors import InputError
 
@@ -64,6 +65,23 @@ def test_hours_minutes_and_seconds_since_the_start(tmp_path: Path, step_s: int) 
     export = open_export([tmp_path / "x.csv"])
     np.testing.assert_array_equal(export.read(["a.PV"])["a.PV"].stamp_s, at)
     assert any("since the start" in note for note in export.notes)
+
+
+def test_many_columns_are_asked_at_once_whether_they_hold_stamps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """How often stamps are taken apart, which costs more than all else of opening, does not grow with the columns."""
+    whole, calls = stamps.fields, []
+    monkeypatch.setattr(stamps, "fields", lambda *texts: calls.append(1) or whole(*texts))
+    met = []
+    for columns in (3, 300):
+        rows = [f"{at:%Y-%m-%d %H:%M:%S}" + f",{k}" * columns for k, at in enumerate(MOMENTS)]
+        names = [f"FIC{k}.PV" for k in range(columns)]
+        (tmp_path / "x.csv").write_text("\n".join([",".join(["Time", *names]), *rows]) + "\n")
+        calls.clear()
+        assert open_export([tmp_path / "x.csv"]).tags == tuple(names)
+        met.append(len(calls))
+    assert met[0] == met[1] > 0
 
 
 def test_a_time_of_day_without_a_date_is_refused(tmp_path: Path) -> None:

@@ -54,6 +54,27 @@ def sheet(header: str, excel: bool, quality: bool = False) -> str:
     return "\n".join(lines)
 
 
+@pytest.mark.parametrize(
+    ("name", "behind", "hours"),
+    [
+        ("Time (UTC+01:00)", "", 1.0),
+        ("Time [CET]_1", "", 1.0),
+        ("Time [Europe/Helsinki]", "", 2.0),
+        ("Time", " [Europe/Helsinki]", 2.0),
+        ("FIC101_MET", "", 0.0),
+    ],
+)
+def test_a_zone_that_names_or_stamps_state_counts(
+    tmp_path: Path, name: str, behind: str, hours: float
+) -> None:
+    """As in any other table; letters behind a tag above the stamps are none."""
+    rows = [f"2024-11-21 08:00:{k:02d}{behind},{k},2024-11-21 08:00:{k:02d}{behind},{k}" for k in range(20)]
+    (tmp_path / "x.csv").write_text("\n".join([f"{name},a.PV,{name},a.OP", *rows]) + "\n")
+    series = open_export([tmp_path / "x.csv"]).read(["a.PV", "a.OP"])
+    for tag in series.values():
+        np.testing.assert_array_equal(tag.stamp_s, START_S - 3600 * hours + np.arange(20))
+
+
 @pytest.mark.parametrize("excel", [False, True])
 @pytest.mark.parametrize("header", HEADERS)
 def test_every_tag_is_read_on_its_own_clock(tmp_path: Path, header: str, excel: bool) -> None:

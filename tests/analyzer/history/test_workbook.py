@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import sys
 import zipfile
 from pathlib import Path
 
@@ -134,6 +135,6 @@ def test_a_bomb_is_refused_by_its_declared_size(tmp_path):
 def test_without_the_extra_the_line_says_how_to_get_it(tmp_path, monkeypatch):
     """Where the package that reads workbooks is missing, the line names the extra, and CSV as the other way."""
     path = write(tmp_path / "day.xlsx", {"Data": wide("FIC1")})
-    monkeypatch.setattr("analyzer.history.files.can_be_read", lambda: False)
+    monkeypatch.setitem(sys.modules, "python_calamine", None)
     with pytest.raises(InputError, match=r"loop-triage\[excel\].*save the sheet as CSV"):
         open_export([path])
