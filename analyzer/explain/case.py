@@ -277,7 +277,8 @@ def loop_trends(asked: Asked, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...],
     InputError
         The export has no such loop, no PV of it, or no samples of PV in the span that is asked for.
     """
-    source, specs, _ = asked.opened()
+    plant = asked.opened()
+    source, specs = plant.export, plant.specs
     spec = spec_of(specs, tag)
     if spec.pv is None:
         raise InputError(f"{tag}: no PV tag in the export", f"{tag}.PV", "check --loops and the export")

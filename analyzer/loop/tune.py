@@ -223,11 +223,13 @@ def _trend_panels(t: Tuning, new: Pid, title: str) -> Panels:
 def proposal(asked: Asked, loop: str, drawn: bool) -> tuple[list[str], dict[str, bytes]]:
     """Lines of text and, if wanted, pictures by file name for the last night of one loop. Raises InputError where the
     loop or its settings are not known, NotAssessedError where its trends give no model."""
-    export, specs, _ = asked.opened()
-    row, config = spec_of(specs, loop), asked.config
-    night = nights_of(export, [row], config.nights, (asked.since_s, asked.until_s), asked.zone)[-1]
+    plant, config = asked.opened(), asked.config
+    row = spec_of(plant.specs, loop)
+    night = nights_of(replace(plant, specs=(row,)))[-1]
     spec = in_force(row, asked.changes, night.last_s)
-    prepared = prepare(spec, {t: cut(s, night) for t, s in export.read(spec.tags).items()}, config.quality)
+    prepared = prepare(
+        spec, {t: cut(s, night) for t, s in plant.export.read(spec.tags).items()}, config.quality
+    )
     stated = controller_of(spec, prepared)
     if stated is None:
         seen = f"{loop}: no kp and ti in loops.csv"

@@ -16,15 +16,13 @@ from analyzer.history.series import Series
 from analyzer.loops.changes import TuningChange, read_changes
 from analyzer.loops.spec import LoopSpec, unknown_columns
 from analyzer.loops.tags import find_loops, match, read_loops
-from analyzer.night.nights import Night, cut
+from analyzer.night.nights import Night, Plant, cut
 from analyzer.night.workers import Died, Workers
 from analyzer.places import is_remote
 from identification.errors import InputError
 
 MOST_NAMES = 10
 """Loops that are named in a note; the rest is counted."""
-Opened = tuple[Export, tuple[LoopSpec, ...], tuple[str, ...]]
-"""An export, its loops with their tags, and what there is to say about them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,10 +42,11 @@ class Asked:
     zone: str
     reading: Mapping[str, Any]
 
-    def opened(self) -> Opened:
-        """The export, its loops with their tags, and what there is to say about them and about the changes."""
+    def opened(self) -> Plant:
+        """The export and its loops, and what there is to say of them and of the changes."""
         source, specs, notes = opened(self.export, self.loops, **self.reading)
-        return source, specs, (*notes, *_of_no_loop(self.changes, specs))
+        span, notes = (self.since_s, self.until_s), (*notes, *_of_no_loop(self.changes, specs))
+        return Plant(source, specs, self.config, span, self.changes, self.zone, notes)
 
     def within(self, series: Mapping[str, Series]) -> dict[str, Series]:
         """The samples within the span of time that is asked for."""
@@ -74,8 +73,10 @@ def asked_of(
     return Asked(tuple(export), loops, dated, first, last, config, zone, reading)
 
 
-def opened(export: Sequence[Path], loops: Path | None, **reading: Any) -> Opened:
-    """An export and its loops, which are found by their tags' endings where no loops.csv is given."""
+def opened(
+    export: Sequence[Path], loops: Path | None, **reading: Any
+) -> tuple[Export, tuple[LoopSpec, ...], tuple[str, ...]]:
+    """An export, its loops, which are found by their tags' endings where no loops.csv is given, and notes on them."""
     reading["good_quality"] = tuple(reading.get("good_quality") or ()) or None
     source = open_export(list(export), ReadOptions(**reading))
     if loops is None:
@@ -97,8 +98,8 @@ def _of_no_loop(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> t
     return (f"--changes: {text}: correct the name",) if strange else ()
 
 
-def opened_apart(asked: Asked) -> Opened:
-    """The same, found out about in a worker process: a damaged file may take memory or time without end. Raises
+def opened_apart(asked: Asked) -> Plant:
+    """What is asked, opened in a worker process: a damaged file may take memory or time without end. Raises
     InputError where the export cannot be used, or the process that read it died."""
     with Workers(1, find_out, _allowed(asked)) as workers:
         workers.submit(asked)
@@ -121,10 +122,10 @@ def _allowed(asked: Asked) -> WorkerLimits:
     return replace(asked.config.workers, memory_mb=limits.memory_mb, **taking)
 
 
-def find_out(asked: Asked, began: Callable[[int], None]) -> Opened:
+def find_out(asked: Asked, began: Callable[[int], None]) -> Plant:
     """What a worker finds out about an export, its span of time included."""
-    source, specs, notes = asked.opened()
-    for spec in specs:
+    plant = asked.opened()
+    for spec in plant.specs:
         if spec.pv is not None:
-            source.span(spec.pv)
-    return source, specs, notes
+            plant.export.span(spec.pv)
+    return plant

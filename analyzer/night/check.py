@@ -69,7 +69,8 @@ def _changes_counted(changes: Sequence[TuningChange], specs: Sequence[LoopSpec])
 def check_lines(asked: Asked) -> Iterator[tuple[str, bool]]:
     """All lines on an export, each with whether a loop of it cannot be assessed. Raises InputError where it cannot be
     used; once the lines on it are told, where it has no loops."""
-    export, specs, notes = asked.opened()
+    plant = asked.opened()
+    export, specs, notes = plant.export, plant.specs, plant.notes
     first, last = export.span()
     span = f"{stamp(first, asked.zone)} to {stamp(last, asked.zone)} {asked.zone}"
     yield f"{len(export.tags)} tags, {len(specs)} loops, {span}", False
