@@ -70,7 +70,7 @@ def _tasks(plant: Plant, store: Store, nights: Sequence[Night], known: set[str])
     whole = Task(replace(plant, notes=()), tuple(nights), store, mark)
     tasks = []
     for i in range(0, len(left), size):
-        part = left[i : i + size]
+        part = tuple(left[i : i + size])
         told = {s.loop: held[s.loop] for s in part if s.loop in held}
         tasks.append(replace(whole.part(part, f"{i:06d}"), held=told))
     return tasks
