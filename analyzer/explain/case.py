@@ -31,7 +31,7 @@ from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import controller
 from analyzer.night.asked import Asked
-from analyzer.night.nights import Night, cut
+from analyzer.night.nights import ALWAYS, Night, cut
 from identification.controller.check import StatedSettings
 from identification.errors import InputError, NotAssessedError
 from identification.estimation.evidence import trials_between_moves
@@ -314,6 +314,6 @@ def asked_cases(asked: Asked, tag: str, held_out: Sequence[Path]) -> tuple[Case,
     first = replace(first, shortened=f"{parts_said([part for part, _ in kept])} {first.shortened}".strip())
     others = {part.name: c for part, c in kept[1:]}
     for path in held_out:
-        elsewhere = replace(asked, export=(path,), since_s=-math.inf, until_s=math.inf)
+        elsewhere = replace(asked, export=(path,), span=ALWAYS)
         others[path.name if path.name not in others else str(path)] = whole(elsewhere, tag)[0]
     return first, others

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -16,7 +15,7 @@ from analyzer.history.series import Series
 from analyzer.loops.changes import TuningChange, read_changes
 from analyzer.loops.spec import LoopSpec, unknown_columns
 from analyzer.loops.tags import find_loops, match, read_loops
-from analyzer.night.nights import Night, Plant, cut
+from analyzer.night.nights import ALWAYS, Night, Plant, Span, cut
 from analyzer.night.workers import Died, Workers
 from analyzer.places import is_remote
 from identification.errors import InputError
@@ -36,8 +35,7 @@ class Asked:
     export: tuple[Path, ...]
     loops: Path | None
     changes: tuple[TuningChange, ...]
-    since_s: float
-    until_s: float
+    span: Span
     config: Config
     zone: str
     reading: Mapping[str, Any]
@@ -45,13 +43,12 @@ class Asked:
     def opened(self) -> Plant:
         """The export and its loops, and what there is to say of them and of the changes."""
         source, specs, notes = opened(self.export, self.loops, **self.reading)
-        span, notes = (self.since_s, self.until_s), (*notes, *_of_no_loop(self.changes, specs))
-        return Plant(source, specs, self.config, span, self.changes, self.zone, notes)
+        notes = (*notes, *_of_no_loop(self.changes, specs))
+        return Plant(source, specs, self.config, self.span, self.changes, self.zone, notes)
 
     def within(self, series: Mapping[str, Series]) -> dict[str, Series]:
         """The samples within the span of time that is asked for."""
-        span = Night("", self.since_s, self.until_s)
-        return {tag: cut(found, span) for tag, found in series.items()}
+        return {tag: cut(found, Night("", *self.span)) for tag, found in series.items()}
 
 
 def asked_of(
@@ -66,11 +63,12 @@ def asked_of(
     """What a command line or a notebook asks; times that state no zone are of the plant's clock."""
     zone = str(zone_of(reading.get("timezone")))
     dated = () if changes is None else read_changes(changes, zone, reading.get("day_first"))
-    first = -math.inf if since is None else utc_seconds(since, zone)
-    last = math.inf if until is None else utc_seconds(until, zone)
+    first, last = ALWAYS
+    first = first if since is None else utc_seconds(since, zone)
+    last = last if until is None else utc_seconds(until, zone)
     if last <= first:
         raise InputError(f"--since {since} --until {until}", "an end after the start", "swap them")
-    return Asked(tuple(export), loops, dated, first, last, config, zone, reading)
+    return Asked(tuple(export), loops, dated, (first, last), config, zone, reading)
 
 
 def opened(

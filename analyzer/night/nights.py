@@ -141,6 +141,11 @@ class Plant:
         series = whole if span is None else {tag: cut(x, span) for tag, x in whole.items()}
         return PlantLoop(spec, prepare(spec, series, self.config.quality), self, span)
 
+    def last_night(self, name: str) -> PlantLoop:
+        """One loop over the last night that its own samples make; errors as of `loop` and `nights_of`."""
+        alone = replace(self, specs=(spec_of(self.specs, name),))
+        return alone.loop(name, alone.nights[-1])
+
 
 @dataclass(frozen=True)
 class PlantLoop:
