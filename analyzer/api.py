@@ -27,7 +27,7 @@ from analyzer.loop import assess as of_night
 from analyzer.loop import tune as of_settings
 from analyzer.loop.advice import withheld
 from analyzer.night.asked import asked_of
-from analyzer.night.nights import Plant, PlantLoop, cut
+from analyzer.night.nights import Plant, PlantLoop
 from analyzer.store.store import Store
 from identification.errors import InputError, NotAssessedError
 from identification.models import Estimate, Loop, Pid, Process, Valve
@@ -163,9 +163,7 @@ def explain(loop: PlantLoop) -> Explained:
     from analyzer.explain.explained import explained
 
     plant, spec = loop.plant, loop.spec
-    series = plant.export.read(tags_of(spec, plant.specs))
-    if loop.night is not None:
-        series = {tag: cut(x, loop.night) for tag, x in series.items()}
+    series = plant.trends(tags_of(spec, plant.specs), loop.night)
     return explained(case(spec, plant.specs, series, plant.config), lambda _: None)
 
 

@@ -278,14 +278,14 @@ def loop_trends(asked: Asked, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...],
         The export has no such loop, no PV of it, or no samples of PV in the span that is asked for.
     """
     plant = asked.opened()
-    source, specs = plant.export, plant.specs
+    specs = plant.specs
     spec = spec_of(specs, tag)
     if spec.pv is None:
         raise InputError(f"{tag}: no PV tag in the export", f"{tag}.PV", "check --loops and the export")
-    first, last = source.span(spec.pv)  # without stray stamps, which would stretch a record over centuries
+    # without stray stamps, which would stretch a record over centuries
+    first, last = plant.export.span(spec.pv)
     whole_span = Night("", first, last + 1.0)
-    series = {tag: cut(x, whole_span) for tag, x in source.read(tags_of(spec, specs)).items()}
-    series = asked.within(series)
+    series = {tag: cut(x, whole_span) for tag, x in plant.trends(tags_of(spec, specs)).items()}
     if series[spec.pv].stamp_s.size == 0:
         raise InputError(f"{tag}: no samples between --since and --until", "a span of the export", "widen it")
     return spec, specs, series

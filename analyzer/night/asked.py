@@ -11,11 +11,10 @@ from typing import Any
 from analyzer.config import Config, WorkerLimits
 from analyzer.history.export import Export, ReadOptions, open_export
 from analyzer.history.plant_clock import utc_seconds, zone_of
-from analyzer.history.series import Series
 from analyzer.loops.changes import TuningChange, read_changes
 from analyzer.loops.spec import LoopSpec, unknown_columns
 from analyzer.loops.tags import find_loops, match, read_loops
-from analyzer.night.nights import ALWAYS, Night, Plant, Span, cut
+from analyzer.night.nights import ALWAYS, Plant, Span
 from analyzer.night.workers import Died, Workers
 from analyzer.places import is_remote
 from identification.errors import InputError
@@ -45,10 +44,6 @@ class Asked:
         source, specs, notes = opened(self.export, self.loops, **self.reading)
         notes = (*notes, *_of_no_loop(self.changes, specs))
         return Plant(source, specs, self.config, self.span, self.changes, self.zone, notes)
-
-    def within(self, series: Mapping[str, Series]) -> dict[str, Series]:
-        """The samples within the span of time that is asked for."""
-        return {tag: cut(found, Night("", *self.span)) for tag, found in series.items()}
 
 
 def asked_of(

@@ -137,9 +137,13 @@ class Plant:
             raise InputError(f"night {night}", f"one of {', '.join(self.nights[-3:])}", "see Plant.nights")
         span = None if night is None else self.spans[night]
         spec = in_force(spec, self.changes, self.export.span()[1] if span is None else span.last_s)
-        whole = self.export.read(spec.tags)
-        series = whole if span is None else {tag: cut(x, span) for tag, x in whole.items()}
-        return PlantLoop(spec, prepare(spec, series, self.config.quality), self, span)
+        prepared = prepare(spec, self.trends(spec.tags, span), self.config.quality)
+        return PlantLoop(spec, prepared, self, span)
+
+    def trends(self, tags: Sequence[str], night: Night | None = None) -> dict[str, Series]:
+        """The samples of some tags over a night, or over the span."""
+        span = Night("", *self.span) if night is None else night
+        return {tag: cut(x, span) for tag, x in self.export.read(tags).items()}
 
     def last_night(self, name: str) -> PlantLoop:
         """One loop over the last night that its own samples make; errors as of `loop` and `nights_of`."""
