@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from analyzer.config import Config, WorkerLimits
-from analyzer.history.export import Export, ReadOptions, open_export
+from analyzer.history.export import ReadOptions, open_export
 from analyzer.history.plant_clock import utc_seconds, zone_of
 from analyzer.loops.changes import TuningChange, read_changes
 from analyzer.loops.spec import LoopSpec, unknown_columns
@@ -40,8 +40,19 @@ class Asked:
     reading: Mapping[str, Any]
 
     def opened(self) -> Plant:
-        """The export and its loops, and what there is to say of them and of the changes."""
-        source, specs, notes = opened(self.export, self.loops, **self.reading)
+        """The export and its loops, found by their tags' endings where no loops.csv is given, and what there is to
+        say of them and of the changes."""
+        source = open_export(list(self.export), ReadOptions(**self.reading))
+        notes: tuple[str, ...] = ()
+        if self.loops is None:
+            specs = find_loops(source.tags)
+        else:
+            stated = read_loops(self.loops, self.zone, self.reading.get("day_first"))
+            specs, notes = match(stated, source.tags)
+            own = unknown_columns(stated)
+            if own:
+                kept = f"{self.loops}: columns {', '.join(own)} mean nothing here and are kept as the plant's own"
+                notes = (kept, *notes)
         notes = (*notes, *_of_no_loop(self.changes, specs))
         return Plant(source, specs, self.config, self.span, self.changes, self.zone, notes)
 
@@ -57,6 +68,7 @@ def asked_of(
 ) -> Asked:
     """What a command line or a notebook asks; times that state no zone are of the plant's clock."""
     zone = str(zone_of(reading.get("timezone")))
+    reading["good_quality"] = tuple(reading.get("good_quality") or ()) or None
     dated = () if changes is None else read_changes(changes, zone, reading.get("day_first"))
     first, last = ALWAYS
     first = first if since is None else utc_seconds(since, zone)
@@ -64,23 +76,6 @@ def asked_of(
     if last <= first:
         raise InputError(f"--since {since} --until {until}", "an end after the start", "swap them")
     return Asked(tuple(export), loops, dated, (first, last), config, zone, reading)
-
-
-def opened(
-    export: Sequence[Path], loops: Path | None, **reading: Any
-) -> tuple[Export, tuple[LoopSpec, ...], tuple[str, ...]]:
-    """An export, its loops, which are found by their tags' endings where no loops.csv is given, and notes on them."""
-    reading["good_quality"] = tuple(reading.get("good_quality") or ()) or None
-    source = open_export(list(export), ReadOptions(**reading))
-    if loops is None:
-        return source, find_loops(source.tags), ()
-    stated = read_loops(loops, str(zone_of(reading.get("timezone"))), reading.get("day_first"))
-    specs, notes = match(stated, source.tags)
-    own = unknown_columns(stated)
-    if own:
-        kept = f"{loops}: columns {', '.join(own)} mean nothing here and are kept as the plant's own"
-        notes = (kept, *notes)
-    return source, specs, notes
 
 
 def _of_no_loop(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> tuple[str, ...]:
