@@ -17,24 +17,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from analyzer.config import Config
-from analyzer.history.export import Export
-from analyzer.history.plant_clock import UTC_NAME
 from analyzer.loop import assess as of_night
 from analyzer.loop import tune as of_settings
 from analyzer.loop.advice import withheld
-from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
-from analyzer.loop.quality import Prepared, prepare
-from analyzer.loops.changes import TuningChange, in_force
-from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.night.asked import asked_of
-from analyzer.night.nights import Night, cut, nights_of
+from analyzer.night.nights import Plant, PlantLoop
 from analyzer.store.store import Store
 from identification.errors import InputError, NotAssessedError
 from identification.models import Estimate, Loop, Pid, Process, Valve
@@ -62,76 +55,6 @@ __all__ = [
 Paths = str | Path | Sequence[str | Path]
 
 
-@dataclass(frozen=True)
-class PlantLoop:
-    """One loop over one night, or over all of an export.
-
-    spec : its row of loops.csv with the settings in force; prepared : its trends on one clock, with masks and notes;
-    plant : the export that it is of; night : None where it is the whole export.
-    """
-
-    spec: LoopSpec
-    prepared: Prepared
-    plant: Plant
-    night: Night | None = None
-
-    @property
-    def record(self) -> LoopRecord:
-        """SP, PV and OP on one clock [% of span], shape (n,) each."""
-        return self.prepared.record
-
-    @property
-    def controller(self) -> Pid | None:
-        """The stated settings in percent and seconds; None where loops.csv does not state them."""
-        return controller_of(self.spec, self.prepared)
-
-    @property
-    def earlier(self) -> tuple[Earlier, ...]:
-        """Settings that were in force in the record before its last ones, oldest first."""
-        stated = spec_of(self.plant.specs, self.spec.loop)
-        return earlier_settings(stated, self.plant.changes, self.prepared)
-
-
-@dataclass(frozen=True)
-class Plant:
-    """An export, its loops and the changes of their settings, and the plant's time zone, as `read` returns it."""
-
-    export: Export
-    specs: tuple[LoopSpec, ...]
-    changes: tuple[TuningChange, ...]
-    notes: tuple[str, ...]
-    config: Config
-    zone: str = UTC_NAME
-
-    @property
-    def loops(self) -> tuple[str, ...]:
-        """Names of the loops."""
-        return tuple(spec.loop for spec in self.specs)
-
-    @cached_property
-    def spans(self) -> Mapping[str, Night]:
-        """Nights by name, oldest first."""
-        found = nights_of(self.export, self.specs, self.config.nights, zone=self.zone)
-        return {night.name: night for night in found}
-
-    @property
-    def nights(self) -> tuple[str, ...]:
-        """Names of the nights, oldest first."""
-        return tuple(self.spans)
-
-    def loop(self, name: str, night: str | None = None) -> PlantLoop:
-        """One loop, over one night or over all that the export holds. Raises InputError where there is no such loop
-        or night, or the loop has no PV; NotAssessedError where its trends hold too little to be put on a clock."""
-        spec = spec_of(self.specs, name)
-        if night is not None and night not in self.spans:
-            raise InputError(f"night {night}", f"one of {', '.join(self.nights[-3:])}", "see Plant.nights")
-        span = None if night is None else self.spans[night]
-        spec = in_force(spec, self.changes, self.export.span()[1] if span is None else span.last_s)
-        whole = self.export.read(spec.tags)
-        series = whole if span is None else {tag: cut(x, span) for tag, x in whole.items()}
-        return PlantLoop(spec, prepare(spec, series, self.config.quality), self, span)
-
-
 def read(
     export: Paths,
     loops: str | Path | None = None,
@@ -157,8 +80,7 @@ def read(
     paths = [Path(p) for p in ([export] if isinstance(export, str | Path) else export)]
     stated, dated = (None if path is None else Path(path) for path in (loops, changes))
     asked = asked_of(paths, stated, dated, config or Config(), None, None, **reading)
-    source, specs, notes = asked.opened()
-    return Plant(source, specs, asked.changes, notes, asked.config, asked.zone)
+    return asked.opened()
 
 
 def assess(loop: PlantLoop) -> of_night.Assessment:
@@ -241,9 +163,7 @@ def explain(loop: PlantLoop) -> Explained:
     from analyzer.explain.explained import explained
 
     plant, spec = loop.plant, loop.spec
-    series = plant.export.read(tags_of(spec, plant.specs))
-    if loop.night is not None:
-        series = {tag: cut(x, loop.night) for tag, x in series.items()}
+    series = plant.trends(tags_of(spec, plant.specs), loop.night)
     return explained(case(spec, plant.specs, series, plant.config), lambda _: None)
 
 

@@ -109,7 +109,7 @@ def tune(asked: Asked, tag: str, out: Path | None) -> None:
     """
     from analyzer.loop.tune import proposal
 
-    check_lines, pictures = proposal(asked, tag, out is not None)
+    check_lines, pictures = proposal(asked.opened().last_night(tag), out is not None)
     for line in check_lines:
         say(line)
     if out is not None:

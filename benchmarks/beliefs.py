@@ -20,6 +20,7 @@ from analyzer.config import Config
 from analyzer.history.export import open_export
 from analyzer.loops.tags import match, read_loops
 from analyzer.night import batch
+from analyzer.night.nights import Plant
 from analyzer.store.store import Store
 from proofs.common import command, command_line, publish, table
 
@@ -33,7 +34,7 @@ def sample_night(store: Store) -> tuple[pa.Table, float]:
     took = 0.0
     for _ in range(2):
         started = time.perf_counter()
-        batch.run(batch.Batch(export, specs, store, Config()), 1)
+        batch.run(Plant(export, specs, Config()), store, 1)
         took = time.perf_counter() - started
     return store.read("nights", store.nights()[-1]), took / len(specs)
 

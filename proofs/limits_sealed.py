@@ -10,10 +10,10 @@ from typing import Any
 
 import pandas as pd
 
+from analyzer.api import read
 from analyzer.config import Config
 from analyzer.explain.case import case
 from analyzer.loops.spec import spec_of
-from analyzer.night.asked import opened
 from identification.controller.check import Finding, StatedSettings
 from identification.mismatch.answer import answer
 from identification.mismatch.diagnosis import controller_finding_of, explain, recorder_finding_of
@@ -42,7 +42,8 @@ def _cases() -> list[Case]:
 
 def _subject(folder: Path, tag: str) -> Recording:
     """One sealed recording as `triage explain` has it."""
-    source, specs, _ = opened((folder / f"{tag}-fit.parquet",), folder / "loops.csv")
+    plant = read(folder / f"{tag}-fit.parquet", folder / "loops.csv")
+    source, specs = plant.export, plant.specs
     spec = spec_of(specs, tag)
     series = source.read([*spec.tags, *(t for other in specs for t in other.tags)])
     return case(spec, specs, series, DEFAULT).subject

@@ -25,6 +25,7 @@ from analyzer.history.export import open_export
 from analyzer.loop.decisions import Action, Cause, Fault
 from analyzer.loops.spec import LoopSpec
 from analyzer.night import batch
+from analyzer.night.nights import Plant
 from analyzer.store.store import Store
 from identification.record import Floats
 from proofs.common import command, command_line, publish, table
@@ -169,7 +170,7 @@ def nights_of(seed: int, jobs: int) -> tuple[list[Drawn], Store, tempfile.Tempor
         trends = {d.tag: simulated(d, (seed, night, k)) for k, d in enumerate(plant)}
         first = START_S + night * 86400.0
         path = write_export(Path(folder.name) / "night.parquet", trends, first, float(EVERY_S))
-        batch.run(batch.Batch(open_export([path]), stated, store, Config()), jobs)
+        batch.run(Plant(open_export([path]), stated, Config()), store, jobs)
     return plant, store, folder
 
 

@@ -26,6 +26,7 @@ from analyzer.loops.changes import TuningChange, read_changes
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller, match, read_loops
 from analyzer.night import batch
+from analyzer.night.nights import Plant
 from analyzer.pages.rank import ranked
 from analyzer.pages.reading import read_night
 from analyzer.pages.summary import news_lines
@@ -106,7 +107,7 @@ def _nights(jobs: int, changes: Sequence[TuningChange], store: Store, news: list
     for night in range(14):
         first = START + timedelta(days=night)
         span = first.timestamp(), first.timestamp() + DAY_S
-        batch.run(batch.Batch(export, specs, store, Config(), *span, changes), jobs)
+        batch.run(Plant(export, specs, Config(), span, changes), store, jobs)
         rows = {r["loop"]: r for r in ranked(store, "oscillation_significance")[0]}
         told_news = news_lines(read_night(store, None, 1, drawn=False)) if night else []
         news += [f"| {first:%m-%d} | {line} | {truth[line.split()[0]].cause} |" for line in told_news]

@@ -20,6 +20,7 @@ from analyzer.loop.decisions import Cause, Finding, Status
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loops.spec import LoopSpec
 from analyzer.night import batch
+from analyzer.night.nights import Plant
 from analyzer.store.store import Store
 from identification.models import Pid
 from identification.record import Floats, LoopRecord
@@ -149,5 +150,5 @@ def night_of(
         path = Path(folder) / "export.parquet"
         pq.write_table(pa.table({"timestamp": stamp, **tags}), path)
         store = Store(Path(folder) / "store")
-        batch.run(batch.Batch(open_export([path]), specs, store, Config()), jobs)
+        batch.run(Plant(open_export([path]), specs, Config()), store, jobs)
         return {r["loop"]: r for r in store.own_rows("nights", store.nights()[-1], columns)}

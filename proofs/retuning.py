@@ -21,6 +21,7 @@ from analyzer.config import Config
 from analyzer.history.export import open_export
 from analyzer.loops.tags import match, read_loops
 from analyzer.night import batch
+from analyzer.night.nights import Plant
 from analyzer.pages.rank import ranked
 from analyzer.store.store import Store
 from proofs.common import command, command_line, publish
@@ -108,7 +109,7 @@ def triaged(rigs: Sequence[Rig], folder: Path) -> dict[str, dict[str, Any]]:
     export = open_export([trends])
     specs = match(read_loops(folder / "loops.csv"), export.tags)[0]
     store = Store(folder / "store")
-    batch.run(batch.Batch(export, specs, store, Config()))
+    batch.run(Plant(export, specs, Config()), store)
     return {row["loop"]: row for row in ranked(store, "oscillation_significance")[0]}
 
 

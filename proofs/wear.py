@@ -21,6 +21,7 @@ import numpy as np
 from analyzer.config import Config
 from analyzer.history.export import open_export
 from analyzer.night import batch
+from analyzer.night.nights import Plant
 from analyzer.store.store import Store
 from proofs.common import command, command_line, publish, table
 from proofs.many_nights import EVERY_S, Drawn, draw, simulated
@@ -63,7 +64,7 @@ def told(seed: int, nights: int, jobs: int) -> tuple[list[Drawn], list[dict[str,
             trends = {d.tag: simulated(d, (seed, night, k)) for k, d in enumerate(worn)}
             first = START_S + night * 86400.0
             path = write_export(Path(folder) / "night.parquet", trends, first, float(EVERY_S))
-            batch.run(batch.Batch(open_export([path]), stated, store, Config()), jobs)
+            batch.run(Plant(open_export([path]), stated, Config()), store, jobs)
             found.append({r["loop"]: r for r in store.rows("nights", store.nights()[-1], COLUMNS)})
             print(f"night {night + 1} of {nights}", file=sys.stderr)
     return plant, found

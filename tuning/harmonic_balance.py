@@ -86,15 +86,19 @@ def _excess(loop: Loop, branch: Branch, omega: Floats) -> Floats:
     return np.log(np.abs(response)) + branch.at_phase(phase)[1]
 
 
-def _roots(loop: Loop, branch: Branch) -> list[float]:
-    """Frequencies [rad/s] of all solutions on a branch, bracketed on the grid and polished."""
+def _roots(loop: Loop, branch: Branch) -> list[tuple[float, bool]]:
+    """Frequencies [rad/s] of all solutions on a branch, bracketed on the grid and polished, and which are stable.
+
+    Loeb's criterion (Atherton 1982) asks that with A a little larger the oscillation decays. As N's phase rises with
+    A on every branch, that is where abs(G C N), at the amplitude that closes the phase, falls with frequency.
+    """
     omega = _reach(loop, branch, REACH_POINTS)
     excess = _excess(loop, branch, omega)
     sign = np.sign(excess)
     at = np.flatnonzero(
         (sign[:-1] * sign[1:] <= 0) & np.isfinite(excess[:-1] + excess[1:]) & (sign[:-1] != 0)
     )
-    return [_polish(loop, branch, float(omega[k]), float(omega[k + 1])) for k in at]
+    return [(_polish(loop, branch, float(omega[k]), float(omega[k + 1])), bool(sign[k] > 0)) for k in at]
 
 
 def _polish(loop: Loop, branch: Branch, low: float, high: float) -> float:
@@ -106,31 +110,16 @@ def _polish(loop: Loop, branch: Branch, low: float, high: float) -> float:
     return 0.5 * (low + high)
 
 
-def _is_stable(loop: Loop, branch: Branch, omega: float, phase: float) -> bool:
-    """Loeb's criterion: with A a little larger the oscillation must decay.
-
-    From 1 + N(A) L(s) = 0, ds/dA = -i (dlnN/dA)/(dlnL/dw), whose real part must be negative (Atherton 1982).
-    """
-    w = omega * np.array([1 - 1e-4, 1 + 1e-4])
-    slope = np.diff(np.log(loop_response(loop, w)))[0]
-    slope = complex(slope.real, math.remainder(slope.imag, 2 * math.pi))
-    angle = phase + 1e-4 * np.array([-1.0, 1.0])
-    log_a, log_n = branch.at_phase(angle)
-    along_a = complex(log_n[1] - log_n[0], angle[1] - angle[0]) / (log_a[1] - log_a[0])
-    return (along_a / slope).imag < 0
-
-
-def _solution(loop: Loop, branch: Branch, omega: float) -> Balance:
+def _solution(loop: Loop, branch: Branch, omega: float, stable: bool) -> Balance:
     at = np.array([omega])
-    phase = np.angle(-1.0 / loop_response(loop, at))
-    log_a, _ = branch.at_phase(phase)
+    log_a, _ = branch.at_phase(np.angle(-1.0 / loop_response(loop, at)))
     amplitude = float(np.exp(log_a[0]))
     gain = float(np.abs(controller_response(loop.controller, at))[0])
     return Balance(
         period_s=2.0 * math.pi / omega,
         op_amplitude=amplitude,
         pv_amplitude=amplitude / gain,
-        stable=_is_stable(loop, branch, omega, float(phase[0])),
+        stable=stable,
         jumps=branch.jumps,
     )
 
@@ -140,7 +129,7 @@ def harmonic_balance(loop: Loop) -> tuple[Balance, ...]:
 
     Empty where the curves do not meet. With scan_s = 0 the controller is continuous, as in the study.
     """
-    found = [_solution(loop, b, w) for b in branches(loop.valve) for w in _roots(loop, b)]
+    found = [_solution(loop, b, *root) for b in branches(loop.valve) for root in _roots(loop, b)]
     return tuple(sorted(found, key=lambda s: s.period_s))
 
 

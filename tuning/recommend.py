@@ -1,22 +1,26 @@
-"""What to type into the controller, or why to leave it alone: a proposal for a loop in trouble."""
+"""What to type into the controller, or why to leave it alone: a proposal for a loop in trouble.
+
+Its sentences stand in reasons.toml; what is put into them is worded here.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib.resources import files
 
 import numpy as np
 
-from identification.models import Fopdt, Loop, Pid
+from identification.models import Backlash, Fopdt, Integrator, Loop, Pid
 from identification.record import Floats
 from identification.simulation.closed_loop import scan_step
-from tuning import Action, Cause, reasons
+from tuning import Action, Cause
 from tuning.describing import band, is_play
 from tuning.frequency_response import integral_s, maximum_sensitivity
-from tuning.limit_cycle import Confirmed, confirm
+from tuning.limit_cycle import Confirmed, Cycle, confirm
 from tuning.limits import LIMITS, METHOD, TuningLimits
-from tuning.reasons import WHY
 from tuning.rules import effective_delay, simc
 from tuning.search import (
     Bench,
@@ -24,11 +28,15 @@ from tuning.search import (
     bench,
     in_digits,
     mean_error,
+    rejection,
     robust,
     rounded,
     search,
     standard_load,
 )
+
+WHY: Mapping[str, str] = tomllib.loads((files("tuning") / "reasons.toml").read_text("utf-8"))
+"""Why settings are proposed or none, by the cause or by what decided it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +102,7 @@ def _tight(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
     """SIMC for a loop that swings by its tuning: the nominal, or on a known load the one of least error."""
     now = maximum_sensitivity(loop)
     if now <= limits.ms_most:
-        return Proposal(Action.UNDECIDED, reasons.not_tight(now), ms_before=now)
+        return Proposal(Action.UNDECIDED, WHY["robust"].format(ms=robustness(now)), ms_before=now)
     found = _simc_settings(loop, others, -limits.faster_most if load is not None else 0, limits)
     if not found:
         why = WHY["too_uncertain"].format(ms=limits.ms_most_sample)
@@ -108,8 +116,10 @@ def _tight(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
             for one in (loop, *others)
         )
         if left > 1.0 - limits.worth_error:
-            return Proposal(Action.UNDECIDED, reasons.little_less_error(left, now), ms_before=now)
-    return Proposal(Action.RETUNE, reasons.tight(loop, new, now, ms), new, ms_before=now, ms=ms)
+            return Proposal(Action.UNDECIDED, little_less_error(left, now), ms_before=now)
+    known = {"old": settings(loop.controller), "new": settings(new), "ms": robustness(ms)}
+    was = robustness(now) + " on the identified process" * math.isinf(now)
+    return Proposal(Action.RETUNE, WHY["tight"].format(was=was, **known), new, ms_before=now, ms=ms)
 
 
 def _simc_settings(
@@ -140,9 +150,9 @@ def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
     """The least travel and error that the limits allow, for a loop with play or stick-slip."""
     if band(loop.valve) <= 0.0:
         return Proposal(Action.UNDECIDED, WHY["no_size"])
-    before, fault = confirm(loop), reasons.fault(loop)
+    before, fault = confirm(loop), fault_told(loop)
     if _is_short_and_sticks(loop, limits):
-        known = {"fault": fault, "cycle": reasons.swings(before.cycle), "ratio": limits.stick_ratio}
+        known = {"fault": fault, "cycle": swings(before.cycle), "ratio": limits.stick_ratio}
         return Proposal(Action.REPAIR_VALVE, WHY["sticks_on_short_lag"].format(**known), before=before)
     if load is None:
         load = standard_load(loop, limits.most_steps)
@@ -154,10 +164,10 @@ def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
     candidates = search(table)
     chosen = _confirmed(table, candidates, before)
     if chosen is None:
-        why = reasons.nothing_better(loop, before, bool(candidates))
+        why = _nothing_better(loop, before, bool(candidates))
         return Proposal(Action.REPAIR_VALVE, why, before=before, ms_before=now, candidates=candidates)
     best, after = chosen
-    why = reasons.valve(loop, best, before, after, now, table)
+    why = _why_calmer(best, before, after, now, table)
     beyond = band(loop.valve) >= limits.band_beyond
     return Proposal(
         Action.REPAIR_VALVE if beyond else Action.RETUNE,
@@ -226,3 +236,72 @@ def _confirmed(
         ):
             return candidate, after
     return None
+
+
+def robustness(ms: float) -> str:
+    """A maximum sensitivity in words; a loop that has none is unstable."""
+    return f"Ms {ms:.2f}" if math.isfinite(ms) else "unstable"
+
+
+def _seconds(x: float) -> str:
+    """A time without an exponent."""
+    return f"{x:.3g}" if x < 1000 else f"{x:.0f}"
+
+
+def settings(controller: Pid) -> str:
+    """Kp and Ti in words, in percent of spans and seconds."""
+    ti = integral_s(controller)
+    return f"Kp {controller.kp:.3g} %/%, Ti {f'{_seconds(ti)} s' if math.isfinite(ti) else 'off'}"
+
+
+def fault_told(loop: Loop) -> str:
+    """A valve's fault with its size."""
+    width = band(loop.valve)
+    return (
+        f"play of {width:.2g} %" if is_play(loop.valve) else f"stick-slip with a stickband of {width:.2g} %"
+    )
+
+
+def swings(cycle: Cycle | None) -> str:
+    """A limit cycle with its period and amplitude."""
+    if cycle is None:
+        return "no limit cycle"
+    return f"a cycle of {_seconds(cycle.period_s)} s and ±{cycle.pv_amplitude:.2g} % PV"
+
+
+def _percent(ratio: float) -> str:
+    return f"{100 * (ratio - 1):+.0f} %"
+
+
+def little_less_error(left: float, now: float) -> str:
+    """Why a tight loop gets no settings: on its own load calmer ones might win nothing."""
+    way, size = ("raise", left - 1.0) if left > 1.0 else ("lower", 1.0 - left)
+    known = {"ms": robustness(now), "size": 100 * size, "alone": " alone" * (way == "lower")}
+    return WHY["little_less_error"].format(way=way, **known)
+
+
+def _why_calmer(best: Candidate, before: Confirmed, after: Confirmed, ms_before: float, table: Bench) -> str:
+    """Why settings for a loop with a faulty valve are proposed, and what they leave to be done."""
+    loop, new = table.loops[0], best.controller
+    peaks = [rejection(loop.process, pid).peak for pid in (new, loop.controller)]
+    why = WHY["calmer"].format(
+        fault=fault_told(loop),
+        old=f"{swings(before.cycle)} at {settings(loop.controller)} ({robustness(ms_before)})",
+        new=f"{swings(after.cycle)} at {settings(new)} ({robustness(best.ms)})",
+        models=len(table.loops),
+        travel=_percent(best.travel),
+        error=_percent(best.error),
+        peak=peaks[0] / peaks[1],
+    )
+    if not is_play(loop.valve):
+        return f"{why} {WHY['stick_slip_stays']}"
+    if isinstance(loop.process, Integrator):
+        return f"{why} {WHY['play_always_cycles']}"
+    return why if after.cycle is None else f"{why} {WHY['play_is_left']}"
+
+
+def _nothing_better(loop: Loop, before: Confirmed, considered: bool) -> str:
+    """Why a faulty valve's loop gets no settings."""
+    known = {"fault": fault_told(loop), "cycle": swings(before.cycle)}
+    kind = "play" if isinstance(loop.valve, Backlash) else "stick-slip"
+    return WHY["none_worth_it" if considered else "none_kept"].format(kind=kind, **known)

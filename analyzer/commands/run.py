@@ -28,8 +28,9 @@ from reports.whole_file import is_full
 
 if TYPE_CHECKING:
     from analyzer.night.asked import Asked
-    from analyzer.night.batch import Batch, Outcome
-    from analyzer.night.nights import Night
+    from analyzer.night.batch import Outcome
+    from analyzer.night.nights import Night, Plant
+    from analyzer.store.store import Store
 
 STOPPED = 128
 """Exit status of a run that a signal has stopped, less the signal's number: what shells and schedulers expect."""
@@ -169,20 +170,17 @@ def _run_night(
     """The export read, assessed as `how` says to analyzer/night/batch.py and, where it is asked for, explained; the
     outcome and the number of loops."""
     from analyzer.night.asked import opened_apart
-    from analyzer.night.batch import Batch
     from analyzer.store.lock import scratch
     from analyzer.store.store import Store
 
     with scratch(place, how["resume"]) as copies:
         reading = {**asked.reading, "scratch": copies}
-        source, specs, notes = opened_apart(replace(asked, reading=reading))
-        _say(notes, log)
-        span = asked.since_s, asked.until_s
-        batch = Batch(source, specs, Store(place), asked.config, *span, asked.changes, asked.zone)
-        outcome = _assessed(batch, how, log)
-        if explaining and len(outcome.unassessed) + len(outcome.failed) < len(specs):
-            _explain_night(batch, outcome.nights[-1], how["jobs"], how["resume"])
-    return outcome, len(specs)
+        plant, store = opened_apart(replace(asked, reading=reading)), Store(place)
+        _say(plant.notes, log)
+        outcome = _assessed(plant, store, how, log)
+        if explaining and len(outcome.unassessed) + len(outcome.failed) < len(plant.specs):
+            _explain_night(plant, store, outcome.nights[-1], how["jobs"], how["resume"])
+    return outcome, len(plant.specs)
 
 
 def _say(notes: Sequence[str], log: RunLog) -> None:
@@ -191,12 +189,12 @@ def _say(notes: Sequence[str], log: RunLog) -> None:
         log.say("note", text=note)
 
 
-def _assessed(batch: Batch, how: Mapping[str, Any], log: RunLog) -> Outcome:
+def _assessed(plant: Plant, store: Store, how: Mapping[str, Any], log: RunLog) -> Outcome:
     """Run the batch with progress and say what came of it: what was lost, how many were assessed, of which night."""
-    from analyzer.night import batch as nightly
+    from analyzer.night import batch
 
     with bar("loops") as progress:
-        outcome = nightly.run(batch, **how, progress=progress)
+        outcome = batch.run(plant, store, **how, progress=progress)
     _say(outcome.notes[:FEW], log)
     if len(outcome.notes) > FEW:
         more = len(outcome.notes) - FEW
@@ -205,20 +203,20 @@ def _assessed(batch: Batch, how: Mapping[str, Any], log: RunLog) -> Outcome:
         for loop, reason in lost_loops:
             say(f"{loop}: {reason}", err=True)
             log.say("lost", loop=loop, status=status, reason=reason)
-    nights, loops, failed = outcome.nights, len(batch.specs), len(outcome.failed)
+    nights, loops, failed = outcome.nights, len(plant.specs), len(outcome.failed)
     done = loops - len(outcome.unassessed) - failed
     log.say("assessed", loops=done, of=loops, failed=failed, nights=len(nights))
     several = f" ({len(nights)} nights from {nights[0].name})" if len(nights) > 1 else ""
     said = f"{done} of {loops} loops assessed{f', {failed} failed' if failed else ''}"
-    click.echo(f"{said}, night {nights[-1].name}{several}, in {batch.store.path}", err=True)
+    click.echo(f"{said}, night {nights[-1].name}{several}, in {store.path}", err=True)
     return outcome
 
 
-def _explain_night(batch: Batch, night: Night, jobs: int, resume: bool) -> None:
+def _explain_night(plant: Plant, store: Store, night: Night, jobs: int, resume: bool) -> None:
     """Explain the flagged loops of a night, with progress, and say how many."""
     from analyzer.explain.night import explain_flagged
 
     with bar("explained") as progress:
-        rows = explain_flagged(batch, night, jobs, resume, progress)
+        rows = explain_flagged(plant, store, night, jobs, resume, progress)
     named = sum(r["verdict"] not in ("none", "unexplained") for r in rows)
     click.echo(f"{len(rows)} flagged loops explained, {named} with a name", err=True)

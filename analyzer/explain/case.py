@@ -31,7 +31,7 @@ from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import controller
 from analyzer.night.asked import Asked
-from analyzer.night.nights import Night, cut
+from analyzer.night.nights import ALWAYS, Night, cut
 from identification.controller.check import StatedSettings
 from identification.errors import InputError, NotAssessedError
 from identification.estimation.evidence import trials_between_moves
@@ -277,14 +277,15 @@ def loop_trends(asked: Asked, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...],
     InputError
         The export has no such loop, no PV of it, or no samples of PV in the span that is asked for.
     """
-    source, specs, _ = asked.opened()
+    plant = asked.opened()
+    specs = plant.specs
     spec = spec_of(specs, tag)
     if spec.pv is None:
         raise InputError(f"{tag}: no PV tag in the export", f"{tag}.PV", "check --loops and the export")
-    first, last = source.span(spec.pv)  # without stray stamps, which would stretch a record over centuries
+    # without stray stamps, which would stretch a record over centuries
+    first, last = plant.export.span(spec.pv)
     whole_span = Night("", first, last + 1.0)
-    series = {tag: cut(x, whole_span) for tag, x in source.read(tags_of(spec, specs)).items()}
-    series = asked.within(series)
+    series = {tag: cut(x, whole_span) for tag, x in plant.trends(tags_of(spec, specs)).items()}
     if series[spec.pv].stamp_s.size == 0:
         raise InputError(f"{tag}: no samples between --since and --until", "a span of the export", "widen it")
     return spec, specs, series
@@ -313,6 +314,6 @@ def asked_cases(asked: Asked, tag: str, held_out: Sequence[Path]) -> tuple[Case,
     first = replace(first, shortened=f"{parts_said([part for part, _ in kept])} {first.shortened}".strip())
     others = {part.name: c for part, c in kept[1:]}
     for path in held_out:
-        elsewhere = replace(asked, export=(path,), since_s=-math.inf, until_s=math.inf)
+        elsewhere = replace(asked, export=(path,), span=ALWAYS)
         others[path.name if path.name not in others else str(path)] = whole(elsewhere, tag)[0]
     return first, others

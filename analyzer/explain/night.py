@@ -9,21 +9,18 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from analyzer.columns import EXPLAINED
 from analyzer.config import Config
 from analyzer.history.export import Export
 from analyzer.loop.decisions import Action, Cause, Status, counts
 from analyzer.loops.spec import LoopSpec
-from analyzer.night.nights import Night, cut
+from analyzer.night.nights import Night, Plant, cut
 from analyzer.night.workers import Died, executor
 from analyzer.store.store import Store
 from analyzer.store.table import rows_table
 from identification.errors import TriageError
-
-if TYPE_CHECKING:
-    from analyzer.night.batch import Batch
 
 TABLE = "explained"
 QUIET = (Cause.NONE, Action.NONE, "", None)
@@ -86,12 +83,12 @@ def answer_row(data: Mapping[str, Any], night: str, page: str = "") -> Row:
     return {**texts, "night": night, "answer": json.dumps(data), "page": page}
 
 
-def questions(batch: Batch, rows: Sequence[Mapping[str, Any]], night: Night) -> list[Question]:
+def questions(plant: Plant, rows: Sequence[Mapping[str, Any]], night: Night) -> list[Question]:
     """The flagged loops of a night, the most significant first."""
-    by_name, config = {s.loop: s for s in batch.specs}, batch.config
+    by_name, config = {s.loop: s for s in plant.specs}, plant.config
     chosen = sorted((r for r in rows if flagged(r)), key=lambda r: -(r["oscillation_significance"] or 0.0))
     return [
-        Question(batch.export, by_name[r["loop"]], by_name.get(r["source_loop"] or ""), night, config)
+        Question(plant.export, by_name[r["loop"]], by_name.get(r["source_loop"] or ""), night, config)
         for r in chosen
         if r["loop"] in by_name
     ]
@@ -109,7 +106,8 @@ def keep(store: Store, night: str, rows: Sequence[Row]) -> None:
 
 
 def explain_flagged(
-    batch: Batch,
+    plant: Plant,
+    store: Store,
     night: Night,
     jobs: int = 0,
     resume: bool = False,
@@ -117,20 +115,19 @@ def explain_flagged(
 ) -> list[Row]:
     """Explain the flagged loops of an assessed night and keep the answers: the rows, in the order in which they came.
 
-    batch : whose store holds the night; jobs : worker processes, 0 works in this one; resume : leave out loops that
+    store : which holds the night; jobs : worker processes, 0 works in this one; resume : leave out loops that
     the store holds an answer of; progress : called with loops done and loops in all.
     """
     from analyzer.explain.explained import abstained
 
-    store, config = batch.store, batch.config
-    asked = questions(batch, store.read("nights", night.name, ASKED).to_pylist(), night)
+    asked = questions(plant, store.read("nights", night.name, ASKED).to_pylist(), night)
     names = {q.spec.loop for q in asked}
     rows = [r for r in known(store, night.name) if resume or r["loop"] not in names]
     done = {r["loop"] for r in rows} & names
     left = [q for q in asked if q.spec.loop not in done]
     keep(store, night.name, rows)
     progress(len(done), len(asked))
-    with executor(jobs, len(left), answered, config.workers) as workers:
+    with executor(jobs, len(left), answered, plant.config.workers) as workers:
         for q in left:
             workers.submit(q)
         for at, result in enumerate(workers.results(), len(done) + 1):

@@ -31,11 +31,11 @@ from identification.estimation.window import Fit, Window, block_means
 from identification.limits import FIT
 from identification.models import Fopdt, Loop, Pid
 from identification.record import Floats, LoopRecord, Mask
-from identification.signals.half_cycles import size_kurtosis
 from identification.signals.spectrum import (
     Spectrum,
     locked_harmonic,
     peak_prominence,
+    size_kurtosis,
     spectrum,
     tapered_power,
 )

@@ -20,8 +20,7 @@ from analyzer.loop.decisions import counts
 from identification.controller.check import runs
 from identification.limits import SIGNALS
 from identification.record import Floats, LoopRecord, Mask
-from identification.signals.correlation import Rhythm, rhythm
-from identification.signals.half_cycles import levelled_correlation, shape, usual_prominence
+from identification.signals.correlation import Rhythm, levelled_correlation, rhythm
 from identification.signals.setpoint_response import amplitude_at_rest, moves, without_setpoint
 from identification.signals.spectrum import (
     Bands,
@@ -29,8 +28,10 @@ from identification.signals.spectrum import (
     band_signal,
     bands,
     envelope,
+    shape,
     spectrum,
     tapered_power,
+    usual_prominence,
 )
 
 

@@ -13,13 +13,9 @@ from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.decisions import Action, Cause, Need, Needs
 from analyzer.loop.fitness import at_limits, unfit_for_cause
 from analyzer.loop.identified import intervals, load_of, tuned
-from analyzer.loop.judged_stretch import controller_of, earlier_settings
-from analyzer.loop.quality import prepare
 from analyzer.loop.settings_side_by_side import compared, middle_ti
-from analyzer.loops.changes import in_force
-from analyzer.loops.spec import LoopSpec, spec_of
+from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
-from analyzer.night.nights import cut, nights_of
 from analyzer.words.reason import sign_in_full
 from analyzer.words.units import number
 from identification.errors import InputError, NotAssessedError
@@ -34,7 +30,7 @@ from tuning.limit_cycle import Confirmed, confirm
 from tuning.recommend import Proposal
 
 if TYPE_CHECKING:
-    from analyzer.night.asked import Asked
+    from analyzer.night.nights import PlantLoop
 
 MAP_POINTS = 36
 """Points of the map along each axis."""
@@ -205,20 +201,16 @@ def _trend_panels(t: Tuning, new: Pid, title: str) -> Panels:
     return Panels("forecast", f"{title}: both tunings on the same load", plots)
 
 
-def proposal(asked: Asked, loop: str, drawn: bool) -> tuple[list[str], dict[str, bytes]]:
-    """Lines of text and, if wanted, pictures by file name for the last night of one loop. Raises InputError where the
-    loop or its settings are not known, NotAssessedError where its trends give no model."""
-    export, specs, _ = asked.opened()
-    row, config = spec_of(specs, loop), asked.config
-    night = nights_of(export, [row], config.nights, (asked.since_s, asked.until_s), asked.zone)[-1]
-    spec = in_force(row, asked.changes, night.last_s)
-    prepared = prepare(spec, {t: cut(s, night) for t, s in export.read(spec.tags).items()}, config.quality)
-    stated = controller_of(spec, prepared)
+def proposal(one: PlantLoop, drawn: bool) -> tuple[list[str], dict[str, bytes]]:
+    """Lines of text and, if wanted, pictures by file name for one loop over a night. Raises InputError where its
+    settings are not known, NotAssessedError where its trends give no model."""
+    spec, prepared, stated, config = one.spec, one.prepared, one.controller, one.plant.config
+    loop, night = spec.loop, "" if one.night is None else one.night.name
     if stated is None:
         seen = f"{loop}: no kp and ti in loops.csv"
         raise InputError(seen, "both", "state them, so that new ones can be compared")
-    found = assess(prepared, stated, config, spec.type, earlier_settings(row, asked.changes, prepared))
-    head = [f"{loop}, night {night.name}: cause {found.verdict.cause}"]
+    found = assess(prepared, stated, config, spec.type, one.earlier)
+    head = [f"{loop}, night {night}: cause {found.verdict.cause}"]
     text = head + [f"sign of {s.points_to}: {sign_in_full(s)}" for s in found.verdict.signs]
     if found.verdict.measured is None:
         limited = at_limits(prepared.record, config.quality) if prepared.op_known else None
@@ -228,7 +220,7 @@ def proposal(asked: Asked, loop: str, drawn: bool) -> tuple[list[str], dict[str,
         return [*text, f"action: {Action.REPAIR_VALVE}", f"no settings: {needs or NO_MOVES}"], {}
     tuning = tune(found, stated, config, withheld(found, spec, stated, prepared.scale.span, config))
     text += proposal_lines(tuning, spec, prepared.scale.span)
-    return _with_settings_beside(tuning, spec, prepared.scale.span, config, night.name, text, drawn)
+    return _with_settings_beside(tuning, spec, prepared.scale.span, config, night, text, drawn)
 
 
 def _with_settings_beside(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -10,21 +9,18 @@ from pathlib import Path
 from typing import Any
 
 from analyzer.config import Config, WorkerLimits
-from analyzer.history.export import Export, ReadOptions, open_export
+from analyzer.history.export import ReadOptions, open_export
 from analyzer.history.plant_clock import utc_seconds, zone_of
-from analyzer.history.series import Series
 from analyzer.loops.changes import TuningChange, read_changes
 from analyzer.loops.spec import LoopSpec, unknown_columns
 from analyzer.loops.tags import find_loops, match, read_loops
-from analyzer.night.nights import Night, cut
+from analyzer.night.nights import ALWAYS, Plant, Span
 from analyzer.night.workers import Died, Workers
 from analyzer.places import is_remote
 from identification.errors import InputError
 
 MOST_NAMES = 10
 """Loops that are named in a note; the rest is counted."""
-Opened = tuple[Export, tuple[LoopSpec, ...], tuple[str, ...]]
-"""An export, its loops with their tags, and what there is to say about them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,21 +34,27 @@ class Asked:
     export: tuple[Path, ...]
     loops: Path | None
     changes: tuple[TuningChange, ...]
-    since_s: float
-    until_s: float
+    span: Span
     config: Config
     zone: str
     reading: Mapping[str, Any]
 
-    def opened(self) -> Opened:
-        """The export, its loops with their tags, and what there is to say about them and about the changes."""
-        source, specs, notes = opened(self.export, self.loops, **self.reading)
-        return source, specs, (*notes, *_of_no_loop(self.changes, specs))
-
-    def within(self, series: Mapping[str, Series]) -> dict[str, Series]:
-        """The samples within the span of time that is asked for."""
-        span = Night("", self.since_s, self.until_s)
-        return {tag: cut(found, span) for tag, found in series.items()}
+    def opened(self) -> Plant:
+        """The export and its loops, found by their tags' endings where no loops.csv is given, and what there is to
+        say of them and of the changes."""
+        source = open_export(list(self.export), ReadOptions(**self.reading))
+        notes: tuple[str, ...] = ()
+        if self.loops is None:
+            specs = find_loops(source.tags)
+        else:
+            stated = read_loops(self.loops, self.zone, self.reading.get("day_first"))
+            specs, notes = match(stated, source.tags)
+            own = unknown_columns(stated)
+            if own:
+                kept = f"{self.loops}: columns {', '.join(own)} mean nothing here and are kept as the plant's own"
+                notes = (kept, *notes)
+        notes = (*notes, *_of_no_loop(self.changes, specs))
+        return Plant(source, specs, self.config, self.span, self.changes, self.zone, notes)
 
 
 def asked_of(
@@ -66,27 +68,14 @@ def asked_of(
 ) -> Asked:
     """What a command line or a notebook asks; times that state no zone are of the plant's clock."""
     zone = str(zone_of(reading.get("timezone")))
+    reading["good_quality"] = tuple(reading.get("good_quality") or ()) or None
     dated = () if changes is None else read_changes(changes, zone, reading.get("day_first"))
-    first = -math.inf if since is None else utc_seconds(since, zone)
-    last = math.inf if until is None else utc_seconds(until, zone)
+    first, last = ALWAYS
+    first = first if since is None else utc_seconds(since, zone)
+    last = last if until is None else utc_seconds(until, zone)
     if last <= first:
         raise InputError(f"--since {since} --until {until}", "an end after the start", "swap them")
-    return Asked(tuple(export), loops, dated, first, last, config, zone, reading)
-
-
-def opened(export: Sequence[Path], loops: Path | None, **reading: Any) -> Opened:
-    """An export and its loops, which are found by their tags' endings where no loops.csv is given."""
-    reading["good_quality"] = tuple(reading.get("good_quality") or ()) or None
-    source = open_export(list(export), ReadOptions(**reading))
-    if loops is None:
-        return source, find_loops(source.tags), ()
-    stated = read_loops(loops, str(zone_of(reading.get("timezone"))), reading.get("day_first"))
-    specs, notes = match(stated, source.tags)
-    own = unknown_columns(stated)
-    if own:
-        kept = f"{loops}: columns {', '.join(own)} mean nothing here and are kept as the plant's own"
-        notes = (kept, *notes)
-    return source, specs, notes
+    return Asked(tuple(export), loops, dated, (first, last), config, zone, reading)
 
 
 def _of_no_loop(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> tuple[str, ...]:
@@ -97,8 +86,8 @@ def _of_no_loop(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> t
     return (f"--changes: {text}: correct the name",) if strange else ()
 
 
-def opened_apart(asked: Asked) -> Opened:
-    """The same, found out about in a worker process: a damaged file may take memory or time without end. Raises
+def opened_apart(asked: Asked) -> Plant:
+    """What is asked, opened in a worker process: a damaged file may take memory or time without end. Raises
     InputError where the export cannot be used, or the process that read it died."""
     with Workers(1, find_out, _allowed(asked)) as workers:
         workers.submit(asked)
@@ -121,10 +110,10 @@ def _allowed(asked: Asked) -> WorkerLimits:
     return replace(asked.config.workers, memory_mb=limits.memory_mb, **taking)
 
 
-def find_out(asked: Asked, began: Callable[[int], None]) -> Opened:
+def find_out(asked: Asked, began: Callable[[int], None]) -> Plant:
     """What a worker finds out about an export, its span of time included."""
-    source, specs, notes = asked.opened()
-    for spec in specs:
+    plant = asked.opened()
+    for spec in plant.specs:
         if spec.pv is not None:
-            source.span(spec.pv)
-    return source, specs, notes
+            plant.export.span(spec.pv)
+    return plant

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import uuid
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -21,17 +20,14 @@ from typing import Any
 
 from analyzer.belief.nights import held_pairs
 from analyzer.config import Config
-from analyzer.history.export import Export, met_told
+from analyzer.history.export import met_told
 from analyzer.history.files import ends_of
-from analyzer.history.plant_clock import UTC_NAME
 from analyzer.loop.decisions import Status
-from analyzer.loops.changes import TuningChange
-from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import no_loops
 from analyzer.night import chunk
 from analyzer.night.chunk import Done, Task
 from analyzer.night.finish import finish_night, is_empty
-from analyzer.night.nights import Night, nights_of
+from analyzer.night.nights import Night, Plant, nights_of
 from analyzer.night.workers import Died, Executor, executor
 from analyzer.store.lock import locked
 from analyzer.store.store import Store
@@ -44,25 +40,6 @@ progress bar and for workers that end together."""
 PACKAGES = ("identification", "tuning", "analyzer", "reports")
 Identity = Mapping[str, Any]
 """A run as it is written down beside its pieces: fingerprint, and words for people (export, loops, begun)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Batch:
-    """What is assessed, and where it is kept.
-
-    export; specs, its loops with the tags that it has; store, held for the run alone; config; since_s, until_s, the
-    span of time whose samples are assessed [s since 1970-01-01 UTC]; changes, when settings were changed: each night
-    has those in force at its end; zone, the plant's time zone, whose days the nights are.
-    """
-
-    export: Export
-    specs: Sequence[LoopSpec]
-    store: Store
-    config: Config
-    since_s: float = -math.inf
-    until_s: float = math.inf
-    changes: Sequence[TuningChange] = ()
-    zone: str = UTC_NAME
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,18 +61,18 @@ def chunk_size(loops: int) -> int:
     return min(max(-(-loops // CHUNKS), FEWEST), MOST)
 
 
-def _tasks(batch: Batch, nights: Sequence[Night], known: set[str]) -> list[Task]:
+def _tasks(plant: Plant, store: Store, nights: Sequence[Night], known: set[str]) -> list[Task]:
     """Chunks of the loops that no piece of the last night holds yet."""
-    left = [s for s in batch.specs if s.loop not in known]
+    left = [s for s in plant.specs if s.loop not in known]
     size = chunk_size(len(left))
     mark = uuid.uuid4().hex[:8]  # a worker of a killed run may write yet; its pieces have another mark
-    held = held_pairs(batch.store, nights[0].name)
-    whole = Task(batch.export, (), tuple(nights), batch.store, batch.config, mark, tuple(batch.changes))
+    held = held_pairs(store, nights[0].name)
+    whole = Task(replace(plant, notes=()), tuple(nights), store, mark)
     tasks = []
     for i in range(0, len(left), size):
         part = tuple(left[i : i + size])
         told = {s.loop: held[s.loop] for s in part if s.loop in held}
-        tasks.append(replace(whole, specs=part, key=f"{mark}-{i:06d}", held=told))
+        tasks.append(replace(whole.part(part, f"{i:06d}"), held=told))
     return tasks
 
 
@@ -114,16 +91,16 @@ def _mourned(workers: Executor[Task, Done], died: Died[Task]) -> Iterator[Done]:
     task, at = died.task, died.at
     if at is None and len(task.specs) > 1:
         for k, spec in enumerate(task.specs):
-            workers.submit(replace(task, specs=(spec,), key=f"{task.key}-{k}", alone=True))
+            workers.submit(task.part((spec,), k, alone=True))
         return
     at = at or 0
     others, hand = task.specs[:at] + task.specs[at + 1 :], task.specs[at : at + 1]
     if others:
-        workers.submit(replace(task, specs=others, key=f"{task.key}-{len(others)}"))
+        workers.submit(task.part(others, len(others)))
     if died.again and not task.alone:
-        workers.submit(replace(task, specs=hand, key=f"{task.key}-alone", alone=True), alone=True)
+        workers.submit(task.part(hand, "alone", alone=True), alone=True)
     else:
-        yield chunk.lose(replace(task, specs=hand, key=f"{task.key}-lost"), died.why)
+        yield chunk.lose(task.part(hand, "lost"), died.why)
 
 
 def in_one_order(value: object) -> bytes:
@@ -166,23 +143,23 @@ def of_code() -> bytes:
     return mark.digest()
 
 
-def identity(batch: Batch) -> Identity:
-    """What a run that goes on with the pieces of a batch must have in common with it."""
+def identity(plant: Plant) -> Identity:
+    """What a run that goes on with the pieces of another must have in common with it."""
     mark = hashlib.blake2b(of_code(), digest_size=16)
-    for source in batch.export.sources:
+    for source in plant.export.sources:
         mark.update(ends_of(source.path))
         mark.update(in_one_order(source.clock))
-    stated = (*batch.specs, *batch.changes, batch.zone)
-    mark.update(in_one_order((stated, batch.since_s, batch.until_s, batch.config)))
-    first, *others = [source.path.name for source in batch.export.sources]
+    stated = (*plant.specs, *plant.changes, plant.zone)
+    mark.update(in_one_order((stated, *plant.span, plant.config)))
+    first, *others = [source.path.name for source in plant.export.sources]
     read = first + (f" and {len(others)} more files" if others else "")
     now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    return {"fingerprint": mark.hexdigest(), "export": read, "loops": len(batch.specs), "begun": now}
+    return {"fingerprint": mark.hexdigest(), "export": read, "loops": len(plant.specs), "begun": now}
 
 
-def _begun(batch: Batch, nights: Sequence[Night], resume: bool) -> list[str]:
+def _begun(plant: Plant, store: Store, nights: Sequence[Night], resume: bool) -> list[str]:
     """Keys of the chunks that a stopped run left whole; all else of it is forgotten."""
-    store, mine = batch.store, identity(batch)
+    mine = identity(plant)
     if resume:
         require_same(store.run_file, mine)
         keys = [key for key in store.whole_chunks(nights[-1].name) if _is_readable(store, nights, key)]
@@ -206,61 +183,61 @@ def _is_readable(store: Store, nights: Sequence[Night], key: str) -> bool:
 
 
 def run(
-    batch: Batch,
+    plant: Plant,
+    store: Store,
     jobs: int = 0,
     resume: bool = False,
     replacing: bool = False,
     scheduler: str | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Outcome:
-    """Assess all loops of an export and keep the results.
+    """Assess all loops of a plant and keep the results.
 
-    jobs : worker processes; 0 works in this one, where a loop that takes all memory takes the run with it; resume :
-    go on with the pieces of a run that was stopped, instead of starting anew; replacing : forget what the store has
-    of these nights; scheduler : address of a Dask scheduler whose workers do the loops, instead of processes of this
-    machine; progress : called with loops done and loops in all. Raises InputError for no loops, no nights, another
-    run on the store, or pieces of another run to be gone on with.
+    store : where, held for the run alone; jobs : worker processes; 0 works in this one, where a loop that takes all
+    memory takes the run with it; resume : go on with the pieces of a run that was stopped, instead of starting anew;
+    replacing : forget what the store has of these nights; scheduler : address of a Dask scheduler whose workers do
+    the loops, instead of processes of this machine; progress : called with loops done and loops in all. Raises
+    InputError for no loops, no nights, another run on the store, or pieces of another run to be gone on with.
     """
-    if not batch.specs:
-        raise no_loops(batch.export.tags)
-    with locked(batch.store.path):
-        batch.store.upgrade()
-        span = batch.since_s, batch.until_s
-        nights = nights_of(batch.export, batch.specs, batch.config.nights, span, batch.zone)
-        said = [line for night in nights for line in batch.store.set_aside_damaged(night.name)]
-        keys, met = _begun(batch, nights, resume), Counter[str]()
-        whole = batch.store.read_parts(nights[-1].name, "nights", keys)
+    if not plant.specs:
+        raise no_loops(plant.export.tags)
+    with locked(store.path):
+        store.upgrade()
+        nights = nights_of(plant)
+        said = [line for night in nights for line in store.set_aside_damaged(night.name)]
+        keys, met = _begun(plant, store, nights, resume), Counter[str]()
+        whole = store.read_parts(nights[-1].name, "nights", keys)
         known = set() if whole is None else set(whole.column("loop").to_pylist())
-        done, of = len(known), len(batch.specs)
+        done, of = len(known), len(plant.specs)
         progress(done, of)
-        for result in _results(_tasks(batch, nights, known), jobs, batch.config, scheduler):
+        for result in _results(_tasks(plant, store, nights, known), jobs, plant.config, scheduler):
             keys.append(result.key)
             done += result.loops
             met.update(result.met)
             progress(done, of)
-        written, more = _finished(batch, nights, keys, replacing)
-        return _outcome(batch, written, (*batch.export.file_notes, *met_told(met), *said, *more))
+        written, more = _finished(plant, store, nights, keys, replacing)
+        return _outcome(plant, store, written, (*plant.export.file_notes, *met_told(met), *said, *more))
 
 
 def _finished(
-    batch: Batch, nights: Sequence[Night], keys: Sequence[str], replacing: bool
+    plant: Plant, store: Store, nights: Sequence[Night], keys: Sequence[str], replacing: bool
 ) -> tuple[list[Night], list[str]]:
     """The nights put together, those without a sample left out unless they are all there is."""
-    store, order = batch.store, [s.loop for s in batch.specs]
+    order = [s.loop for s in plant.specs]
     full = [night for night in nights if not is_empty(store, night.name, keys)] or list(nights[-1:])
     said = []
     if len(full) < len(nights):
         said.append(f"{len(nights) - len(full)} nights without a good sample of any loop are left out")
     for night in full:
-        said += finish_night(store, night.name, order, batch.config, keys, replacing)
+        said += finish_night(store, night.name, order, plant.config, keys, replacing)
     store.drop_parts()
     return full, said
 
 
-def _outcome(batch: Batch, nights: Sequence[Night], notes: Sequence[str]) -> Outcome:
+def _outcome(plant: Plant, store: Store, nights: Sequence[Night], notes: Sequence[str]) -> Outcome:
     """The outcome as the last night's table has it, for the loops of this run."""
-    wanted = {s.loop for s in batch.specs}
-    rows = batch.store.read("nights", nights[-1].name, ["loop", "status", "reason"]).to_pylist()
+    wanted = {s.loop for s in plant.specs}
+    rows = store.read("nights", nights[-1].name, ["loop", "status", "reason"]).to_pylist()
     lost = [r for r in rows if r["loop"] in wanted and r["status"] != Status.OK]
     unassessed = tuple((r["loop"], r["reason"]) for r in lost if r["status"] == Status.NOT_ASSESSED)
     failed = tuple((r["loop"], r["reason"]) for r in lost if r["status"] != Status.NOT_ASSESSED)

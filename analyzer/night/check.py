@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from analyzer.config import Config
-from analyzer.history.export import Export
 from analyzer.history.plant_clock import stamp
 from analyzer.loop.assess import hidden, unassessable
 from analyzer.loop.decisions import Needs
@@ -17,6 +16,7 @@ from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import no_loops
 from analyzer.night.asked import Asked
+from analyzer.night.nights import Plant
 from identification.errors import TriageError
 
 MOST_NAMES = 5
@@ -43,17 +43,17 @@ def _fit_for(lacking: Needs | None, spec: LoopSpec, prepared: Prepared, config: 
     return "fit for all questions" if unset is None else f"fit for all but new settings: {unset}"
 
 
-def loop_line(export: Export, spec: LoopSpec, asked: Asked) -> tuple[str, bool]:
+def loop_line(plant: Plant, spec: LoopSpec) -> tuple[str, bool]:
     """One loop's line, and whether it cannot be assessed."""
     if spec.pv is None:
         return f"{spec.loop}: no PV tag {spec.wanted_pv or spec.loop + '.PV'} in the export", True
     try:
-        prepared = prepare(spec, asked.within(export.read(spec.tags)), asked.config.quality)
+        prepared = prepare(spec, plant.trends(spec.tags), plant.config.quality)
     except TriageError as error:
         return f"{spec.loop}: {_tags(spec)}; fit for nothing: {error}", True
     record = prepared.record
-    lacking = unassessable(record, asked.config)
-    fit = _fit_for(lacking, spec, prepared, asked.config)
+    lacking = unassessable(record, plant.config)
+    fit = _fit_for(lacking, spec, prepared, plant.config)
     parts = [_tags(spec), f"{len(record)} samples every {record.dt_s:g} s", *prepared.notes, fit]
     return f"{spec.loop}: " + "; ".join(parts), lacking is not None
 
@@ -69,7 +69,8 @@ def _changes_counted(changes: Sequence[TuningChange], specs: Sequence[LoopSpec])
 def check_lines(asked: Asked) -> Iterator[tuple[str, bool]]:
     """All lines on an export, each with whether a loop of it cannot be assessed. Raises InputError where it cannot be
     used; once the lines on it are told, where it has no loops."""
-    export, specs, notes = asked.opened()
+    plant = asked.opened()
+    export, specs, notes = plant.export, plant.specs, plant.notes
     first, last = export.span()
     span = f"{stamp(first, asked.zone)} to {stamp(last, asked.zone)} {asked.zone}"
     yield f"{len(export.tags)} tags, {len(specs)} loops, {span}", False
@@ -80,7 +81,7 @@ def check_lines(asked: Asked) -> Iterator[tuple[str, bool]]:
     for note in notes:
         yield note, False
     for spec in specs:
-        yield loop_line(export, in_force(spec, asked.changes, last), asked)
+        yield loop_line(plant, in_force(spec, plant.changes, last))
     for note in export.notes:
         yield note, False
     if not specs:

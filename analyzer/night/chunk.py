@@ -15,7 +15,6 @@ import pyarrow as pa
 from analyzer.belief.nights import Held
 from analyzer.columns import HOURS, NIGHTS, SETTINGS
 from analyzer.config import Config
-from analyzer.history.export import Export
 from analyzer.history.plant_clock import stamp
 from analyzer.history.series import Series
 from analyzer.lanes.standing import standing
@@ -31,7 +30,7 @@ from analyzer.loop.sample_clock import interval
 from analyzer.loop.witness import witness
 from analyzer.loops.changes import TuningChange, in_force, settings_from
 from analyzer.loops.spec import LoopSpec
-from analyzer.night.nights import Night, cut
+from analyzer.night.nights import Night, Plant, cut
 from analyzer.pages import compared as settings_pages
 from analyzer.plantwide.structure import Moves, moves_of, moves_table
 from analyzer.plantwide.wave import waves_table
@@ -49,18 +48,24 @@ week before."""
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One chunk of loops over some nights, small enough to send to a worker; `key` names its pieces, `alone`
+    """A chunk of a plant's loops over some nights, small enough to send to a worker; `key` names its pieces, `alone`
     says that it is one loop's second try, and `held` are settings that nights before have told of its loops."""
 
-    export: Export
-    specs: tuple[LoopSpec, ...]
+    plant: Plant
     nights: tuple[Night, ...]
     store: Store
-    config: Config
     key: str
-    changes: tuple[TuningChange, ...] = ()
     alone: bool = False
     held: Mapping[str, Held] = field(default_factory=dict)
+
+    @property
+    def specs(self) -> tuple[LoopSpec, ...]:
+        """Its loops."""
+        return self.plant.specs
+
+    def part(self, specs: tuple[LoopSpec, ...], name: object, alone: bool = False) -> Task:
+        """A task of some of its loops, whose pieces have a name beside its own."""
+        return replace(self, plant=replace(self.plant, specs=specs), key=f"{self.key}-{name}", alone=alone)
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,14 +191,14 @@ def _samples_of(task: Task, spec: LoopSpec) -> dict[str, Series] | Lost:
         wanted = spec.wanted_pv or f"{spec.loop}.PV"
         return Lost(Status.NOT_ASSESSED, Needs(Lack.PV, Need.PV_TAG, (wanted,)))
     try:
-        return task.export.read(spec.tags)
+        return task.plant.export.read(spec.tags)
     except Exception as error:  # a broken column is that loop's result
-        return _lost(error, task.config)
+        return _lost(error, task.plant.config)
 
 
 def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
     """Assess a chunk and write its pieces; `began` is told the number of each loop that is begun with."""
-    kept = {n.name: Rows() for n in task.nights}
+    kept, plant = {n.name: Rows() for n in task.nights}, task.plant
     for at, spec in enumerate(task.specs):
         began(at)
         series = _samples_of(task, spec)
@@ -203,10 +208,10 @@ def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
                 continue
             advising = night is task.nights[-1]
             held = task.held.get(spec.loop)
-            _loop_row(spec, series, night, task.config, advising, kept[night.name], task.changes, held)
+            _loop_row(spec, series, night, plant.config, advising, kept[night.name], plant.changes, held)
     for night in task.nights:
         _write_pieces(task, night.name, kept[night.name])
-    return Done(task.key, len(task.specs), task.export.met(tag for spec in task.specs for tag in spec.tags))
+    return Done(task.key, len(task.specs), plant.export.met(tag for spec in task.specs for tag in spec.tags))
 
 
 def lose(task: Task, reason: str) -> Done:

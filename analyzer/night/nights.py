@@ -1,20 +1,26 @@
-"""How an export is cut into nights, each a span of time that is assessed as one."""
+"""A plant: an export with its loops, cut into nights, each a span of time that is assessed as one."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
-from analyzer.config import NightLimits
+from analyzer.config import Config, NightLimits
 from analyzer.history.export import Export
 from analyzer.history.plant_clock import UTC_NAME, date_of, midnights
 from analyzer.history.series import Series, stamp_text
-from analyzer.loops.spec import LoopSpec
+from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
+from analyzer.loop.quality import Prepared, prepare
+from analyzer.loops.changes import TuningChange, in_force
+from analyzer.loops.spec import LoopSpec, spec_of
 from identification.errors import InputError
+from identification.models import Pid
+from identification.record import LoopRecord
 
 DAY_S = 86400.0
 Span = tuple[float, float]
@@ -76,18 +82,100 @@ def cut(series: Series, night: Night) -> Series:
     )
 
 
-def nights_of(
-    export: Export, specs: Sequence[LoopSpec], limits: NightLimits, span: Span = ALWAYS, zone: str = UTC_NAME
-) -> list[Night]:
-    """The nights of an export within a span of time, cut at the plant's midnights. Raises InputError where the export
-    has no PV of any loop, or nothing within the span."""
-    present = [s.pv for s in specs if s.pv is not None]
+def nights_of(plant: Plant) -> list[Night]:
+    """The nights of a plant within its span of time, cut at its midnights. Raises InputError where the export has no
+    PV of any loop, or nothing within the span."""
+    present = [s.pv for s in plant.specs if s.pv is not None]
     if not present:
-        wanted = specs[0].wanted_pv or f"{specs[0].loop}.PV"
+        wanted = plant.specs[0].wanted_pv or f"{plant.specs[0].loop}.PV"
         raise InputError("no PV tag of any loop is in the export", f"tags such as {wanted}", "check --loops")
-    since_s, until_s = span
-    spans = [export.span(tag) for tag in present]
+    since_s, until_s = plant.span
+    spans = [plant.export.span(tag) for tag in present]
     inside = [(max(a, since_s), min(b, until_s - 1.0)) for a, b in spans if a < until_s and b >= since_s]
     if not inside:
         raise InputError("no samples between --since and --until", "a span of the export", "widen it")
-    return in_nights(inside, limits, zone)
+    return in_nights(inside, plant.config.nights, plant.zone)
+
+
+@dataclass(frozen=True)
+class Plant:
+    """An export and its loops, and what is asked of both.
+
+    specs : loops with the tags that the export has; config : limits; span : of time, whose samples are used [s since
+    1970-01-01 UTC]; changes : when settings were changed, each night has those in force at its end; zone : the
+    plant's time zone, whose days the nights are; notes : what there is to say of files and tables.
+    """
+
+    export: Export
+    specs: tuple[LoopSpec, ...]
+    config: Config = field(default_factory=Config)
+    span: Span = ALWAYS
+    changes: Sequence[TuningChange] = ()
+    zone: str = UTC_NAME
+    notes: tuple[str, ...] = ()
+
+    @property
+    def loops(self) -> tuple[str, ...]:
+        """Names of the loops."""
+        return tuple(spec.loop for spec in self.specs)
+
+    @cached_property
+    def spans(self) -> Mapping[str, Night]:
+        """Nights by name, oldest first."""
+        return {night.name: night for night in nights_of(self)}
+
+    @property
+    def nights(self) -> tuple[str, ...]:
+        """Names of the nights, oldest first."""
+        return tuple(self.spans)
+
+    def loop(self, name: str, night: str | None = None) -> PlantLoop:
+        """One loop, over one night or over all that the export holds. Raises InputError where there is no such loop
+        or night, or the loop has no PV; NotAssessedError where its trends hold too little to be put on a clock."""
+        spec = spec_of(self.specs, name)
+        if night is not None and night not in self.spans:
+            raise InputError(f"night {night}", f"one of {', '.join(self.nights[-3:])}", "see Plant.nights")
+        span = None if night is None else self.spans[night]
+        spec = in_force(spec, self.changes, self.export.span()[1] if span is None else span.last_s)
+        prepared = prepare(spec, self.trends(spec.tags, span), self.config.quality)
+        return PlantLoop(spec, prepared, self, span)
+
+    def trends(self, tags: Sequence[str], night: Night | None = None) -> dict[str, Series]:
+        """The samples of some tags over a night, or over the span."""
+        span = Night("", *self.span) if night is None else night
+        return {tag: cut(x, span) for tag, x in self.export.read(tags).items()}
+
+    def last_night(self, name: str) -> PlantLoop:
+        """One loop over the last night that its own samples make; errors as of `loop` and `nights_of`."""
+        alone = replace(self, specs=(spec_of(self.specs, name),))
+        return alone.loop(name, alone.nights[-1])
+
+
+@dataclass(frozen=True)
+class PlantLoop:
+    """One loop over one night, or over all of an export.
+
+    spec : its row of loops.csv with the settings in force; prepared : its trends on one clock, with masks and notes;
+    plant : the export that it is of; night : None where it is the whole export.
+    """
+
+    spec: LoopSpec
+    prepared: Prepared
+    plant: Plant
+    night: Night | None = None
+
+    @property
+    def record(self) -> LoopRecord:
+        """SP, PV and OP on one clock [% of span], shape (n,) each."""
+        return self.prepared.record
+
+    @property
+    def controller(self) -> Pid | None:
+        """The stated settings in percent and seconds; None where loops.csv does not state them."""
+        return controller_of(self.spec, self.prepared)
+
+    @property
+    def earlier(self) -> tuple[Earlier, ...]:
+        """Settings that were in force in the record before its last ones, oldest first."""
+        stated = spec_of(self.plant.specs, self.spec.loop)
+        return earlier_settings(stated, self.plant.changes, self.prepared)

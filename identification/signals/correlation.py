@@ -92,6 +92,19 @@ def rhythm(x: Floats, dt_s: float, period_s: float) -> Rhythm:
     return Rhythm(at * dt_s, first, third, trough, _regularity(r))
 
 
+def levelled_correlation(x: Floats, dt_s: float, period_s: float) -> float:
+    """How well a band's signal comes back after a period once no half-cycle is larger than the usual one [-].
+
+    The lesser of the autocorrelation's first peak and 1.5 times the trough before it. One step of the load, through
+    the band a few large swings, hides a cycle of many halves from the plain autocorrelation; not from this one.
+    """
+    usual = float(np.median(np.abs(x)))
+    if usual <= 0.0:
+        return 0.0
+    found = rhythm(np.clip(x, -SIGNALS.level * usual, SIGNALS.level * usual), dt_s, period_s)
+    return min(found.first, 1.5 * found.trough)
+
+
 def _averaged(error: Floats, good: Mask, blocks: int, width: int) -> tuple[Floats, Mask]:
     """Means of the good samples of each block, 0 in blocks that are half bad, and which are not, shape (blocks,)."""
     weight = good[: blocks * width].reshape(blocks, width).mean(axis=1)

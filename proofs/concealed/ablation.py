@@ -22,10 +22,10 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
 import numpy as np
 import pandas as pd
 
+from analyzer.api import read
 from analyzer.config import Config
 from analyzer.explain.case import Case, case
 from analyzer.loops.spec import spec_of
-from analyzer.night.asked import opened
 from identification.controller.pi_regression import Trends, recovered_law
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.model_file import carried, to_data
@@ -42,7 +42,8 @@ LEVELS = ("plain", "masked", "concealed")
 
 def loaded(cases: pathlib.Path, tag: str, which: str) -> Case:
     """One recording of a case."""
-    source, specs, _ = opened((cases / f"{tag}-{which}.parquet",), cases / "loops.csv")
+    plant = read(cases / f"{tag}-{which}.parquet", cases / "loops.csv")
+    source, specs = plant.export, plant.specs
     spec = spec_of(specs, tag)
     return case(spec, specs, source.read(list(spec.tags)), Config())
 

@@ -18,10 +18,10 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
 import numpy as np
 import pandas as pd
 
+from analyzer.api import read
 from analyzer.config import Config
 from analyzer.explain.case import case
 from analyzer.loops.spec import spec_of
-from analyzer.night.asked import opened
 from identification.estimation.prediction_error import descended
 from identification.mismatch.answer import parameters_of
 from identification.mismatch.catalogue import CANDIDATES
@@ -45,7 +45,8 @@ def compared_names() -> list[str]:
 
 def fitted(cases: pathlib.Path, tag: str, effect: str):
     """Problem and fit of the right effect on one sealed case."""
-    source, specs, _ = opened((cases / f"{tag}-fit.parquet",), cases / "loops.csv")
+    plant = read(cases / f"{tag}-fit.parquet", cases / "loops.csv")
+    source, specs = plant.export, plant.specs
     spec = spec_of(specs, tag)
     s = case(spec, specs, source.read(list(spec.tags) + [t for o in specs for t in o.tags]), Config()).subject
     inputs = inputs_of(s)

@@ -18,12 +18,12 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
 
 import numpy as np
 
+from analyzer.api import read
 from analyzer.config import Config
 from analyzer.explain.case import Case, case
 from analyzer.explain.explained import Explained, explained
 from analyzer.explain.models import simulated
 from analyzer.loops.spec import spec_of
-from analyzer.night.asked import opened
 from identification.mismatch.model_file import to_data
 from identification.mismatch.selection import silent
 from proofs.concealed.proof import place_section, table
@@ -33,7 +33,8 @@ STEP, LOOP = "DUCT-03_air_step_1_5_90", "DUCT-09_pi_siso_full"
 
 def loaded(path: pathlib.Path) -> Case:
     """The only loop of an export."""
-    source, specs, _ = opened((path,), None)
+    plant = read(path)
+    source, specs = plant.export, plant.specs
     spec = spec_of(specs, path.stem.split("-")[0])
     return case(spec, specs, source.read(list(spec.tags)), Config())
 

@@ -19,6 +19,7 @@ from analyzer.history.export import Export, open_export
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import find_loops
 from analyzer.night import batch, chunk
+from analyzer.night.nights import Plant
 from analyzer.store.store import Store
 from identification.errors import InputError
 from proofs.plant import CONFIG, START_S, Sketch, Trends, simulate, write_export
@@ -70,7 +71,7 @@ def whole(night: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The store of an uninterrupted run in one process."""
     store = tmp_path_factory.mktemp("whole") / "store"
     export, specs = opened(night)
-    batch.run(batch.Batch(export, specs, Store(store), CONFIG))
+    batch.run(Plant(export, specs, CONFIG), Store(store))
     return store
 
 
@@ -101,7 +102,7 @@ def test_an_error_of_one_loop_is_its_result(night, tmp_path, monkeypatch):
     assess = chunk.assess
     monkeypatch.setattr(chunk, "assess", fails)
     export, specs = opened(night)
-    outcome = batch.run(batch.Batch(export, specs[:6], Store(tmp_path / "store"), CONFIG))
+    outcome = batch.run(Plant(export, specs[:6], CONFIG), Store(tmp_path / "store"))
     assert outcome.failed == (("L03", "ZeroDivisionError: of all things"),)
     assert outcome.unassessed == ()
 
@@ -138,7 +139,7 @@ def stopped(night: Path, store: Path, chunks: int) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(chunk, "work", killed)
         with pytest.raises(KeyboardInterrupt):
-            batch.run(batch.Batch(export, specs, Store(store), CONFIG))
+            batch.run(Plant(export, specs, CONFIG), Store(store))
 
 
 def test_a_stopped_run_goes_on_where_it_stood(night, whole, tmp_path, monkeypatch):
@@ -150,7 +151,7 @@ def test_a_stopped_run_goes_on_where_it_stood(night, whole, tmp_path, monkeypatc
     work = chunk.work
     monkeypatch.setattr(chunk, "work", lambda task: worked.extend(s.loop for s in task.specs) or work(task))
     export, specs = opened(night)
-    batch.run(batch.Batch(export, specs, Store(store), CONFIG), resume=True)
+    batch.run(Plant(export, specs, CONFIG), Store(store), resume=True)
     assert worked == [f"L{k:02d}" for k in range(2 * batch.chunk_size(LOOPS), LOOPS)]
     assert tables(store) == tables(whole)
     assert Store(store).begun() == []
@@ -172,7 +173,7 @@ def test_a_chunk_stopped_half_written_is_not_kept_twice(night, whole, tmp_path):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(chunk, "write_table", killed)
         with pytest.raises(KeyboardInterrupt):
-            batch.run(batch.Batch(export, specs, Store(store), CONFIG))
+            batch.run(Plant(export, specs, CONFIG), Store(store))
     CliRunner().invoke(main, ["run", str(night), "--store", str(store), "--resume", "--jobs", "2"])
     assert tables(store) == tables(whole)
 
@@ -180,15 +181,15 @@ def test_a_chunk_stopped_half_written_is_not_kept_twice(night, whole, tmp_path):
 def test_a_run_that_other_code_began_is_not_gone_on_with(night, tmp_path, monkeypatch):
     """Pieces of a run stopped before an update are refused in one line, and a run without --resume begins."""
     export, specs = opened(night)
-    mine = batch.Batch(export, specs[:4], Store(tmp_path / "store"), CONFIG)
-    mine.store.run_file.parent.mkdir(parents=True, exist_ok=True)
+    mine, kept = Plant(export, specs[:4], CONFIG), Store(tmp_path / "store")
+    kept.run_file.parent.mkdir(parents=True, exist_ok=True)
     with monkeypatch.context() as older:
         older.setattr(batch, "of_code", lambda: b"another")
-        mine.store.run_file.write_text(json.dumps(batch.identity(mine)), encoding="utf-8")
+        kept.run_file.write_text(json.dumps(batch.identity(mine)), encoding="utf-8")
     with pytest.raises(InputError, match="and version"):
-        batch.run(mine, resume=True)
-    batch.run(mine)
-    assert mine.store.nights() == ["2026-03-02"]
+        batch.run(mine, kept, resume=True)
+    batch.run(mine, kept)
+    assert kept.nights() == ["2026-03-02"]
 
 
 def test_without_resume_a_run_starts_anew(night, whole, tmp_path):
@@ -203,7 +204,7 @@ def test_two_processes_give_what_one_gives(night, whole, tmp_path):
     """A pool of two workers writes the same store as one process."""
     export, specs = opened(night)
     store = tmp_path / "store"
-    batch.run(batch.Batch(export, specs, Store(store), CONFIG), jobs=2)
+    batch.run(Plant(export, specs, CONFIG), Store(store), jobs=2)
     assert tables(store) == tables(whole)
 
 
@@ -212,7 +213,8 @@ def test_progress_counts_all_loops(night, tmp_path):
     export, specs = opened(night)
     said: list[tuple[int, int]] = []
     batch.run(
-        batch.Batch(export, specs[:20], Store(tmp_path / "s"), CONFIG),
+        Plant(export, specs[:20], CONFIG),
+        Store(tmp_path / "s"),
         progress=lambda d, t: said.append((d, t)),
     )
     assert said == [(k, 20) for k in range(0, 21, 4)]
@@ -270,6 +272,7 @@ MEASURE = """
 import json, resource, sys
 from pathlib import Path
 from analyzer.night import batch
+from analyzer.night.nights import Plant
 from analyzer.config import Config
 from analyzer.history.export import open_export
 from analyzer.store.store import Store
@@ -277,7 +280,7 @@ from analyzer.loops.tags import find_loops
 export = open_export([Path(sys.argv[1])])
 peak = {}
 measured = lambda done, of: peak.update({done: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss})
-batch.run(batch.Batch(export, find_loops(export.tags), Store(Path(sys.argv[2])), Config()), progress=measured)
+batch.run(Plant(export, find_loops(export.tags), Config()), Store(Path(sys.argv[2])), progress=measured)
 print(json.dumps(peak))
 """
 

@@ -188,7 +188,7 @@ def test_explain_and_simulate_work_on_the_span_with_its_settings(export: Path):
     )
     loops = export.with_name("loops.csv")
     loops.write_text("loop,type,pv_lo,pv_hi,kp,ti\nLIC1,level,0,100,0.9,40\n")
-    request = Asked((export,), loops, changes, *hour, Config(), "UTC", {})
+    request = Asked((export,), loops, changes, hour, Config(), "UTC", {})
     case, pv = whole(request, "LIC1")
     explained, held_out = asked_cases(request, "LIC1", ())
     assert not held_out

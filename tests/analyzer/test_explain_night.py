@@ -23,8 +23,7 @@ from analyzer.explain.night import (
     questions,
 )
 from analyzer.loops.spec import LoopSpec
-from analyzer.night.batch import Batch
-from analyzer.night.nights import Night
+from analyzer.night.nights import Night, Plant
 from analyzer.night.workers import Died
 from analyzer.pages import night as night_pages
 from analyzer.store.store import Store
@@ -37,6 +36,7 @@ from tests.reports.small_store import NASTY, small_store, tags
 NIGHT = Night("2026-03-15", 0.0, 1.0)
 SPECS = tuple(LoopSpec(tag, pv=f"{tag}.PV", op=f"{tag}.OP") for tag in tags(30))
 EXPORT: Any = None
+PLANT = Plant(EXPORT, SPECS)
 ROW = {"status": "ok", "oscillating_pct": 0.0, "cause": "none", "action": "none"}
 
 
@@ -44,11 +44,6 @@ ROW = {"status": "ok", "oscillating_pct": 0.0, "cause": "none", "action": "none"
 def store(tmp_path: Path) -> Store:
     """Two weeks of 30 made-up loops."""
     return small_store(tmp_path / "store", hours=False, buckets=50)
-
-
-def batch_in(store: Store) -> Batch:
-    """The loops of the made-up night, kept in a store."""
-    return Batch(EXPORT, SPECS, store, Config())
 
 
 def told(q: Question) -> tuple[dict[str, Any], str]:
@@ -106,7 +101,7 @@ def test_worst_loop_comes_first_with_the_loop_that_leads_it(store: Store) -> Non
         ROW | {"loop": tag, "cause": "load", "oscillation_significance": size, "source_loop": lead}
         for tag, size, lead in (("FIC0000", 1.0, None), ("FIC0001", 9.0, "FIC0000"))
     ]
-    first, second = questions(batch_in(store), rows, NIGHT)
+    first, second = questions(PLANT, rows, NIGHT)
     assert (first.spec.loop, second.spec.loop) == ("FIC0001", "FIC0000")
     assert first.source is not None
     assert first.source.loop == "FIC0000"
@@ -117,7 +112,7 @@ def test_one_failing_loop_never_stops_the_night(store: Store, monkeypatch: pytes
     """A loop that breaks and one that abstains have their reason as answer; all others are explained."""
     monkeypatch.setattr(explain_night, "_answer_and_page", told)
     seen: list[tuple[int, int]] = []
-    rows = explain_flagged(batch_in(store), NIGHT, progress=lambda *x: seen.append(x))
+    rows = explain_flagged(PLANT, store, NIGHT, progress=lambda *x: seen.append(x))
     by = {r["loop"]: r for r in known(store, NIGHT.name)}
     assert len(by) == len(rows) == seen[-1][0] == seen[-1][1]
     assert {"unexplained", "backlash"} == {r["verdict"] for r in rows}
@@ -130,7 +125,7 @@ def test_dead_worker_costs_its_loop_alone(store: Store, monkeypatch: pytest.Monk
     """Where every second worker dies, every second loop says so and the others have their answers."""
     monkeypatch.setattr(explain_night, "_answer_and_page", told)
     monkeypatch.setattr("analyzer.night.workers.Workers", DyingWorkers)
-    rows = explain_flagged(batch_in(store), NIGHT, 2)
+    rows = explain_flagged(PLANT, store, NIGHT, 2)
     dead = [r for r in rows if "SIGKILL" in r["reason"]]
     assert abs(2 * len(dead) - len(rows)) <= 1
 
@@ -138,9 +133,9 @@ def test_dead_worker_costs_its_loop_alone(store: Store, monkeypatch: pytest.Monk
 def test_resumed_night_keeps_what_it_has(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """A stopped night goes on with the loops that have no answer yet."""
     monkeypatch.setattr(explain_night, "_answer_and_page", told)
-    whole = explain_flagged(batch_in(store), NIGHT)
+    whole = explain_flagged(PLANT, store, NIGHT)
     keep(store, NIGHT.name, [whole[0] | {"reason": "kept"}])
-    again = explain_flagged(batch_in(store), NIGHT, resume=True)
+    again = explain_flagged(PLANT, store, NIGHT, resume=True)
     assert again[0]["reason"] == "kept"
     assert {r["loop"] for r in again} == {r["loop"] for r in whole}
 

@@ -13,6 +13,7 @@ from analyzer.loop.judged_stretch import Earlier, judged_stretch
 from analyzer.loops.changes import read_changes
 from analyzer.loops.tags import match, read_loops
 from analyzer.night import batch
+from analyzer.night.nights import Plant
 from analyzer.pages.rank import brief
 from analyzer.store.store import Store
 from analyzer.words.reason import in_short
@@ -99,7 +100,7 @@ def retuned(tmp_path_factory):
     specs = tuple(s for s in matched if s.loop in wanted)
     first = START_S + 7 * DAY_S
     store = Store(tmp_path_factory.mktemp("retuned") / "store")
-    batch.run(batch.Batch(export, specs, store, CONFIG, first, first + DAY_S, changes), 1)
+    batch.run(Plant(export, specs, CONFIG, (first, first + DAY_S), changes), store, 1)
     rows = store.read("nights", store.require()).to_pylist()
     return {r["loop"]: r for r in rows}, {c.loop for c in changes}
 

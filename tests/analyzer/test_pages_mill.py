@@ -26,6 +26,7 @@ OTHERS = ("FIC2110", "FIC2113", "PIC2116")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
     """The mill's fourteen nights, of the retuned loops and some others, without causes: none is compared."""
     from analyzer.night import batch
+    from analyzer.night.nights import Plant
 
     config = Config()
     quick = replace(config, quality=replace(config.quality, straight_share=0.0))
@@ -34,7 +35,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
     specs, _ = match(read_loops(MILL / "loops.csv"), export.tags)
     kept = Store(tmp_path_factory.mktemp("mill"))
     wanted = [s for s in specs if s.loop in (*RETUNED, *OTHERS)]
-    batch.run(batch.Batch(export, wanted, kept, quick))
+    batch.run(Plant(export, wanted, quick), kept)
     return kept
 
 

@@ -10,6 +10,7 @@ from analyzer.history.stamps import parse_time
 from analyzer.loops.changes import TuningChange, in_force, settings_from
 from analyzer.loops.tags import match, read_loops
 from analyzer.night import batch
+from analyzer.night.nights import Plant
 from analyzer.store.store import Store
 from identification.errors import InputError
 from proofs.plant import START_S, Sketch, simulate, spec, write_export
@@ -51,7 +52,7 @@ def test_a_run_advises_on_the_settings_in_force(tmp_path):
     rows = []
     for changes in ((), dated):
         store = Store(tmp_path / f"store{len(changes)}")
-        batch.run(batch.Batch(export, stale, store, Config(), changes=changes))
+        batch.run(Plant(export, stale, Config(), changes=changes), store)
         (row,) = store.read("nights", store.require()).to_pylist()
         rows.append(row)
     assert [r["action"] for r in rows] == ["check settings", "retune"]

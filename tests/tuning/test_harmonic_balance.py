@@ -10,9 +10,10 @@ from scipy.optimize import fsolve
 
 from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Stiction
 from proofs.valve_loops import largest_cycling_ratio
-from tuning.describing import backlash
-from tuning.frequency_response import is_stable
+from tuning.describing import backlash, describing_function
+from tuning.frequency_response import is_stable, loop_response
 from tuning.harmonic_balance import (
+    Balance,
     curves,
     harmonic_balance,
     predicted_cycle,
@@ -115,8 +116,19 @@ def test_loeb_and_the_slope_of_the_gain_agree(ratio, gain, ti, which, integratin
     valve = (Backlash(1.0), Stiction(1.0, 1.0), Stiction(1.0, 0.4))[which]
     loop = Loop(process, Pid(gain * ratio / 2.5, ti * ratio, scan_s=0.5), valve)
     m = travel_map(loop, np.array([loop.controller.kp]), np.array([loop.controller.ti_s]))
-    stable = [b for b in harmonic_balance(loop) if b.stable]
-    assert (m.travel[0, 0] > 0) == bool(stable)
+    found = harmonic_balance(loop)
+    assert (m.travel[0, 0] > 0) == any(b.stable for b in found)
+    assert [b.stable for b in found] == [by_loeb(loop, b) for b in found]
+
+
+def by_loeb(loop: Loop, b: Balance) -> bool:
+    """Whether with A a little larger the oscillation decays: from 1 + N(A) L(s) = 0, ds/dA is -i (dlnN/dA) /
+    (dlnL/dw), whose real part must be negative (Atherton 1982)."""
+    near = np.array([1 - 1e-6, 1 + 1e-6])
+    linear = loop_response(loop, 2 * np.pi / b.period_s * near)
+    valve = describing_function(loop.valve, b.op_amplitude * near, max(b.jumps, 1))
+    along_w, along_a = np.log(linear[1] / linear[0]), np.log(valve[1] / valve[0])
+    return bool((-1j * along_a / along_w).real < 0)
 
 
 def test_curves_meet_at_the_crossing():

@@ -10,6 +10,7 @@ from analyzer.history.stamps import parse_time
 from analyzer.loop.decisions import Fault
 from analyzer.loops.tags import match, read_loops
 from analyzer.night import batch
+from analyzer.night.nights import Plant
 from analyzer.store.store import Store
 
 MILL = Path(__file__).parents[3] / "sample_data"
@@ -21,7 +22,7 @@ def test_a_valve_whose_friction_scatters_sticks_by_all_nights(tmp_path: Path) ->
     specs, _ = match(read_loops(MILL / "loops.csv"), export.tags)
     store = Store(tmp_path / "store")
     first, last = (parse_time(x, "--since", "UTC") for x in ("2026-03-02", "2026-03-04"))
-    batch.run(batch.Batch(export, [s for s in specs if s.loop == "FIC2110"], store, Config(), first, last))
+    batch.run(Plant(export, [s for s in specs if s.loop == "FIC2110"], Config(), (first, last)), store)
     for name in store.nights():
         (alone,) = store.own_rows("nights", name, ["valve_fault"])
         (together,) = store.rows("nights", name, ["valve_fault"])

@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from identification.signals.correlation import rhythm
-from identification.signals.half_cycles import (
+from identification.signals.correlation import levelled_correlation, rhythm
+from identification.signals.spectrum import (
+    band_signal,
+    bands,
     half_cycles,
-    levelled_correlation,
     shape,
     size_kurtosis,
+    spectrum,
+    tapered_power,
     usual_prominence,
 )
-from identification.signals.spectrum import band_signal, bands, spectrum, tapered_power
 
 N = 6000
 T = np.arange(N)
