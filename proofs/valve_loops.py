@@ -12,9 +12,9 @@ from scipy.signal import lfilter
 
 from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Process, Stiction
 from identification.record import Floats
+from tuning.describing import scaled_valve
 from tuning.harmonic_balance import travel_map
 from tuning.rules import simc
-from tuning.search import scaled_valve
 
 SLOPE, DELAY, BAND = 0.15, 0.25, 0.15
 """Half widths of what slope, dead time and play of a loop may be by, over their values [-]."""

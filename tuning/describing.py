@@ -5,7 +5,7 @@ A sine A sin(wt) of OP comes out as the fundamental N(A) A sin(wt); N is complex
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -98,6 +98,15 @@ def band(valve: Valve) -> float:
     if valve is None:
         return 0.0
     return valve.width if isinstance(valve, Backlash) else valve.stickband
+
+
+def scaled_valve(valve: Valve, factor: float) -> Valve:
+    """The valve with play, or stickband and slip jump, times a factor [-]."""
+    if valve is None:
+        return None
+    if isinstance(valve, Backlash):
+        return Backlash(valve.width * factor)
+    return replace(valve, stickband=valve.stickband * factor, slip_jump=valve.slip_jump * factor)
 
 
 def moves_by_jumps(valve: Valve) -> bool:

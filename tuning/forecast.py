@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -13,12 +13,16 @@ from identification.models import Estimate, Integrator, Loop, Pid
 from identification.record import Floats, LoopRecord
 from identification.signals.correlation import lag_sums
 from identification.simulation.closed_loop import closed_loop, scan_step
-from tuning.describing import band, is_play
+from tuning.describing import band, is_play, scaled_valve
 from tuning.frequency_response import integral_s, maximum_sensitivity, slowest_s
 from tuning.limit_cycle import KICK
 from tuning.limits import METHOD
 from tuning.rules import backlash_rule, lambda_settings, simc
 
+DIGITS = 6
+"""Digits of a model's constants, and decimals of a load [% PV], that are simulated: a cycle behind a play or a
+stem that sticks carries a rounding error on, and between settings as good as each other a thirteenth digit would
+choose."""
 SEED = 0
 NOW, RECOMMENDED, SIMC, LAMBDA, LONGER = "now", "recommended", "SIMC", "lambda", "Ti not below T"
 CALMER, SMALLER, DERIVATIVE, REPAIRED = (
@@ -60,6 +64,22 @@ class Forecast:
     before: dict[str, Estimate]
     after: dict[str, Estimate]
     change: dict[str, Estimate]
+
+
+def in_digits(load: Floats) -> Floats:
+    """A load as it is simulated, shape (n,) [% PV]."""
+    return np.ascontiguousarray(np.round(load, DIGITS))
+
+
+def loop_in_digits(loop: Loop) -> Loop:
+    """The loop with its constants to so many digits as they are ever known."""
+
+    def rounded(x: float) -> float:
+        return float(f"{x:.{DIGITS}g}")
+
+    process, width = type(loop.process)(*map(rounded, astuple(loop.process))), band(loop.valve)
+    valve = scaled_valve(loop.valve, rounded(width) / width) if width > 0.0 else loop.valve
+    return replace(loop, process=process, valve=valve)
 
 
 def run(loop: Loop, load: Floats) -> LoopRecord:
@@ -149,7 +169,8 @@ def predict(loop: Loop, controller: Pid, load: Floats, uncertainty: Sequence[Loo
     if load.size < 10 * METHOD.blocks:
         raise ValueError(f"a forecast needs {10 * METHOD.blocks} scans of load, has {load.size}")
     rng = np.random.default_rng(SEED)
-    cases = [replace(one, controller=loop.controller) for one in (loop, *uncertainty)]
+    load, whole = in_digits(load), (loop_in_digits(one) for one in (loop, *uncertainty))
+    cases = [replace(one, controller=loop.controller) for one in whole]
     old = [_blocks(settled(run(one, load))) for one in cases]
     new = [_blocks(settled(run(replace(one, controller=controller), load))) for one in cases]
     draws = [

@@ -18,6 +18,7 @@ from identification.record import Floats
 from identification.simulation.closed_loop import scan_step
 from tuning import Action, Cause
 from tuning.describing import band, is_play
+from tuning.forecast import in_digits
 from tuning.frequency_response import integral_s, maximum_sensitivity
 from tuning.limit_cycle import Confirmed, Cycle, confirm
 from tuning.limits import LIMITS, METHOD, TuningLimits
@@ -26,7 +27,6 @@ from tuning.search import (
     Bench,
     Candidate,
     bench,
-    in_digits,
     mean_error,
     rejection,
     robust,

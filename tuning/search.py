@@ -12,12 +12,12 @@ from itertools import product
 
 import numpy as np
 
-from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Process, Valve
+from identification.models import Fopdt, Integrator, Loop, Pid, Process
 from identification.record import Floats
 from identification.simulation.closed_loop import closed_loop, scan_step
 from identification.simulation.lag import discretize, respond
 from tuning.describing import band, is_play
-from tuning.forecast import run, settled
+from tuning.forecast import in_digits, loop_in_digits, run, settled
 from tuning.frequency_response import integral_s, maximum_sensitivity, slowest_s
 from tuning.limits import TuningLimits
 from tuning.rules import effective_delay, simc
@@ -26,10 +26,6 @@ GAINS, TIMES = 11, 13
 """Points of the coarse grid in Kp and Ti."""
 FINE = 5
 """Points of the fine grid in each direction, over one coarse step to either side of the best."""
-DIGITS = 6
-"""Digits of a model's constants, and decimals of a load [% PV], that are simulated: a cycle behind a play or a
-stem that sticks carries a rounding error on, and between settings as good as each other a thirteenth digit would
-choose."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,29 +74,12 @@ def standard_load(loop: Loop, steps: int) -> Floats:
     return load
 
 
-def scaled_valve(valve: Valve, factor: float) -> Valve:
-    """The valve with play, or stickband and slip jump, times a factor [-]."""
-    if valve is None:
-        return None
-    if isinstance(valve, Backlash):
-        return Backlash(valve.width * factor)
-    return replace(valve, stickband=valve.stickband * factor, slip_jump=valve.slip_jump * factor)
-
-
-def _to_digits(x: float) -> float:
-    return float(f"{x:.{DIGITS}g}")
-
-
 def _as_simulated(loop: Loop) -> Loop:
-    """The loop with its constants to so many digits as they are ever known, and its controller's gain above 0:
-    mirrored about OP's middle, it travels and errs alike."""
-    p, c, width = loop.process, loop.controller, band(loop.valve)
-    gain, *times = (_to_digits(x) for x in astuple(p))
-    return Loop(
-        type(p)(math.copysign(1.0, c.kp) * gain, *times),
-        replace(c, kp=abs(c.kp)),
-        scaled_valve(loop.valve, _to_digits(width) / width) if width > 0.0 else loop.valve,
-    )
+    """The loop in digits, its controller's gain above 0: mirrored about OP's middle, it travels and errs alike."""
+    p, c = loop.process, loop.controller
+    gain, *times = astuple(p)
+    mirrored = type(p)(math.copysign(1.0, c.kp) * gain, *times)
+    return loop_in_digits(replace(loop, process=mirrored, controller=replace(c, kp=abs(c.kp))))
 
 
 def _figures(loop: Loop, load: Floats) -> tuple[float, float]:
@@ -108,11 +87,6 @@ def _figures(loop: Loop, load: Floats) -> tuple[float, float]:
     r = settled(run(_as_simulated(loop), load))
     travel = float(np.abs(np.diff(r.stem)).sum())
     return travel / r.duration_s * 3600.0, float(np.mean(np.abs(r.pv)))
-
-
-def in_digits(load: Floats) -> Floats:
-    """A load as it is simulated, shape (n,) [% PV]."""
-    return np.ascontiguousarray(np.round(load, DIGITS))
 
 
 def mean_error(loops: Sequence[Loop], controller: Pid, load: Floats) -> float:

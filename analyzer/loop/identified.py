@@ -17,10 +17,10 @@ from identification.models import Estimate, Fopdt, Integrator, Loop, Pid, Proces
 from identification.record import Floats
 from identification.signals.robust import robust_deviation
 from identification.simulation.valve import StemLaw
+from tuning.describing import scaled_valve
 from tuning.forecast import SEED
 from tuning.frequency_response import maximum_sensitivity
 from tuning.rules import simc
-from tuning.search import scaled_valve
 
 
 def is_known(fit: Fit, limits: AdviceLimits) -> bool:

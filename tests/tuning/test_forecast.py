@@ -7,7 +7,7 @@ import pytest
 
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.record import LoopRecord
-from proofs.valve_loops import backlash_case, corners
+from proofs.valve_loops import backlash_case, corners, stick_case
 from tuning.forecast import NAMES, assess, autocorrelation_peak, predict
 from tuning.rules import backlash_rule
 
@@ -90,3 +90,14 @@ def test_quiet_load_does_not_hide_a_cycle():
     assert f.before["stem_travel"].value == pytest.approx(65.9, rel=0.05)
     assert f.after["stem_travel"].value < 5
     assert f.before["oscillation"].value > 0.3
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_digits_that_nobody_knows_change_no_forecast(seed):
+    """A stem that sticks carries a rounding error on; another last digit of load or process is forecast alike."""
+    case = stick_case(seed)
+    new = replace(case.loop.controller, kp=0.6 * case.loop.controller.kp)
+    other = replace(case.loop.process, time_constant_s=case.loop.process.time_constant_s * (1 + 1e-11))
+    once = predict(case.loop, new, case.load)
+    again = predict(replace(case.loop, process=other), new, case.load + 1e-13)
+    assert (again.before, again.after) == (once.before, once.after)
