@@ -16,9 +16,9 @@ from analyzer.limits import PAGES
 from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES, Fault, Status
 from analyzer.pages import loop_pictures, words
-from analyzer.pages.maintenance import work_order
 from analyzer.pages.reading import BESIDE, Thinned
 from analyzer.pages.words import Row, duration, keys, known_figures, lead, number, page_table, titled
+from analyzer.pages.work import work_order
 from analyzer.words.belief import wear_text
 from analyzer.words.reason import in_short
 from analyzer.words.units import row_settings

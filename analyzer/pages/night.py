@@ -7,9 +7,8 @@ from dataclasses import replace
 
 from analyzer.explain.night import known
 from analyzer.limits import PAGES
-from analyzer.pages import groups, loop, maintenance, morning, work
+from analyzer.pages import groups, loop, morning, work
 from analyzer.pages.loop_pictures import trend_block
-from analyzer.pages.plant import read_sums
 from analyzer.pages.reading import BESIDE, ShownNight, Thinned, by_loop, read_night, read_nights, read_trends
 from analyzer.pages.words import ALL_LOOPS, pv_scale_of
 from analyzer.plantwide.view import GroupView, read_groups
@@ -35,9 +34,9 @@ def pages_of_night(store: Store, name: str | None = None, top: int = 200) -> Ite
     shared = read_groups(store, night.name)
     nights = [n for n in store.nights() if n <= night.name]
     links = nights_around(nights[-PAGES.dated :], night.name)
-    about = morning.morning_page(night, shared, read_sums(store, night.name), links)
+    about = morning.morning_page(night, shared, morning.read_sums(store, night.name), links)
     yield replace(about, choices=nights_to_choose(nights[-PAGES.dated :], night.name))
-    yield maintenance.maintenance_page(night)
+    yield work.maintenance_page(night)
     yield side_by_side(store, night)
     yield work.work_page(store, night)
     members = {r["loop"] for g in shared for r in g.rows[: PAGES.group_loops]}
@@ -94,7 +93,7 @@ def dated_pages(store: Store, name: str | None, written: Callable[[str], bool]) 
     left out of which `written` says that their page was written after their results."""
     last = name or store.require()
     nights = [n for n in store.nights() if n <= last][-PAGES.dated :]
-    sums = read_sums(store, last)
+    sums = morning.read_sums(store, last)
     for night in nights:
         if night in nights[-2:] or not written(night):
             # loops' pages are the latest night's

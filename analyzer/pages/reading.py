@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -17,13 +17,13 @@ from analyzer.lanes.lanes import FIGURE
 from analyzer.limits import PAGES
 from analyzer.loop.decisions import Cause, Status, counts
 from analyzer.pages.rank import worst_first
-from analyzer.pages.words import keys
+from analyzer.pages.words import cells, keys, page_table
 from analyzer.store import notes
 from analyzer.store.notes import Note, is_hidden, last
 from analyzer.store.store import Store
 from analyzer.store.table import TREND, read_stored
 from analyzer.words.units import Row, row_settings
-from reports.pages import Cell
+from reports.pages import Cell, Table
 from reports.texts import slug
 
 SIGNALS = ("sp", "pv", "op")
@@ -174,6 +174,23 @@ class ShownNight:
         found = last(self.notes, loop)
         return "" if found is None else found.said(self.zone)
 
+    def link(self, loop: str) -> Cell:
+        """The loop's name, leading to its page where there is one."""
+        return Cell(loop, kind="strong", href=f"{slug(loop)}.html" if loop in self.paged else "")
+
+    def table(
+        self,
+        declared: str,
+        rows: Iterable[Row],
+        own: Callable[[Row], Mapping[str, Cell | str | float | None]] = lambda row: {},
+        **stated: Any,
+    ) -> Table:
+        """A table of loops, as tables.toml declares it but for what is `stated`: each row's own cells, a link to the
+        loop's page, else what the store holds."""
+        shown = stated.get("columns", declared)
+        told = (cells(row, shown, **{"loop": self.link(row["loop"]), **own(row)}) for row in rows)
+        return page_table(declared, told, **stated)
+
 
 def oscillates(row: Row | None) -> bool:
     """Whether a loop counts as oscillating."""
@@ -218,11 +235,6 @@ def read_night(store: Store, name: str | None, top: int, drawn: bool = True) -> 
     return ShownNight(
         night, tuple(rows), remembered, earlier[-1] if earlier else "", worst, trends, known, paged
     )
-
-
-def link_to(night: ShownNight, loop: str) -> Cell:
-    """The loop's name, leading to its page where there is one."""
-    return Cell(loop, kind="strong", href=f"{slug(loop)}.html" if loop in night.paged else "")
 
 
 def action_text(row: Row, action: str = "") -> str:

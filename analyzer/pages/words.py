@@ -120,10 +120,17 @@ def cell(row: Row, name: str) -> Cell:
     return Cell(duration(value) if name == "period_s" else number(value), value)
 
 
-def cells(row: Row, columns: str | Iterable[Column], **own: Cell) -> tuple[Cell, ...]:
-    """A row of a table by the keys of its columns: cells of its own, else what the store holds."""
+def cells(row: Row, columns: str | Iterable[Column], **own: Cell | str | float | None) -> tuple[Cell, ...]:
+    """A row of a table by the keys of its columns: what is its `own`, by cell, text or number, else what the store
+    holds."""
     shown = page_columns(columns) if isinstance(columns, str) else columns
-    return tuple(own[c.key] if c.key in own else cell(row, c.key) for c in shown)
+    return tuple(_own_cell(own[c.key]) if c.key in own else cell(row, c.key) for c in shown)
+
+
+def _own_cell(held: Cell | str | float | None) -> Cell:
+    if isinstance(held, Cell):
+        return held
+    return Cell(held) if isinstance(held, str) else plain_cell(held)
 
 
 def marked_cell(row: Row, name: str, digits: str = "") -> Cell:

@@ -16,7 +16,7 @@ from analyzer.loops.changes import TuningChange
 from analyzer.pages import before_after, loop, morning, night
 from analyzer.pages.before_after import change_cases, detected, wear_texts
 from analyzer.pages.loop_pictures import autocorrelation, rhythm_plots, turn_panels
-from analyzer.pages.plant import score
+from analyzer.pages.morning import score
 from analyzer.pages.reading import read_hours, read_night, read_trends
 from analyzer.pages.words import PvScale
 from analyzer.store.store import Store
