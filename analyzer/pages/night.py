@@ -42,7 +42,7 @@ def pages_of_night(store: Store, name: str | None = None, top: int = 200) -> Ite
     members = {r["loop"] for g in shared for r in g.rows[: PAGES.group_loops]}
     trends = read_trends(store, members, [night.name])
     for g in shared:
-        yield groups.group_page(g, trends, night.name, frozenset(night.paged))
+        yield groups.group_page(g, trends, night)
     yield from _loop_pages(store, night, nights[-PAGES.history :], shared, {**trends, **night.trends})
 
 

@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any
 
 from analyzer.columns import BY_NAME, GROUPS
+from analyzer.columns import Column as Declared
 from analyzer.history.plant_clock import stamp
 from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES
@@ -50,9 +51,13 @@ def texts(subject: str) -> dict[str, Any]:
     return found
 
 
+def _declared(name: str) -> Declared:
+    return BY_NAME.get(name) or OF_GROUPS[name]
+
+
 def heading(name: str, **more: bool) -> Column:
     """A column of the store as one of a page."""
-    declared = BY_NAME.get(name) or OF_GROUPS[name]
+    declared = _declared(name)
     unit = f" [{declared.unit}]" if name in OF_GROUPS and declared.unit else ""
     return Column(name, declared.heading + unit, declared.is_number, declared.hint, **more)
 
@@ -115,7 +120,7 @@ def cell(row: Row, name: str) -> Cell:
     value = row[name]
     if name == "reason":
         return Cell(in_short(value or "")[0])
-    if not BY_NAME[name].is_number:
+    if not _declared(name).is_number:
         return Cell(value or "")
     return Cell(duration(value) if name == "period_s" else number(value), value)
 
@@ -124,13 +129,8 @@ def cells(row: Row, columns: str | Iterable[Column], **own: Cell | str | float |
     """A row of a table by the keys of its columns: what is its `own`, by cell, text or number, else what the store
     holds."""
     shown = page_columns(columns) if isinstance(columns, str) else columns
-    return tuple(_own_cell(own[c.key]) if c.key in own else cell(row, c.key) for c in shown)
-
-
-def _own_cell(held: Cell | str | float | None) -> Cell:
-    if isinstance(held, Cell):
-        return held
-    return Cell(held) if isinstance(held, str) else plain_cell(held)
+    told = (own[c.key] if c.key in own else cell(row, c.key) for c in shown)
+    return tuple(t if isinstance(t, Cell) else Cell(t) if isinstance(t, str) else plain_cell(t) for t in told)
 
 
 def marked_cell(row: Row, name: str, digits: str = "") -> Cell:
