@@ -214,9 +214,18 @@ def graph(g: GroupView) -> parts.Graph:
             depth[name] = 1 + column(parent if parent in by_name else first)
         return depth[name]
 
-    nodes = tuple(parts.Node(n, _node_text(r), str(r["role"]), column(n)) for n, r in by_name.items())
+    def node(name: str, row: Row) -> parts.Node:
+        sure = f" {row['source_pct']:.0f} %" if row["source_pct"] >= 1 else ""
+        text = f"{row['role']}{sure}, {number(row['wave_amplitude_pct'])} %"
+        return parts.Node(name, text, str(row["role"]), column(name))
+
+    nodes = tuple(node(n, r) for n, r in by_name.items())
     arrows = tuple(
-        parts.Arrow(r["parent"] if r["parent"] in by_name else first, n, _arrow_text(r))
+        parts.Arrow(
+            r["parent"] if r["parent"] in by_name else first,
+            n,
+            f"{r['coherence']:.2f}" if r["lag_s"] is None else f"{r['lag_s']:+.0f} s",
+        )
         for n, r in by_name.items()
         if n != first
     )
@@ -224,16 +233,6 @@ def graph(g: GroupView) -> parts.Graph:
     caption = "From left to right as coherence falls; lags are behind the likeliest source."
     caption += f" {left} more not drawn." if left else ""
     return parts.Graph("way", "Where it starts and whom it moves", nodes, arrows, caption)
-
-
-def _node_text(r: Row) -> str:
-    role = f"{r['role']} {r['source_pct']:.0f} %" if r["source_pct"] >= 1 else str(r["role"])
-    return f"{role}, {number(r['wave_amplitude_pct'])} %"
-
-
-def _arrow_text(r: Row) -> str:
-    lag = r["lag_s"]
-    return f"{lag:+.0f} s" if lag is not None else f"{r['coherence']:.2f}"
 
 
 def heat_map(g: GroupView) -> parts.HeatMap | None:

@@ -227,9 +227,7 @@ def _of_settings(found: parts.Page | None) -> parts.Section | None:
     if found is None:
         return None
     first = found.sections[0]
-    return parts.Section(
-        first.title, tuple(b for b in first.blocks if isinstance(b, parts.Text | parts.Plot))
-    )
+    return parts.section(first.title, *(b for b in first.blocks if isinstance(b, parts.Text | parts.Plot)))
 
 
 def _figures(row: Row) -> parts.Facts:
@@ -246,48 +244,37 @@ def _figures(row: Row) -> parts.Facts:
 def nights_section(rows: Sequence[Row]) -> parts.Section:
     """A table of a loop's nights, the last first, and pictures of how its oscillation and the width of its valve's
     fault grew or fell."""
-    plots = parts.there(
-        *(_over_nights(rows, column) for column in keys("figures-over-nights")), _widths(rows)
-    )
+    plots = [
+        _over_nights(
+            f"nights-{slug(c)}", BY_NAME[c].title, BY_NAME[c].unit, 0.0, _by_night([r[c] for r in rows])
+        )
+        for c in keys("figures-over-nights")
+    ]
+    if rows[-1]["certain_since"]:
+        alone = [(json.loads(r["witness"] or "{}").get("width") or [None])[0] for r in rows]
+        certain = [r["width_pct"] if r["certain_since"] else None for r in rows]
+        lines = _by_night(alone, joined=False), _by_night(certain, "nights together", kind="op")
+        plots.append(_over_nights("widths", "Width of the valve's fault", "% of OP", 1.0, *lines))
+    shown = parts.there(*plots)
+    drawn = parts.Panels("nights", "Night by night", shown) if shown else None
     table = page_table("history", map(_night_cells, reversed(rows)))
-    return parts.Section(
-        "Over the nights",
-        parts.there(parts.Panels("nights", "Night by night", plots) if plots else None, table),
-    )
+    return parts.Section("Over the nights", parts.there(drawn, table))
 
 
 def _night_cells(row: Row) -> tuple[parts.Cell, ...]:
     """One night's cells; the last says why where the loop was not assessed."""
-    lost = {} if row["status"] == Status.OK else {"action": parts.Cell(f"{row['status']}: {row['reason']}")}
+    lost = {} if row["status"] == Status.OK else {"action": f"{row['status']}: {row['reason']}"}
     return words.cells(row, "history", **lost)
 
 
-def _over_nights(rows: Sequence[Row], column: str) -> parts.Plot | None:
-    """A figure over the nights."""
-    line, shown = _by_night("each night", [r[column] for r in rows]), BY_NAME[column]
-    return _nights_plot(f"nights-{slug(column)}", shown.title, shown.unit, (line,), 0.0)
-
-
-def _widths(rows: Sequence[Row]) -> parts.Plot | None:
-    """Width of the valve's fault as each night tells it, and as they do together, where it is certain."""
-    alone = [(json.loads(r["witness"] or "{}").get("width") or [None])[0] for r in rows]
-    certain = [r["width_pct"] if r["certain_since"] else None for r in rows]
-    lines = _by_night("each night", alone, joined=False), _by_night("nights together", certain, kind="op")
-    if not rows[-1]["certain_since"]:
-        return None
-    return _nights_plot("widths", "Width of the valve's fault", "% of OP", lines, 1.0)
-
-
-def _by_night(label: str, figures: Sequence[float | None], **drawn: Any) -> parts.Line:
+def _by_night(figures: Sequence[float | None], label: str = "each night", **drawn: Any) -> parts.Line:
     """A figure of the nights up to this one, where it is known."""
     known = [(i - len(figures) + 1.0, y) for i, y in enumerate(figures) if y is not None]
     x, y = np.array(known, float).reshape(-1, 2).T
     return parts.Line(label, x, y, **drawn)
 
 
-def _nights_plot(
-    name: str, title: str, unit: str, lines: tuple[parts.Line, ...], least: float
-) -> parts.Plot | None:
+def _over_nights(name: str, title: str, unit: str, least: float, *lines: parts.Line) -> parts.Plot | None:
     """Figures over the nights, from 0 to `least` at least; None where fewer than three nights know them."""
     if min(line.x.size for line in lines) < 3:
         return None

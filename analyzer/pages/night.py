@@ -13,7 +13,7 @@ from analyzer.pages.reading import BESIDE, ShownNight, Thinned, by_loop, read_ni
 from analyzer.pages.words import ALL_LOOPS, pv_scale_of
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
-from reports.page_file import PageFileError, loads
+from reports.page_file import loads
 from reports.pages import Beside, Page, Section
 from reports.texts import slug
 
@@ -77,7 +77,7 @@ def _loop_pages(
     for tag in night.paged:
         own = rows[tag]
         found = explained.get(tag)
-        drawn, settings = kept_page(found.get("page") if found else None), kept_page(compared.get(tag))
+        drawn, settings = (loads(text or "") for text in (found and found.get("page"), compared.get(tag)))
         group = by_number.get(own[-1]["group"] or "")
         said = [n.said(night.zone) for n in night.notes.get(tag, ())]
         part = None if group is None else groups.member_section(group, tag, around)
@@ -120,11 +120,3 @@ def nights_to_choose(nights: Sequence[str], night: str) -> tuple[tuple[str, str]
     """Nights that have a page, the latest first, with their pages; '' for the one that is shown."""
     pages = {n: f"{name_of(n)}.html" for n in nights} | {nights[-1]: LATEST[1], night: ""}
     return tuple((n, pages[n]) for n in reversed(nights)) if len(nights) > 1 else ()
-
-
-def kept_page(text: str | None) -> Page | None:
-    """A page as a night kept it; None where it kept none, or one of another version."""
-    try:
-        return loads(text) if text else None
-    except PageFileError:
-        return None
