@@ -116,16 +116,13 @@ def _times(t: Tried, now: Tried) -> float | None:
     return t.integral_s / now.integral_s if known else None
 
 
-def _with_repaired(c: Comparison) -> tuple[Tried, ...]:
-    """All that was tried, and what a repair would bring."""
-    return parts.there(*c.tried, c.repaired)
-
-
 def table(c: Comparison, spec: LoopSpec, unit: str) -> parts.Table:
     """The settings with what they do on the load."""
     said, lasts = texts("settings_tried"), duration(c.load.size * scan_step(c.loop))
     note = said["note"].format(lasts=lasts) + said["derivative"] * (c.loop.controller.td_s > 0.0)
-    return page_table("settings", (_tried_row(t, c, spec, unit) for t in _with_repaired(c)), note=note)
+    return page_table(
+        "settings", (_tried_row(t, c, spec, unit) for t in parts.there(*c.tried, c.repaired)), note=note
+    )
 
 
 def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[parts.Cell, ...]:
@@ -275,7 +272,7 @@ def settings_page(loop: str, night: str, c: Comparison, spec: LoopSpec) -> parts
     )
     first = (parts.Text((opening(c, spec, unit),), "lead"), panels(c, unit), table(c, spec, unit))
     tried = parts.WhatIf("try", said["title"], model(c, spec, unit), c.load, said["caption"])
-    named = parts.Listing(tuple((f"{t.name}:", meant[t.name]) for t in _with_repaired(c)))
+    named = parts.Listing(tuple((f"{t.name}:", meant[t.name]) for t in parts.there(*c.tried, c.repaired)))
     sections = (
         parts.Section("Settings compared", parts.there(*first, price(c, unit), field(c))),
         parts.Section("Try settings", (parts.Text((said["hint"],)), tried)),

@@ -124,16 +124,11 @@ def sentence(g: GroupView) -> str:
     return f"{head}; {tail}; without it the others' average errors fall by {number(g.gain_pct)} % of span together"
 
 
-def page_name(number: str) -> str:
-    """The file of a group's page, without its ending."""
-    return f"group-{number}"
-
-
 def morning_table(groups: Sequence[GroupView], linked: bool) -> parts.Table:
     """One cause, several loops: the groups of a night, those that cost most first; `linked` to their pages."""
     rows = []
     for g in groups:
-        href = f"{page_name(g.number)}.html" if linked else ""
+        href = f"group-{g.number}.html" if linked else ""
         _, *texts = _told(g, "not clear", "undecided: look at the candidates")
         figures = (len(g.rows), g.period_s, None, None, g.gain_pct, None)
         rows.append(
@@ -182,7 +177,7 @@ def group_page(g: GroupView, trends: Mapping[str, Thinned], night: ShownNight) -
     )
     subtitle = f"{words.with_noun(len(g.rows), 'loop')}, night {night.name}."
     return parts.Page(
-        page_name(g.number), f"Group {g.number}: one oscillation", subtitle, sections, (words.ALL_LOOPS,)
+        f"group-{g.number}", f"Group {g.number}: one oscillation", subtitle, sections, (words.ALL_LOOPS,)
     )
 
 

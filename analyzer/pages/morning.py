@@ -46,8 +46,6 @@ KEYS = (
 SUMMED = ("loop", "status", "oscillating_pct", "cause", "importance", LOSS, SIGNIFICANCE)
 FOLLOWER = "\u2514 "
 """Before the name of a loop that stands under the one it follows."""
-ALL_SHARES = ("oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct")
-ALL_COSTS = (SIGNIFICANCE, "average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct")
 LINKS = (
     ("Hand-over to maintenance", f"{work.MAINTENANCE}.html"),
     ("Work list", f"{work.WORK}.html"),
@@ -86,13 +84,14 @@ def worst_table(night: ShownNight) -> Table:
 
 def ranking(night: ShownNight) -> Table:
     """All loops of the night."""
+    figures = [c.key for c in words.page_columns("ranking") if c.numeric]
 
     def own(row: words.Row) -> dict[str, Cell]:
-        costs = {name: words.marked_cell(row, name) for name in ALL_COSTS}
-        shares = {name: words.marked_cell(row, name, ".0f") for name in ALL_SHARES}
-        return costs | shares | {"cause": words.cause_cell(row["cause"])}
+        return {name: words.marked_cell(row, name) for name in figures} | {
+            "cause": words.cause_cell(row["cause"])
+        }
 
-    return night.table("ranking", night.rows, own, note=_what_marks(night.rows, *ALL_COSTS))
+    return night.table("ranking", night.rows, own, note=_what_marks(night.rows, *figures))
 
 
 def waiting(night: ShownNight) -> list[tuple[str, str]]:

@@ -13,11 +13,10 @@ from typing import Any
 from analyzer.columns import BELIEVED, BY_NAME, LISTED, NOTED, RANKING, names
 from analyzer.lanes.lanes import FIGURE, lanes_in
 from analyzer.loop.cost import LOSS, MARK, OF_RECORDED, SIGNIFICANCE, compares, cost_column, mark
-from analyzer.loop.decisions import CAUSES, Cause, Due, Lane
-from analyzer.pages.words import Row, duration, keys, number
+from analyzer.loop.decisions import Cause, Due, Lane
+from analyzer.pages.words import SHARES, Row, cell, keys, marked_cell, number
 from analyzer.store import notes
 from analyzer.store.store import Store
-from analyzer.words.reason import in_short
 from analyzer.words.units import gain_unit
 from identification.errors import InputError
 from reports.markdown import escaped, rows_of_table
@@ -44,11 +43,8 @@ CAUSE_STYLES: Mapping[str, str] = {
     Cause.UNDECIDED: "magenta",
 }
 """Colours of causes on the terminal."""
-SHARES = tuple(f"osc_{cause}_pct" for cause in CAUSES)
 SHOWN = keys("list")
 """Columns for people, in their order; new settings stand in the cells of the old ones."""
-WHOLE = frozenset({"oscillating_pct", *SHARES})
-"""Shares that are shown without decimals."""
 WITH_UNITS = frozenset({"period_s", "kp", "ti"})
 """Numbers that are shown with their units, and so as texts."""
 LEAST_REASON = 44
@@ -204,16 +200,11 @@ def brief(row: Row, columns: Sequence[str]) -> dict[str, str]:
     gain = gain_unit(row.get("gain_unit"), row.get("pv_unit"), row.get("op_unit"))
     noted = f" [note: {row['note']}]" if row.get("note") else ""
     special = {
-        "period_s": duration(row["period_s"]),
         "kp": _setting_text(row["kp"], row["kp_new"], gain),
         "ti": _setting_text(row["ti"], row["ti_new"], row.get("ti_unit") or "s", "none"),
-        "reason": in_short(row["reason"] or "")[0] + noted,
+        "reason": cell(row, "reason").text + noted,
     }
-    for name in (n for n in columns if not special.get(n)):
-        value = row[name]
-        whole = name in WHOLE and value is not None
-        special[name] = value if isinstance(value, str) else f"{value:.0f}" if whole else number(value)
-    return {name: visible(special[name] + mark(row, name)) for name in columns}
+    return {name: visible(special.get(name) or marked_cell(row, name).text) for name in columns}
 
 
 def _fitting(shown: Sequence[Mapping[str, str]], width: int) -> tuple[str, ...]:

@@ -23,6 +23,9 @@ ROOM = "analyzer.pages"
 """Where the tables and texts of pages stand."""
 ALL_LOOPS = ("All loops", "index.html")
 """The link from a page to the morning page."""
+SHARES = tuple(f"osc_{cause}_pct" for cause in CAUSES)
+WHOLE = frozenset({"oscillating_pct", *SHARES})
+"""Shares that lists show without decimals."""
 OF_GROUPS = {c.name: c for c in GROUPS if c.name not in BY_NAME}
 """Columns of the table of groups alone; in a heading their unit stands too."""
 
@@ -65,14 +68,11 @@ def heading(name: str, **more: bool) -> Column:
 @cache
 def page_columns(table: str) -> tuple[Column, ...]:
     """The columns of a table of a page, as tables.toml declares them."""
-    return tuple(map(_column, toml_of(ROOM, "tables.toml")[table]["columns"]))
-
-
-def _column(stated: str | dict[str, Any]) -> Column:
-    if isinstance(stated, dict):
-        return Column(**stated)
-    name, *more = stated.split()
-    return heading(name, **dict.fromkeys(more, True))
+    stated = toml_of(ROOM, "tables.toml")[table]["columns"]
+    parted = (c if isinstance(c, dict) else c.split() for c in stated)
+    return tuple(
+        Column(**c) if isinstance(c, dict) else heading(c[0], **dict.fromkeys(c[1:], True)) for c in parted
+    )
 
 
 def keys(*tables: str) -> tuple[str, ...]:
@@ -133,11 +133,11 @@ def cells(row: Row, columns: str | Iterable[Column], **own: Cell | str | float |
     return tuple(t if isinstance(t, Cell) else Cell(t) if isinstance(t, str) else plain_cell(t) for t in told)
 
 
-def marked_cell(row: Row, name: str, digits: str = "") -> Cell:
-    """A figure, marked where it compares with no other loop's."""
-    value = row[name]
-    text = number(value) if not digits or value is None else f"{value:{digits}}"
-    return Cell(text + mark(row, name), value)
+def marked_cell(row: Row, name: str) -> Cell:
+    """A figure in a list of loops: shares without decimals, marked where it compares with no other loop's."""
+    shown = cell(row, name)
+    text = f"{shown.number:.0f}" if name in WHOLE and shown.number is not None else shown.text
+    return Cell(text + mark(row, name), shown.number)
 
 
 def cause_cell(cause: str | None) -> Cell:
