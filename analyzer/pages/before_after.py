@@ -247,13 +247,13 @@ def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> parts.
 
 def _trend(case: ChangeCase, number_: int) -> parts.Trend | None:
     """Both spans of a loop; None where the store holds no trends of them, for they may have been pruned."""
-    if case.trend is None or case.trend.time_s.size < 2:
+    if case.trend is None:
         return None
     found, marks = case.found, (parts.Mark(case.change.time_s, "changed"),)
     thin = case.trend.between(found.before.first_s, found.after.last_s).coarser(TREND_BUCKETS)
-    title = f"{found.loop}: before and after on one scale"
     if thin.time_s.size < 2:
         return None
+    title = f"{found.loop}: before and after on one scale"
     return trend_block(f"trend-{number_}", title, thin, marks, words.pv_scale_of(case.row))
 
 
