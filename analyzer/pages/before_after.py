@@ -15,6 +15,7 @@ from analyzer.comparison.before_after import (
     MEASURES,
     Change,
     ChangeVerdict,
+    Grade,
     LoopComparison,
     Measure,
     Span,
@@ -161,7 +162,7 @@ def _outcome_tiles(cases: Sequence[ChangeCase]) -> parts.Tiles:
     return parts.Tiles(((str(len(cases)), "changes looked at", ""), *shown))
 
 
-def _row(change: Change, found: LoopComparison) -> tuple[parts.Cell, ...]:
+def _row(change: Change, found: LoopComparison) -> tuple[words.Told, ...]:
     """A figure before and after; the interval is in percent of before, in the figure's unit where that is zero."""
     d, ends, unit = change.found, change.interval_pct, change.measure.unit
     interval = f"{words.number(d.low)} … {words.number(d.high)} {unit}"
@@ -169,13 +170,11 @@ def _row(change: Change, found: LoopComparison) -> tuple[parts.Cell, ...]:
         interval = f"{words.signed(ends[0])} … {words.signed(ends[1])} %"
     follows = f"follows {found.source_loop}" if found.source_loop else ""
     return (
-        *map(parts.Cell, (found.loop, change.measure.title, unit)),
-        *map(words.plain_cell, (d.before, d.after)),
+        *(found.loop, change.measure.title, unit, d.before, d.after),
         parts.Cell(words.signed(change.value_pct), change.value_pct),
-        parts.Cell(interval),
-        *map(words.plain_cell, (d.low, d.high)),
+        *(interval, d.low, d.high),
         parts.Cell(change.verdict.value, kind=change.verdict.colour),
-        parts.Cell("; ".join(found.reasons) or follows),
+        "; ".join(found.reasons) or follows,
     )
 
 
@@ -198,14 +197,14 @@ def _settings_typed(case: ChangeCase) -> str:
     return f"Kp {kp}, Ti {ti} ({row['form'] or 'ideal'} form, Kp in {gain}, Ti in {row['ti_unit'] or 's'})"
 
 
-def _in_short(case: ChangeCase) -> tuple[parts.Cell, ...]:
+def _in_short(case: ChangeCase) -> tuple[words.Told, ...]:
     """A loop in one row: what was typed in, the four changes, and what to make of them."""
     by_name = {c.measure.name: c for c in case.found.primary}
     kind = words.texts("outcomes")[grade(case.found)]["tone"]
     return (
         parts.Cell(case.found.loop, kind="strong"),
-        words.cell(case.row, "description"),
-        parts.Cell(_settings_typed(case)),
+        case.row["description"] or "",
+        _settings_typed(case),
         *(_change_cell(by_name.get(m.name)) for m in PRIMARY),
         parts.Cell(outcome(case.found), kind=kind),
     )
@@ -273,9 +272,9 @@ def per_loop_chart(cases: Sequence[ChangeCase]) -> parts.IntervalChart:
 
 
 def _average(cases: Sequence[ChangeCase], measure: Measure) -> parts.IntervalBar:
-    """Mean of the comparable loops' changes; errors of different loops taken as independent."""
+    """Mean of the loops' changes; errors of different loops taken as independent."""
     changes = [c for case in cases for c in case.found.primary if c.measure == measure]
-    known = [c for c in changes if c.verdict is not ChangeVerdict.INCOMPARABLE and c.value_pct is not None]
+    known = [c for c in changes if c.value_pct is not None]
     group = words.with_noun(len(known), "loop")
     if not known:
         return parts.IntervalBar(
@@ -291,7 +290,7 @@ def _average(cases: Sequence[ChangeCase], measure: Measure) -> parts.IntervalBar
 
 
 def average_chart(cases: Sequence[ChangeCase]) -> parts.IntervalChart:
-    """Average change of all comparable loops (the study's Figure 13)."""
+    """Average change of loops that can be compared (the study's Figure 13)."""
     bars = tuple(_average(cases, m) for m in PRIMARY)
     caption = "Mean over the loops that can be compared; loops that were not better count as they are."
     return parts.IntervalChart("average-change", "Average change", "% of before", bars, caption)
@@ -307,10 +306,8 @@ def changes_page(
     """The page of all changes on the plant's clock; `missing` could not be looked at, with the reason."""
     lost = parts.Listing(tuple((loop, f"not looked at: {why}") for loop, why in missing)) if missing else None
     seen = parts.Text((OFFERED,)) if offered else None
-    comparable = [
-        c for c in cases if any(x.verdict is not ChangeVerdict.INCOMPARABLE for x in c.found.primary)
-    ]
-    charts = (average_chart(cases), per_loop_chart(comparable)) if len(comparable) > 1 else ()
+    comparable = [c for c in cases if grade(c.found) is not Grade.INCOMPARABLE]
+    charts = (average_chart(comparable), per_loop_chart(comparable)) if len(comparable) > 1 else ()
     limits = cases[0].found.limits if cases else LIMITS
     said = {"m": limits, "error": 100 * (1 - limits.confidence), "share": 100 * limits.usable_share}
     method = parts.Text(tuple(text.format(**said) for text in words.texts("method").values()))

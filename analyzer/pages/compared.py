@@ -14,7 +14,7 @@ from analyzer.limits import PAGES
 from analyzer.loop.settings_side_by_side import SPREAD, Comparison
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated, derivative_as_stated, unit_ratio
-from analyzer.pages.words import number, page_table, signed, texts
+from analyzer.pages.words import Told, number, page_table, signed, texts
 from analyzer.words.units import duration, gain_unit
 from identification.models import Integrator, Pid
 from identification.simulation.closed_loop import scan_step
@@ -125,7 +125,7 @@ def table(c: Comparison, spec: LoopSpec, unit: str) -> parts.Table:
     )
 
 
-def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[parts.Cell, ...]:
+def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[Told, ...]:
     scale, now, (kp, ti) = c.pv_span / 100.0, c.tried[0], as_stated(t.controller, spec, c.pv_span)
     found = c.everywhere.get(t.name) if t is not now else None
     worst = "" if found is None else ", ".join(map(_against_now_pct, (found.worst_travel, found.worst_error)))
@@ -139,8 +139,8 @@ def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[part
         parts.Cell(number(t.stem_travel), t.stem_travel, _against(t.stem_travel, now.stem_travel)),
         parts.Cell(f"{number(scale * t.error)} {unit}", t.error, _against(t.error, now.error)),
         parts.Cell(f"{number(scale * t.peak)} {unit}", t.peak, _against(t.peak, now.peak)),
-        parts.Cell(worst),
-        *(parts.Cell("–") if x is None else parts.Cell(number(x), x, _against(x, 1.0)) for x in rejected),
+        worst,
+        *("–" if x is None else parts.Cell(number(x), x, _against(x, 1.0)) for x in rejected),
         parts.Cell(ms, None if math.isinf(t.ms) else t.ms),
     )
 

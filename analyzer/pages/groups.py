@@ -140,7 +140,7 @@ def morning_table(groups: Sequence[GroupView], linked: bool) -> parts.Table:
 def _members_table(g: GroupView, night: ShownNight) -> parts.Table:
     """The members with their lags and gains, the likeliest source first."""
 
-    def own(row: Row) -> dict[str, parts.Cell]:
+    def own(row: Row) -> dict[str, words.Told]:
         pct, cause = row["source_pct"], g.loops[row["loop"]]["cause"]
         confidence = parts.Cell(f"{pct:.0f}" if pct >= 1 else "under 1", pct)
         return {"source_pct": confidence, "cause": words.cause_cell(cause)}
@@ -153,10 +153,7 @@ def _signs_table(g: GroupView) -> parts.Table:
     shown = {r["loop"]: json.loads(r["group_signs"]) for r in g.rows[:5] if r["group_signs"]}
     columns = (*words.page_columns("signs"), *(parts.Column(loop, loop, True) for loop in shown))
     rows = (
-        (
-            parts.Cell(text),
-            *(parts.Cell(f"{signs.get(k, 0.0):.2f}", signs.get(k, 0.0)) for signs in shown.values()),
-        )
+        (text, *(parts.Cell(f"{s.get(k, 0.0):.2f}", s.get(k, 0.0)) for s in shown.values()))
         for k, text in words.texts("signs").items()
     )
     return words.page_table("signs", rows, columns=columns)
@@ -200,13 +197,13 @@ def graph(g: GroupView) -> parts.Graph:
     shown = [r for r in g.rows if r["role"] != GroupRole.SHARES or r is g.rows[0]][: PAGES.group_loops]
     by_name = {r["loop"]: r for r in shown}
     first = shown[0]["loop"]
+    parents = {n: r["parent"] if r["parent"] in by_name else first for n, r in by_name.items() if n != first}
     depth = {first: 0}
 
     def column(name: str) -> int:
         if name not in depth:
             depth[name] = 1  # of a ring, were there one
-            parent = by_name[name]["parent"]
-            depth[name] = 1 + column(parent if parent in by_name else first)
+            depth[name] = 1 + column(parents[name])
         return depth[name]
 
     def node(name: str, row: Row) -> parts.Node:
@@ -215,15 +212,9 @@ def graph(g: GroupView) -> parts.Graph:
         return parts.Node(name, text, str(row["role"]), column(name))
 
     nodes = tuple(node(n, r) for n, r in by_name.items())
-    arrows = tuple(
-        parts.Arrow(
-            r["parent"] if r["parent"] in by_name else first,
-            n,
-            f"{r['coherence']:.2f}" if r["lag_s"] is None else f"{r['lag_s']:+.0f} s",
-        )
-        for n, r in by_name.items()
-        if n != first
-    )
+    lags = {n: by_name[n]["lag_s"] for n in parents}
+    texts = {n: f"{by_name[n]['coherence']:.2f}" if s is None else f"{s:+.0f} s" for n, s in lags.items()}
+    arrows = tuple(parts.Arrow(parents[n], n, text) for n, text in texts.items())
     left = len(g.rows) - len(shown)
     caption = "From left to right as coherence falls; lags are behind the likeliest source."
     caption += f" {left} more not drawn." if left else ""

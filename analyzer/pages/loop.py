@@ -164,7 +164,7 @@ def _evidence_section(row: Row) -> parts.Section:
         (
             words.cause_cell(s["points_to"]),
             parts.Cell(f"{s['strength']:.2f}", s["strength"]),
-            parts.Cell(f"{s['text']} ({s['figures']})" if s.get("figures") else s["text"]),
+            f"{s['text']} ({s['figures']})" if s.get("figures") else s["text"],
         )
         for s in signs
     ]
@@ -208,7 +208,7 @@ def _phases(row: Row) -> parts.Table | None:
         ends = (low + span * phase[k] / 100.0 for k in ("begin", "end"))
         settled = [s for s in phase["settled_s"] if s is not None]
         middles = median(phase["overshoot_pct"]), median(settled) if settled else None
-        rows.append(tuple(map(words.plain_cell, (*ends, len(phase["start_s"]), *middles))))
+        rows.append((*ends, len(phase["start_s"]), *middles))
     unit = f"Levels in {row['pv_unit']}." if row["pv_unit"] else ""
     return page_table("phases", rows, note=unit) if rows else None
 
@@ -216,9 +216,7 @@ def _phases(row: Row) -> parts.Table | None:
 def _limit_cycle(row: Row) -> parts.Section | None:
     """Recorded against predicted limit cycle, and what new settings promise, where the night holds them."""
     known = [(name, row[f"{of}period_s"], row[f"{of}pv_amplitude_pct"]) for name, of in CYCLES.items()]
-    rows = [
-        (parts.Cell(n), parts.Cell(duration(p), p), words.plain_cell(a)) for n, p, a in known if p is not None
-    ]
+    rows = [(name, parts.Cell(duration(p), p), size) for name, p, size in known if p is not None]
     return parts.Section("Limit cycle", (page_table("limit-cycle", rows),)) if len(rows) > 1 else None
 
 
@@ -261,7 +259,7 @@ def nights_section(rows: Sequence[Row]) -> parts.Section:
     return parts.Section("Over the nights", parts.there(drawn, table))
 
 
-def _night_cells(row: Row) -> tuple[parts.Cell, ...]:
+def _night_cells(row: Row) -> tuple[words.Told, ...]:
     """One night's cells; the last says why where the loop was not assessed."""
     lost = {} if row["status"] == Status.OK else {"action": f"{row['status']}: {row['reason']}"}
     return words.cells(row, "history", **lost)

@@ -63,7 +63,7 @@ def worst_table(night: ShownNight) -> Table:
     """The loops to touch, the worst first, followers under the loop that moves them."""
     here, by = {r["loop"] for r in night.worst}, cost_column(night.rows)
 
-    def own(row: words.Row) -> dict[str, Cell | str]:
+    def own(row: words.Row) -> dict[str, words.Told]:
         name, trend = night.link(row["loop"]), night.trends.get(row["loop"])
         drawn = None if trend is None else sparkline(trend, close_span(row, trend))
         changed = row["kp_new"] is not None or row["ti_new"] is not None
@@ -86,7 +86,7 @@ def ranking(night: ShownNight) -> Table:
     """All loops of the night."""
     figures = [c.key for c in words.page_columns("ranking") if c.numeric]
 
-    def own(row: words.Row) -> dict[str, Cell]:
+    def own(row: words.Row) -> Mapping[str, words.Told]:
         return {name: words.marked_cell(row, name) for name in figures} | {
             "cause": words.cause_cell(row["cause"])
         }
@@ -132,24 +132,20 @@ def score(rows: Sequence[words.Row]) -> float | None:
     return 100.0 * sum(w for w, good in weights if good) / total if total > 0 else None
 
 
-def _area(name: str, rows: Sequence[words.Row]) -> tuple[Cell, ...]:
+def _area(name: str, rows: Sequence[words.Row]) -> tuple[words.Told, ...]:
     assessed = [r for r in rows if r["status"] == Status.OK]
     worst = sorted((r for r in assessed if r["cause"] != Cause.NONE), key=lambda r: -(r[SIGNIFICANCE] or 0.0))
     numbers = [len(rows), len(assessed)]
     numbers += [sum(r["cause"] == c for r in assessed) for c in (*CAUSES, Cause.UNDECIDED)]
-    return (
-        Cell(name or NO_AREA),
-        *map(words.plain_cell, (score(rows), *numbers, sum(r[SIGNIFICANCE] or 0.0 for r in assessed))),
-        Cell(", ".join(f"{r['loop']} ({words.number(r[SIGNIFICANCE])})" for r in worst[: PAGES.area_loops])),
-    )
+    named = ", ".join(f"{r['loop']} ({words.number(r[SIGNIFICANCE])})" for r in worst[: PAGES.area_loops])
+    return (name or NO_AREA, score(rows), *numbers, sum(r[SIGNIFICANCE] or 0.0 for r in assessed), named)
 
 
 def area_table(rows: Sequence[words.Row]) -> Table:
     """Areas with their worst loops, the lowest score first."""
-    cells = [_area(name, own) for name, own in by_area(rows).items()]
-    return words.page_table(
-        "areas", sorted(cells, key=lambda c: 101.0 if c[1].number is None else c[1].number)
-    )
+    areas = by_area(rows).items()
+    ordered = sorted(areas, key=lambda a: 101.0 if (found := score(a[1])) is None else found)
+    return words.page_table("areas", (_area(name, own) for name, own in ordered))
 
 
 def _plant_tiles(night: ShownNight, rows: Sequence[words.Row], by: str) -> tuple[Tile, ...]:

@@ -17,7 +17,7 @@ from analyzer.lanes.lanes import FIGURE
 from analyzer.limits import PAGES
 from analyzer.loop.decisions import Cause, Status, counts
 from analyzer.pages.rank import worst_first
-from analyzer.pages.words import cells, keys, page_table
+from analyzer.pages.words import Told, cells, keys, page_table
 from analyzer.store import notes
 from analyzer.store.notes import Note, is_hidden, last
 from analyzer.store.store import Store
@@ -181,7 +181,7 @@ class ShownNight:
         self,
         declared: str,
         rows: Iterable[Row],
-        own: Callable[[Row], Mapping[str, Cell | str | float | None]] = lambda row: {},
+        own: Callable[[Row], Mapping[str, Told]] = lambda row: {},
         **stated: Any,
     ) -> Table:
         """A table of loops, as tables.toml declares it but for what is `stated`: each row's own cells, a link to the

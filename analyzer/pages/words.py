@@ -19,6 +19,8 @@ from reports.pages import Cell, Column, Facts, Floats, Listing, Table, Text
 
 __all__ = ["Row", "duration", "number", "stamp"]  # of the words that are not chosen here
 
+Told = Cell | str | float | None
+"""What a table tells in a cell: a text or a number stands for a cell of it alone."""
 ROOM = "analyzer.pages"
 """Where the tables and texts of pages stand."""
 ALL_LOOPS = ("All loops", "index.html")
@@ -80,13 +82,19 @@ def keys(*tables: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(c.key for table in tables for c in page_columns(table)))
 
 
-def page_table(declared: str, rows: Iterable[tuple[Cell, ...]], **own: Any) -> Table:
+def page_table(declared: str, rows: Iterable[Iterable[Told]], **own: Any) -> Table:
     """A table of a page with its rows: as tables.toml declares it, but for what is its `own`."""
     stated = {
         k: tuple(v) if isinstance(v, list) else v for k, v in toml_of(ROOM, "tables.toml")[declared].items()
     }
-    whole = {"name": declared, "title": "", **stated, "columns": page_columns(declared), "rows": tuple(rows)}
-    return Table(**whole | own)
+    told = tuple(tuple(map(_as_cell, row)) for row in rows)
+    return Table(
+        **{"name": declared, "title": "", **stated, "columns": page_columns(declared), "rows": told} | own
+    )
+
+
+def _as_cell(told: Told) -> Cell:
+    return told if isinstance(told, Cell) else Cell(told) if isinstance(told, str) else plain_cell(told)
 
 
 def lead(*clauses: str) -> Text:
@@ -125,12 +133,10 @@ def cell(row: Row, name: str) -> Cell:
     return Cell(duration(value) if name == "period_s" else number(value), value)
 
 
-def cells(row: Row, columns: str | Iterable[Column], **own: Cell | str | float | None) -> tuple[Cell, ...]:
-    """A row of a table by the keys of its columns: what is its `own`, by cell, text or number, else what the store
-    holds."""
+def cells(row: Row, columns: str | Iterable[Column], **own: Told) -> tuple[Told, ...]:
+    """A row of a table by the keys of its columns: what is its `own`, else what the store holds."""
     shown = page_columns(columns) if isinstance(columns, str) else columns
-    told = (own[c.key] if c.key in own else cell(row, c.key) for c in shown)
-    return tuple(t if isinstance(t, Cell) else Cell(t) if isinstance(t, str) else plain_cell(t) for t in told)
+    return tuple(own[c.key] if c.key in own else cell(row, c.key) for c in shown)
 
 
 def marked_cell(row: Row, name: str) -> Cell:
