@@ -170,13 +170,10 @@ def as_table(
     ]
     head, body = table(headings, [[cells[name] for name in kept] for cells in shown], width)
     rule = " " + "\u2500" * (max(map(len, (head, *(line for lines in body for line in lines)))) - 1)
-    coloured = interactive() and not os.environ.get("NO_COLOR")
-    lines = [
-        _coloured(line, row["loop"], row["cause"]) if coloured and not k else line
-        for row, lines in zip(rows, body, strict=True)
-        for k, line in enumerate(lines)
-    ]
-    return "\n".join([f"Night {night}", "", head, rule, *lines])
+    if interactive() and not os.environ.get("NO_COLOR"):
+        for row, lines in zip(rows, body, strict=True):
+            lines[0] = _coloured(lines[0], row["loop"], row["cause"])
+    return "\n".join([f"Night {night}", "", head, rule, *(line for lines in body for line in lines)])
 
 
 def _coloured(line: str, loop: str, cause: str | None) -> str:
