@@ -81,14 +81,13 @@ def rank(
 
     Example: triage rank store --top 20 --format markdown
     """
-    from analyzer.pages.rank import hidden_loops, ranked, rendered, rendered_groups
+    from analyzer.pages.rank import hidden_loops, ranked, rendered
     from analyzer.store.store import Store
 
     if groups:
-        from analyzer.pages.groups import grouped
+        from analyzer.pages import groups as shared
 
-        found, name = grouped(Store(store), by["night"], top)
-        click.echo(rendered_groups(found, form, name))
+        click.echo(shared.rendered(*shared.grouped(Store(store), by["night"], top), form))
         return
     rows, name = ranked(Store(store), **by)
     hidden = () if everything or form in ("csv", "json") else hidden_loops(rows, name)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+from dataclasses import asdict
 from functools import cache
 
 import numpy as np
@@ -54,11 +55,11 @@ def trend_data(trend: Trend) -> Markup:
         "tick": tick,
         "time": base64.b64encode(offset.tobytes()).decode(),
         "bands": bands,
-        "panels": list(trend.panels),
-        "marks": [{"x": m.x, "label": m.label} for m in trend.marks],
-        "spans": [list(s) for s in trend.spans],
-        "opening": None if trend.opening is None else list(trend.opening),
-        "least": list(trend.least),
+        "panels": trend.panels,
+        "marks": list(map(asdict, trend.marks)),
+        "spans": trend.spans,
+        "opening": trend.opening,
+        "least": trend.least,
     }
     return _for_script(data)
 

@@ -24,10 +24,6 @@ TYPES = {"f4": np.float32, "f8": np.float64, "b1": np.bool_}
 ENDS = {"inf": float("inf"), "-inf": float("-inf"), "nan": float("nan")}
 
 
-class PageFileError(ValueError):
-    """A text that holds no page."""
-
-
 def dumps(page: pages.Page) -> str:
     """A page as text."""
     return json.dumps(_data(page), separators=(",", ":"), allow_nan=False)
@@ -56,21 +52,13 @@ def _array(x: np.ndarray) -> dict[str, Any]:
     return shape | {"type": code, "values": values}
 
 
-def loads(text: str) -> pages.Page:
-    """A page of its text.
-
-    Raises
-    ------
-    PageFileError
-        The text holds no page.
-    """
+def loads(text: str) -> pages.Page | None:
+    """A page of its text; None where it holds none, or one of another version."""
     try:
         found = _part(json.loads(text))
-    except (ValueError, KeyError, TypeError, binascii.Error, RecursionError) as error:
-        raise PageFileError(f"no page: {error}") from error
-    if not isinstance(found, pages.Page):
-        raise PageFileError("no page: another part of one")
-    return found
+    except (ValueError, KeyError, TypeError, binascii.Error, RecursionError):
+        return None
+    return found if isinstance(found, pages.Page) else None
 
 
 def _part(x: Any) -> Any:

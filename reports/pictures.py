@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 
@@ -29,15 +29,6 @@ OWN = (
 """What the style sheet does not say, for pages draw their trends by a script."""
 
 
-DRAWN: Mapping[type[Picture], Callable[..., Drawing]] = {
-    Plot: plots.plot,
-    HeatMap: maps.heat_map,
-    Graph: maps.graph,
-    TreeMap: maps.tree_map,
-}
-"""How blocks of one drawing are drawn."""
-
-
 @cache
 def asset(name: str) -> str:
     """Text of a style sheet, script or licence."""
@@ -49,15 +40,23 @@ def drawings(block: Picture, zone: str = "UTC", alone: bool = False) -> list[tup
 
     alone : whether they are drawn for a file of its own.
     """
-    if isinstance(block, Panels):
-        return [(p.title, plots.plot(p)) for p in block.plots]
-    if isinstance(block, IntervalChart):
-        return [("", drawn) for drawn in plots.intervals(block)]
-    if isinstance(block, Trend):
-        return [("", plots.trend(block, zone))]
-    if isinstance(block, Field):
-        return [("", maps.field(block, alone))]
-    return [("", DRAWN[type(block)](block))]
+    match block:
+        case Panels():
+            return [(p.title, plots.plot(p)) for p in block.plots]
+        case IntervalChart():
+            return [("", drawn) for drawn in plots.intervals(block)]
+        case Plot():
+            return [("", plots.plot(block))]
+        case Trend():
+            return [("", plots.trend(block, zone))]
+        case Field():
+            return [("", maps.field(block, alone))]
+        case HeatMap():
+            return [("", maps.heat_map(block))]
+        case Graph():
+            return [("", maps.graph(block))]
+        case TreeMap():
+            return [("", maps.tree_map(block))]
 
 
 def _swatches(block: Picture) -> list[tuple[str, str]]:

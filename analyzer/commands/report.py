@@ -85,15 +85,14 @@ def report(
     Example: triage report store --changes changes.csv --out report
     """
     from analyzer.config import read_config
-    from analyzer.pages.before_after import changes_page
-    from analyzer.pages.changes import Spans, change_cases
+    from analyzer.pages.before_after import change_cases, changes_page
 
     limits, kept = read_config(config), opened_store(store)
     zone = kept.zone()
     if not days <= MOST_DAYS:  # NaN passes the range that the option states
         raise InputError(f"--days {days}", f"1 to {MOST_DAYS}", "correct it")
-    spans = Spans(days, _span_given(before, "--before", zone), _span_given(after, "--after", zone))
-    found, missing = change_cases(kept, _changes(kept, limits, **named), spans, limits.before_after)
+    stated = _span_given(before, "--before", zone), _span_given(after, "--after", zone)
+    found, missing = change_cases(kept, _changes(kept, limits, **named), days, stated, limits.before_after)
     if not found:
         why = "; ".join(f"{tag}: {reason}" for tag, reason in missing) or "no change found"
         raise InputError(why, "loops and times that the store holds", "check the tags and times")
@@ -132,7 +131,7 @@ def _changes(
     """The changes that the command line names, or those that the loops' behaviour shows."""
     from analyzer.history.stamps import parse_time
     from analyzer.loops.changes import TuningChange, read_changes
-    from analyzer.pages.changes import detected
+    from analyzer.pages.before_after import detected
 
     if find:
         return detected(store, [loop] if loop else None, config)

@@ -112,6 +112,11 @@ class ChangeVerdict(StrEnum):
     UNCLEAR = "no clear change"
     INCOMPARABLE = "not comparable"
 
+    @property
+    def colour(self) -> str:
+        """The kind under which pages colour it."""
+        return self.name.lower()
+
 
 class Grade(StrEnum):
     """What became of a loop, from its four verdicts."""

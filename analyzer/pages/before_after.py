@@ -1,9 +1,12 @@
-"""The before/after page: what retuning brought, per loop and on average, with proof."""
+"""The before/after page: changes of controllers, what came of each, per loop and on average, with proof."""
 
 from __future__ import annotations
 
+import json
+import math
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,29 +15,142 @@ from analyzer.comparison.before_after import (
     MEASURES,
     Change,
     ChangeVerdict,
+    Grade,
     LoopComparison,
     Measure,
+    Span,
+    compare,
+    follows,
     grade,
+    spans_around,
 )
+from analyzer.config import ComparisonLimits, Config
 from analyzer.history.plant_clock import UTC_NAME
+from analyzer.loop.decisions import counts
+from analyzer.loops.changes import TuningChange, behaviour_change, stated_changes
 from analyzer.pages import words
-from analyzer.pages.changes import ChangeCase, outcome, wear_texts
 from analyzer.pages.loop_pictures import trend_block
+from analyzer.pages.reading import Thinned, by_loop, nights_within, read_hours, read_nights, read_trends
+from analyzer.store.store import Store
 from analyzer.words.units import gain_unit
 from reports import pages as parts
 
+COLUMNS = words.keys("of-a-change")
+HOURS_A_YEAR = 8760.0
 PRIMARY = tuple(m for m in MEASURES if m.primary)
 """The study's four figures."""
-KINDS = {
-    ChangeVerdict.BETTER: "better",
-    ChangeVerdict.WORSE: "worse",
-    ChangeVerdict.UNCLEAR: "unclear",
-    ChangeVerdict.INCOMPARABLE: "incomparable",
-}
-"""Colour of each verdict."""
 TREND_BUCKETS = 4000
 """Buckets of a trend on this page: two weeks at two pixels a bucket, 64 kB a loop; ours."""
 OFFERED = "These changes were not stated but seen in the loops' behaviour: confirm them first."
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeCase:
+    """A change with what came of it, the loop's row of the last night around it, and its trend."""
+
+    change: TuningChange
+    found: LoopComparison
+    row: words.Row
+    trend: Thinned | None
+
+
+def detected(store: Store, loops: Sequence[str] | None, config: Config) -> list[TuningChange]:
+    """Changes that nobody stated: settings that differ between nights, and steps of a controller's
+    behaviour."""
+    nights = store.nights()
+    rows = by_loop(read_nights(store, nights, COLUMNS, loops))
+    hours = read_hours(store, rows, nights)
+    found = []
+    for tag, own in rows.items():
+        stated = stated_changes(own)
+        seen = behaviour_change(tag, hours[tag], config) if tag in hours else None
+        found += stated or ([seen] if seen else [])
+    return found
+
+
+def change_cases(
+    store: Store,
+    changes: Sequence[TuningChange],
+    days: float = 7.0,
+    stated: tuple[Span | None, Span | None] = (None, None),
+    limits: ComparisonLimits = LIMITS,
+) -> tuple[list[ChangeCase], list[tuple[str, str]]]:
+    """Every change with what came of it, and those that could not be looked at, with the reason.
+
+    Some days each side are compared, or spans that are stated; several changes of one loop end each other's spans.
+    """
+    if not changes:
+        return [], []
+    others = ([o.time_s for o in changes if o.loop == c.loop and o != c] for c in changes)
+    around = (spans_around(c.time_s, days, own, limits) for c, own in zip(changes, others, strict=True))
+    of = [(stated[0] or before, stated[1] or after) for before, after in around]
+    ends = [span for pair in of for span in pair]
+    nights = nights_within(store, Span(min(s.first_s for s in ends), max(s.last_s for s in ends)))
+    loops = {c.loop for c in changes}
+    rows = by_loop(read_nights(store, nights, COLUMNS, loops))
+    hours, trends = read_hours(store, loops, nights), read_trends(store, loops, nights)
+    found: list[ChangeCase] = []
+    missing: list[tuple[str, str]] = []
+    for change, (before, after) in zip(changes, of, strict=True):
+        own = rows.get(change.loop)
+        if change.loop not in hours or not own:
+            missing.append((change.loop, "the store holds no hours of it around the change"))
+            continue
+        oscillating = [counts(r["oscillating_pct"]) for r in own]
+        source = follows([r["source_loop"] for r in own], oscillating, limits)
+        result = compare(change.loop, hours[change.loop], before, after, source, limits)
+        found.append(ChangeCase(change, result, own[-1], trends.get(change.loop)))
+    return found, missing
+
+
+def outcome(found: LoopComparison) -> str:
+    """A loop's outcome in one phrase."""
+    better = [c.measure.short_title.lower() for c in found.primary if c.verdict is ChangeVerdict.BETTER]
+    reasons = "; ".join(found.reasons) or "no hourly figures on both sides"
+    text: str = words.texts("outcomes")[grade(found)]["said"].format(
+        better=words.enumerated(better), reasons=reasons
+    )
+    if found.source_loop:
+        text += f"; the cause lies in the neighbour {found.source_loop}, whose oscillation it follows"
+    return text
+
+
+def _stated(row: words.Row, name: str) -> float | None:
+    """A number of the plant: a column of the night, or of its JSON of the plant's own columns."""
+    held = json.loads(row.get("extra") or "{}") | {k: v for k, v in row.items() if v is not None}
+    try:
+        value = float(held[name])
+    except (KeyError, TypeError, ValueError):
+        return None
+    return value if math.isfinite(value) and value > 0 else None
+
+
+def _clear_change(found: LoopComparison, name: str) -> Change | None:
+    """The change of a figure, where it is clear."""
+    unclear = (ChangeVerdict.INCOMPARABLE, ChangeVerdict.UNCLEAR)
+    return next((c for c in found.changes if c.measure.name == name and c.verdict not in unclear), None)
+
+
+def wear_texts(found: LoopComparison, row: words.Row) -> tuple[str, ...]:
+    """What the change means in valve life and in the plant's own cost of error, from numbers that loops.csv states
+    alone.
+
+    valve_life_travel_pct : travel after which a valve is overhauled [% of stroke, summed]
+    cost_per_error_pct_h : what one percent of average absolute error costs an hour [cost_unit]
+    """
+    texts = []
+    travel, life = _clear_change(found, "valve_travel_pct_per_h"), _stated(row, "valve_life_travel_pct")
+    if travel is not None and life is not None:
+        a, b = (life / max(v, 1e-9) / HOURS_A_YEAR for v in (travel.found.before, travel.found.after))
+        texts.append(
+            f"Valve life at this travel: {words.number(a)} years before, {words.number(b)} years after."
+        )
+    error, cost = _clear_change(found, "average_absolute_error_pct"), _stated(row, "cost_per_error_pct_h")
+    if error is not None and cost is not None:
+        unit = json.loads(row.get("extra") or "{}").get("cost_unit", "") or "units of cost"
+        low, high = (words.number(-end * cost * HOURS_A_YEAR) for end in (error.found.high, error.found.low))
+        texts.append(f"Saved by the smaller error: {low} to {high} {unit} a year at the stated cost.")
+    return tuple(texts)
 
 
 def _outcome_tiles(cases: Sequence[ChangeCase]) -> parts.Tiles:
@@ -46,7 +162,7 @@ def _outcome_tiles(cases: Sequence[ChangeCase]) -> parts.Tiles:
     return parts.Tiles(((str(len(cases)), "changes looked at", ""), *shown))
 
 
-def _row(change: Change, found: LoopComparison) -> tuple[parts.Cell, ...]:
+def _row(change: Change, found: LoopComparison) -> tuple[words.Told, ...]:
     """A figure before and after; the interval is in percent of before, in the figure's unit where that is zero."""
     d, ends, unit = change.found, change.interval_pct, change.measure.unit
     interval = f"{words.number(d.low)} … {words.number(d.high)} {unit}"
@@ -54,13 +170,11 @@ def _row(change: Change, found: LoopComparison) -> tuple[parts.Cell, ...]:
         interval = f"{words.signed(ends[0])} … {words.signed(ends[1])} %"
     follows = f"follows {found.source_loop}" if found.source_loop else ""
     return (
-        *map(parts.Cell, (found.loop, change.measure.title, unit)),
-        *map(words.plain_cell, (d.before, d.after)),
+        *(found.loop, change.measure.title, unit, d.before, d.after),
         parts.Cell(words.signed(change.value_pct), change.value_pct),
-        parts.Cell(interval),
-        *map(words.plain_cell, (d.low, d.high)),
-        parts.Cell(change.verdict.value, kind=KINDS[change.verdict]),
-        parts.Cell("; ".join(found.reasons) or follows),
+        *(interval, d.low, d.high),
+        parts.Cell(change.verdict.value, kind=change.verdict.colour),
+        "; ".join(found.reasons) or follows,
     )
 
 
@@ -83,14 +197,14 @@ def _settings_typed(case: ChangeCase) -> str:
     return f"Kp {kp}, Ti {ti} ({row['form'] or 'ideal'} form, Kp in {gain}, Ti in {row['ti_unit'] or 's'})"
 
 
-def _in_short(case: ChangeCase) -> tuple[parts.Cell, ...]:
+def _in_short(case: ChangeCase) -> tuple[words.Told, ...]:
     """A loop in one row: what was typed in, the four changes, and what to make of them."""
     by_name = {c.measure.name: c for c in case.found.primary}
     kind = words.texts("outcomes")[grade(case.found)]["tone"]
     return (
         parts.Cell(case.found.loop, kind="strong"),
-        words.cell(case.row, "description"),
-        parts.Cell(_settings_typed(case)),
+        case.row["description"] or "",
+        _settings_typed(case),
         *(_change_cell(by_name.get(m.name)) for m in PRIMARY),
         parts.Cell(outcome(case.found), kind=kind),
     )
@@ -101,7 +215,7 @@ def _change_cell(change: Change | None) -> parts.Cell:
         return parts.Cell("–")
     low, high = map(words.signed, change.interval_pct)
     return parts.Cell(
-        f"{words.signed(change.value_pct)} ({low} … {high})", change.value_pct, KINDS[change.verdict]
+        f"{words.signed(change.value_pct)} ({low} … {high})", change.value_pct, change.verdict.colour
     )
 
 
@@ -132,13 +246,13 @@ def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> parts.
 
 def _trend(case: ChangeCase, number_: int) -> parts.Trend | None:
     """Both spans of a loop; None where the store holds no trends of them, for they may have been pruned."""
-    if case.trend is None or case.trend.time_s.size < 2:
+    if case.trend is None:
         return None
     found, marks = case.found, (parts.Mark(case.change.time_s, "changed"),)
     thin = case.trend.between(found.before.first_s, found.after.last_s).coarser(TREND_BUCKETS)
-    title = f"{found.loop}: before and after on one scale"
     if thin.time_s.size < 2:
         return None
+    title = f"{found.loop}: before and after on one scale"
     return trend_block(f"trend-{number_}", title, thin, marks, words.pv_scale_of(case.row))
 
 
@@ -149,7 +263,7 @@ def per_loop_chart(cases: Sequence[ChangeCase]) -> parts.IntervalChart:
         for c in case.found.primary:
             low, high = c.interval_pct or (None, None)
             text = f"{words.signed(c.value_pct)} %" if c.interval_pct else c.verdict.value
-            name, kind = c.measure.short_title, KINDS[c.verdict]
+            name, kind = c.measure.short_title, c.verdict.colour
             bars.append(parts.IntervalBar(case.found.loop, name, c.value_pct, low, high, kind, text))
     caption = "Bars: change in % of the span before; lines: its interval. Less is better in all four."
     return parts.IntervalChart(
@@ -158,9 +272,9 @@ def per_loop_chart(cases: Sequence[ChangeCase]) -> parts.IntervalChart:
 
 
 def _average(cases: Sequence[ChangeCase], measure: Measure) -> parts.IntervalBar:
-    """Mean of the comparable loops' changes; errors of different loops taken as independent."""
+    """Mean of the loops' changes; errors of different loops taken as independent."""
     changes = [c for case in cases for c in case.found.primary if c.measure == measure]
-    known = [c for c in changes if c.verdict is not ChangeVerdict.INCOMPARABLE and c.value_pct is not None]
+    known = [c for c in changes if c.value_pct is not None]
     group = words.with_noun(len(known), "loop")
     if not known:
         return parts.IntervalBar(
@@ -176,7 +290,7 @@ def _average(cases: Sequence[ChangeCase], measure: Measure) -> parts.IntervalBar
 
 
 def average_chart(cases: Sequence[ChangeCase]) -> parts.IntervalChart:
-    """Average change of all comparable loops (the study's Figure 13)."""
+    """Average change of loops that can be compared (the study's Figure 13)."""
     bars = tuple(_average(cases, m) for m in PRIMARY)
     caption = "Mean over the loops that can be compared; loops that were not better count as they are."
     return parts.IntervalChart("average-change", "Average change", "% of before", bars, caption)
@@ -192,9 +306,8 @@ def changes_page(
     """The page of all changes on the plant's clock; `missing` could not be looked at, with the reason."""
     lost = parts.Listing(tuple((loop, f"not looked at: {why}") for loop, why in missing)) if missing else None
     seen = parts.Text((OFFERED,)) if offered else None
-    told = [(c, {x.verdict for x in c.found.primary} - {ChangeVerdict.INCOMPARABLE}) for c in cases]
-    comparable = [c for c, verdicts in told if verdicts]
-    charts = (average_chart(cases), per_loop_chart(comparable)) if len(comparable) > 1 else ()
+    comparable = [c for c in cases if grade(c.found) is not Grade.INCOMPARABLE]
+    charts = (average_chart(comparable), per_loop_chart(comparable)) if len(comparable) > 1 else ()
     limits = cases[0].found.limits if cases else LIMITS
     said = {"m": limits, "error": 100 * (1 - limits.confidence), "share": 100 * limits.usable_share}
     method = parts.Text(tuple(text.format(**said) for text in words.texts("method").values()))

@@ -14,7 +14,7 @@ from analyzer.limits import PAGES
 from analyzer.loop.settings_side_by_side import SPREAD, Comparison
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated, derivative_as_stated, unit_ratio
-from analyzer.pages.words import number, page_table, signed, texts
+from analyzer.pages.words import Told, number, page_table, signed, texts
 from analyzer.words.units import duration, gain_unit
 from identification.models import Integrator, Pid
 from identification.simulation.closed_loop import scan_step
@@ -116,19 +116,16 @@ def _times(t: Tried, now: Tried) -> float | None:
     return t.integral_s / now.integral_s if known else None
 
 
-def _with_repaired(c: Comparison) -> tuple[Tried, ...]:
-    """All that was tried, and what a repair would bring."""
-    return parts.there(*c.tried, c.repaired)
-
-
 def table(c: Comparison, spec: LoopSpec, unit: str) -> parts.Table:
     """The settings with what they do on the load."""
     said, lasts = texts("settings_tried"), duration(c.load.size * scan_step(c.loop))
     note = said["note"].format(lasts=lasts) + said["derivative"] * (c.loop.controller.td_s > 0.0)
-    return page_table("settings", (_tried_row(t, c, spec, unit) for t in _with_repaired(c)), note=note)
+    return page_table(
+        "settings", (_tried_row(t, c, spec, unit) for t in parts.there(*c.tried, c.repaired)), note=note
+    )
 
 
-def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[parts.Cell, ...]:
+def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[Told, ...]:
     scale, now, (kp, ti) = c.pv_span / 100.0, c.tried[0], as_stated(t.controller, spec, c.pv_span)
     found = c.everywhere.get(t.name) if t is not now else None
     worst = "" if found is None else ", ".join(map(_against_now_pct, (found.worst_travel, found.worst_error)))
@@ -142,8 +139,8 @@ def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[part
         parts.Cell(number(t.stem_travel), t.stem_travel, _against(t.stem_travel, now.stem_travel)),
         parts.Cell(f"{number(scale * t.error)} {unit}", t.error, _against(t.error, now.error)),
         parts.Cell(f"{number(scale * t.peak)} {unit}", t.peak, _against(t.peak, now.peak)),
-        parts.Cell(worst),
-        *(parts.Cell("–") if x is None else parts.Cell(number(x), x, _against(x, 1.0)) for x in rejected),
+        worst,
+        *("–" if x is None else parts.Cell(number(x), x, _against(x, 1.0)) for x in rejected),
         parts.Cell(ms, None if math.isinf(t.ms) else t.ms),
     )
 
@@ -275,7 +272,7 @@ def settings_page(loop: str, night: str, c: Comparison, spec: LoopSpec) -> parts
     )
     first = (parts.Text((opening(c, spec, unit),), "lead"), panels(c, unit), table(c, spec, unit))
     tried = parts.WhatIf("try", said["title"], model(c, spec, unit), c.load, said["caption"])
-    named = parts.Listing(tuple((f"{t.name}:", meant[t.name]) for t in _with_repaired(c)))
+    named = parts.Listing(tuple((f"{t.name}:", meant[t.name]) for t in parts.there(*c.tried, c.repaired)))
     sections = (
         parts.Section("Settings compared", parts.there(*first, price(c, unit), field(c))),
         parts.Section("Try settings", (parts.Text((said["hint"],)), tried)),

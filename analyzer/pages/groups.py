@@ -1,4 +1,4 @@
-"""Groups that share an oscillation: their list, the table of the morning page, a page each, a part of a member's."""
+"""Groups that share an oscillation: as a list, in the morning page, as pages of their own and in those of loops."""
 
 from __future__ import annotations
 
@@ -8,17 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.columns import GROUP_LIST, row_of
+from analyzer.columns import GROUP_LIST, names, row_of
 from analyzer.limits import PAGES
 from analyzer.loop.decisions import GroupRole
 from analyzer.pages import words
-from analyzer.pages.reading import Thinned, action_text
+from analyzer.pages.rank import PIPED, interactive
+from analyzer.pages.reading import ShownNight, Thinned, action_text
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from analyzer.words.units import Row, duration, number
 from identification.signals.spectrum import PER_OCTAVE
 from reports import pages as parts
-from reports.texts import slug
+from reports.markdown import escaped, rows_of_table
+from reports.plain import csv_text
+from reports.texts import visible
 
 PERIODS = 12.0
 """Periods that the aligned trends show."""
@@ -26,10 +29,8 @@ FLOOR_DB = 30.0
 """Level under a loop's peak from which a colour is empty [dB]."""
 
 
-def grouped(
-    store: Store, night: str | None = None, top: int | None = None
-) -> tuple[list[dict[str, Any]], str]:
-    """Rows of the groups of a night, those that cost most first.
+def grouped(store: Store, night: str | None = None, top: int | None = None) -> tuple[list[GroupView], str]:
+    """The groups of a night, those that cost most first, and the night's name.
 
     Raises
     ------
@@ -38,28 +39,69 @@ def grouped(
     """
     name = night or store.require()
     store.read("nights", name, ["loop"])
-    return [group_row(g) for g in read_groups(store, name)][:top], name
+    return read_groups(store, name)[:top], name
 
 
 def group_row(g: GroupView) -> dict[str, Any]:
-    """What is told of a group."""
+    """What is listed of a group, candidates by their names and members as they are."""
     source = g.source
-    own = g.loops[source["loop"]] if source else None
     told = {
         "group": g.number,
         "group_period_s": g.period_s,
         "loops": float(len(g.rows)),
         "fix_first": source["loop"] if source else None,
         "source_pct": source["source_pct"] if source else None,
-        "candidates": json.dumps({r["loop"]: round(r["source_pct"], 1) for r in g.candidates}),
+        "candidates": {r["loop"]: round(r["source_pct"], 1) for r in g.candidates},
         "unseen_pct": g.unseen_pct,
-        "source_cause": own["cause"] if own else None,
+        "source_cause": g.loops[source["loop"]]["cause"] if source else None,
         "source_action": action_there(g),
         "others_gain_pct": g.gain_pct,
-        "members": json.dumps([r["loop"] for r in g.rows]),
+        "members": [r["loop"] for r in g.rows],
         "sentence": sentence(g),
     }
     return row_of(told, GROUP_LIST)
+
+
+def rendered(groups: Sequence[GroupView], night: str, form: str) -> str:
+    """Groups as text in one of the formats."""
+    rows = [group_row(g) for g in groups]
+    if form == "csv":
+        cells = ([json.dumps(v) if isinstance(v, dict | list) else v for v in r.values()] for r in rows)
+        return csv_text(names(GROUP_LIST), cells).rstrip("\n")
+    if form == "json":
+        return json.dumps(rows, indent=1)
+    shown = [list(map(visible, _told(g, "unseen", "undecided"))) for g in groups]
+    if form == "table":
+        return _as_table(shown, night)
+    heads = [column.title for column in words.page_columns("list-of-groups")]
+    return "\n".join(rows_of_table(heads, (map(escaped, cells) for cells in shown)))
+
+
+def _as_table(shown: Sequence[Sequence[str]], night: str) -> str:
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    if not shown:
+        return f"Night {night}: no loops share an oscillation"
+    drawn = Table(box=SIMPLE_HEAD, title=f"Night {night}: one cause, several loops", title_justify="left")
+    for column in words.page_columns("list-of-groups"):
+        drawn.add_column(column.title, justify="right" if column.numeric else "left")
+    for cells in shown:
+        drawn.add_row(*map(Text, cells))
+    console = Console(width=None if interactive() else PIPED)
+    with console.capture() as capture:
+        console.print(drawn)
+    return "\n".join(line.rstrip() for line in capture.get().rstrip().splitlines())
+
+
+def _told(g: GroupView, unseen: str, undecided: str) -> tuple[str, ...]:
+    """A group in a row: number, loops, period, where it starts or `unseen`, the action there or `undecided`, what the
+    others gain, and they."""
+    others = ", ".join(r["loop"] for r in g.rows if r is not g.source)
+    head = g.number, str(len(g.rows)), duration(g.period_s), _candidates(g) or unseen
+    return (*head, action_there(g) or undecided, number(g.gain_pct), others)
 
 
 def action_there(g: GroupView) -> str:
@@ -82,39 +124,28 @@ def sentence(g: GroupView) -> str:
     return f"{head}; {tail}; without it the others' average errors fall by {number(g.gain_pct)} % of span together"
 
 
-def page_name(number: str) -> str:
-    """The file of a group's page, without its ending."""
-    return f"group-{number}"
-
-
 def morning_table(groups: Sequence[GroupView], linked: bool) -> parts.Table:
     """One cause, several loops: the groups of a night, those that cost most first; `linked` to their pages."""
-    rows = (
-        (
-            parts.Cell(
-                f"group {g.number}", kind="strong", href=f"{page_name(g.number)}.html" if linked else ""
-            ),
-            parts.Cell(str(len(g.rows)), len(g.rows)),
-            parts.Cell(duration(g.period_s), g.period_s),
-            parts.Cell(_candidates(g) or "not clear"),
-            parts.Cell(action_there(g) or "undecided: look at the candidates"),
-            words.plain_cell(g.gain_pct),
-            parts.Cell(", ".join(r["loop"] for r in g.rows if r is not g.source)),
+    rows = []
+    for g in groups:
+        href = f"group-{g.number}.html" if linked else ""
+        _, *texts = _told(g, "not clear", "undecided: look at the candidates")
+        figures = (len(g.rows), g.period_s, None, None, g.gain_pct, None)
+        rows.append(
+            (parts.Cell(f"group {g.number}", kind="strong", href=href), *map(parts.Cell, texts, figures))
         )
-        for g in groups
-    )
     return words.page_table("groups", rows)
 
 
-def _member_cells(g: GroupView, row: Row, paged: frozenset[str]) -> tuple[parts.Cell, ...]:
-    name, pct = row["loop"], row["source_pct"]
-    return (
-        parts.Cell(name, kind="strong", href=f"{slug(name)}.html" if name in paged else ""),
-        parts.Cell(row["role"]),
-        parts.Cell(f"{pct:.0f}" if pct >= 1 else "under 1", pct),
-        words.cause_cell(g.loops[name]["cause"]),
-        *(words.plain_cell(row[c.key]) for c in words.page_columns("members")[4:]),
-    )
+def _members_table(g: GroupView, night: ShownNight) -> parts.Table:
+    """The members with their lags and gains, the likeliest source first."""
+
+    def own(row: Row) -> dict[str, words.Told]:
+        pct, cause = row["source_pct"], g.loops[row["loop"]]["cause"]
+        confidence = parts.Cell(f"{pct:.0f}" if pct >= 1 else "under 1", pct)
+        return {"source_pct": confidence, "cause": words.cause_cell(cause)}
+
+    return night.table("members", g.rows, own)
 
 
 def _signs_table(g: GroupView) -> parts.Table:
@@ -122,32 +153,28 @@ def _signs_table(g: GroupView) -> parts.Table:
     shown = {r["loop"]: json.loads(r["group_signs"]) for r in g.rows[:5] if r["group_signs"]}
     columns = (*words.page_columns("signs"), *(parts.Column(loop, loop, True) for loop in shown))
     rows = (
-        (
-            parts.Cell(text),
-            *(parts.Cell(f"{signs.get(k, 0.0):.2f}", signs.get(k, 0.0)) for signs in shown.values()),
-        )
+        (text, *(parts.Cell(f"{s.get(k, 0.0):.2f}", s.get(k, 0.0)) for s in shown.values()))
         for k, text in words.texts("signs").items()
     )
     return words.page_table("signs", rows, columns=columns)
 
 
-def group_page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: frozenset[str]) -> parts.Page:
+def group_page(g: GroupView, trends: Mapping[str, Thinned], night: ShownNight) -> parts.Page:
     """A group's page."""
     facts = [("Period", duration(g.period_s)), ("Loops", str(len(g.rows)))]
     if g.source is not None:
         facts += [("Fix first", g.source["loop"]), ("Action there", action_there(g))]
     facts.append(("Others gain", f"{number(g.gain_pct)} % of span"))
     facts.append(("It starts elsewhere", f"{g.unseen_pct:.0f} %"))
-    members = words.page_table("members", (_member_cells(g, r, paged) for r in g.rows))
     sections = parts.there(
         parts.Section("What and where", (words.lead(sentence(g)), parts.Facts(tuple(facts)), graph(g))),
-        parts.Section("Loops", (members,)),
+        parts.Section("Loops", (_members_table(g, night),)),
         parts.Section("Why there", (_signs_table(g),)),
         parts.section("Trends and spectra", aligned(g, trends), heat_map(g)),
     )
-    subtitle = f"{words.with_noun(len(g.rows), 'loop')}, night {night}."
+    subtitle = f"{words.with_noun(len(g.rows), 'loop')}, night {night.name}."
     return parts.Page(
-        page_name(g.number), f"Group {g.number}: one oscillation", subtitle, sections, (words.ALL_LOOPS,)
+        f"group-{g.number}", f"Group {g.number}: one oscillation", subtitle, sections, (words.ALL_LOOPS,)
     )
 
 
@@ -170,35 +197,28 @@ def graph(g: GroupView) -> parts.Graph:
     shown = [r for r in g.rows if r["role"] != GroupRole.SHARES or r is g.rows[0]][: PAGES.group_loops]
     by_name = {r["loop"]: r for r in shown}
     first = shown[0]["loop"]
+    parents = {n: r["parent"] if r["parent"] in by_name else first for n, r in by_name.items() if n != first}
     depth = {first: 0}
 
     def column(name: str) -> int:
         if name not in depth:
             depth[name] = 1  # of a ring, were there one
-            parent = by_name[name]["parent"]
-            depth[name] = 1 + column(parent if parent in by_name else first)
+            depth[name] = 1 + column(parents[name])
         return depth[name]
 
-    nodes = tuple(parts.Node(n, _node_text(r), str(r["role"]), column(n)) for n, r in by_name.items())
-    arrows = tuple(
-        parts.Arrow(r["parent"] if r["parent"] in by_name else first, n, _arrow_text(r))
-        for n, r in by_name.items()
-        if n != first
-    )
+    def node(name: str, row: Row) -> parts.Node:
+        sure = f" {row['source_pct']:.0f} %" if row["source_pct"] >= 1 else ""
+        text = f"{row['role']}{sure}, {number(row['wave_amplitude_pct'])} %"
+        return parts.Node(name, text, str(row["role"]), column(name))
+
+    nodes = tuple(node(n, r) for n, r in by_name.items())
+    lags = {n: by_name[n]["lag_s"] for n in parents}
+    texts = {n: f"{by_name[n]['coherence']:.2f}" if s is None else f"{s:+.0f} s" for n, s in lags.items()}
+    arrows = tuple(parts.Arrow(parents[n], n, text) for n, text in texts.items())
     left = len(g.rows) - len(shown)
     caption = "From left to right as coherence falls; lags are behind the likeliest source."
     caption += f" {left} more not drawn." if left else ""
     return parts.Graph("way", "Where it starts and whom it moves", nodes, arrows, caption)
-
-
-def _node_text(r: Row) -> str:
-    role = f"{r['role']} {r['source_pct']:.0f} %" if r["source_pct"] >= 1 else str(r["role"])
-    return f"{role}, {number(r['wave_amplitude_pct'])} %"
-
-
-def _arrow_text(r: Row) -> str:
-    lag = r["lag_s"]
-    return f"{lag:+.0f} s" if lag is not None else f"{r['coherence']:.2f}"
 
 
 def heat_map(g: GroupView) -> parts.HeatMap | None:
@@ -227,21 +247,21 @@ def heat_map(g: GroupView) -> parts.HeatMap | None:
 
 def aligned(g: GroupView, trends: Mapping[str, Thinned], only: Sequence[str] = ()) -> parts.Trend | None:
     """PV of the members beneath each other over some periods; None where the trends are too coarse to show any."""
-    names = [r["loop"] for r in g.rows if r["loop"] in trends and (not only or r["loop"] in only)]
-    names = (sorted(names, key=only.index) if only else names)[: PAGES.group_loops]
-    if not names:
+    shown = [r["loop"] for r in g.rows if r["loop"] in trends and (not only or r["loop"] in only)]
+    shown = (sorted(shown, key=only.index) if only else shown)[: PAGES.group_loops]
+    if not shown:
         return None
-    first = trends[names[0]]
+    first = trends[shown[0]]
     middle = 0.5 * (first.time_s[0] + first.time_s[-1])
     lead = first.between(middle - 0.5 * PERIODS * g.period_s, middle + 0.5 * PERIODS * g.period_s)
     if lead.time_s.size < 4 * PERIODS:
         return None
     bands = []
-    for i, name in enumerate(names):
+    for i, name in enumerate(shown):
         t = trends[name]
         low, high = (np.interp(lead.time_s, t.time_s, t.extremes[f"pv_{end}"]) for end in ("min", "max"))
         bands.append(parts.Band(f"{name}.PV", "pv", i, low, high))
     top = "" if only else ", the likeliest source on top"
     caption = f"PV [% of span] over {PERIODS:g} periods in the middle of the night{top}."
     title = "Trends, aligned"
-    return parts.Trend("aligned", title, lead.time_s, lead.gap, tuple(bands), tuple(names), (), caption)
+    return parts.Trend("aligned", title, lead.time_s, lead.gap, tuple(bands), tuple(shown), (), caption)

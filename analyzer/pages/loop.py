@@ -16,9 +16,9 @@ from analyzer.limits import PAGES
 from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES, Fault, Status
 from analyzer.pages import loop_pictures, words
-from analyzer.pages.maintenance import work_order
 from analyzer.pages.reading import BESIDE, Thinned
 from analyzer.pages.words import Row, duration, keys, known_figures, lead, number, page_table, titled
+from analyzer.pages.work import work_order
 from analyzer.words.belief import wear_text
 from analyzer.words.reason import in_short
 from analyzer.words.units import row_settings
@@ -164,7 +164,7 @@ def _evidence_section(row: Row) -> parts.Section:
         (
             words.cause_cell(s["points_to"]),
             parts.Cell(f"{s['strength']:.2f}", s["strength"]),
-            parts.Cell(f"{s['text']} ({s['figures']})" if s.get("figures") else s["text"]),
+            f"{s['text']} ({s['figures']})" if s.get("figures") else s["text"],
         )
         for s in signs
     ]
@@ -208,7 +208,7 @@ def _phases(row: Row) -> parts.Table | None:
         ends = (low + span * phase[k] / 100.0 for k in ("begin", "end"))
         settled = [s for s in phase["settled_s"] if s is not None]
         middles = median(phase["overshoot_pct"]), median(settled) if settled else None
-        rows.append(tuple(map(words.plain_cell, (*ends, len(phase["start_s"]), *middles))))
+        rows.append((*ends, len(phase["start_s"]), *middles))
     unit = f"Levels in {row['pv_unit']}." if row["pv_unit"] else ""
     return page_table("phases", rows, note=unit) if rows else None
 
@@ -216,9 +216,7 @@ def _phases(row: Row) -> parts.Table | None:
 def _limit_cycle(row: Row) -> parts.Section | None:
     """Recorded against predicted limit cycle, and what new settings promise, where the night holds them."""
     known = [(name, row[f"{of}period_s"], row[f"{of}pv_amplitude_pct"]) for name, of in CYCLES.items()]
-    rows = [
-        (parts.Cell(n), parts.Cell(duration(p), p), words.plain_cell(a)) for n, p, a in known if p is not None
-    ]
+    rows = [(name, parts.Cell(duration(p), p), size) for name, p, size in known if p is not None]
     return parts.Section("Limit cycle", (page_table("limit-cycle", rows),)) if len(rows) > 1 else None
 
 
@@ -227,9 +225,7 @@ def _of_settings(found: parts.Page | None) -> parts.Section | None:
     if found is None:
         return None
     first = found.sections[0]
-    return parts.Section(
-        first.title, tuple(b for b in first.blocks if isinstance(b, parts.Text | parts.Plot))
-    )
+    return parts.section(first.title, *(b for b in first.blocks if isinstance(b, parts.Text | parts.Plot)))
 
 
 def _figures(row: Row) -> parts.Facts:
@@ -246,48 +242,37 @@ def _figures(row: Row) -> parts.Facts:
 def nights_section(rows: Sequence[Row]) -> parts.Section:
     """A table of a loop's nights, the last first, and pictures of how its oscillation and the width of its valve's
     fault grew or fell."""
-    plots = parts.there(
-        *(_over_nights(rows, column) for column in keys("figures-over-nights")), _widths(rows)
-    )
+    plots = [
+        _over_nights(
+            f"nights-{slug(c)}", BY_NAME[c].title, BY_NAME[c].unit, 0.0, _by_night([r[c] for r in rows])
+        )
+        for c in keys("figures-over-nights")
+    ]
+    if rows[-1]["certain_since"]:
+        alone = [(json.loads(r["witness"] or "{}").get("width") or [None])[0] for r in rows]
+        certain = [r["width_pct"] if r["certain_since"] else None for r in rows]
+        lines = _by_night(alone, joined=False), _by_night(certain, "nights together", kind="op")
+        plots.append(_over_nights("widths", "Width of the valve's fault", "% of OP", 1.0, *lines))
+    shown = parts.there(*plots)
+    drawn = parts.Panels("nights", "Night by night", shown) if shown else None
     table = page_table("history", map(_night_cells, reversed(rows)))
-    return parts.Section(
-        "Over the nights",
-        parts.there(parts.Panels("nights", "Night by night", plots) if plots else None, table),
-    )
+    return parts.Section("Over the nights", parts.there(drawn, table))
 
 
-def _night_cells(row: Row) -> tuple[parts.Cell, ...]:
+def _night_cells(row: Row) -> tuple[words.Told, ...]:
     """One night's cells; the last says why where the loop was not assessed."""
-    lost = {} if row["status"] == Status.OK else {"action": parts.Cell(f"{row['status']}: {row['reason']}")}
+    lost = {} if row["status"] == Status.OK else {"action": f"{row['status']}: {row['reason']}"}
     return words.cells(row, "history", **lost)
 
 
-def _over_nights(rows: Sequence[Row], column: str) -> parts.Plot | None:
-    """A figure over the nights."""
-    line, shown = _by_night("each night", [r[column] for r in rows]), BY_NAME[column]
-    return _nights_plot(f"nights-{slug(column)}", shown.title, shown.unit, (line,), 0.0)
-
-
-def _widths(rows: Sequence[Row]) -> parts.Plot | None:
-    """Width of the valve's fault as each night tells it, and as they do together, where it is certain."""
-    alone = [(json.loads(r["witness"] or "{}").get("width") or [None])[0] for r in rows]
-    certain = [r["width_pct"] if r["certain_since"] else None for r in rows]
-    lines = _by_night("each night", alone, joined=False), _by_night("nights together", certain, kind="op")
-    if not rows[-1]["certain_since"]:
-        return None
-    return _nights_plot("widths", "Width of the valve's fault", "% of OP", lines, 1.0)
-
-
-def _by_night(label: str, figures: Sequence[float | None], **drawn: Any) -> parts.Line:
+def _by_night(figures: Sequence[float | None], label: str = "each night", **drawn: Any) -> parts.Line:
     """A figure of the nights up to this one, where it is known."""
     known = [(i - len(figures) + 1.0, y) for i, y in enumerate(figures) if y is not None]
     x, y = np.array(known, float).reshape(-1, 2).T
     return parts.Line(label, x, y, **drawn)
 
 
-def _nights_plot(
-    name: str, title: str, unit: str, lines: tuple[parts.Line, ...], least: float
-) -> parts.Plot | None:
+def _over_nights(name: str, title: str, unit: str, least: float, *lines: parts.Line) -> parts.Plot | None:
     """Figures over the nights, from 0 to `least` at least; None where fewer than three nights know them."""
     if min(line.x.size for line in lines) < 3:
         return None

@@ -144,8 +144,8 @@ def turn_panels(row: Row, scale: PvScale) -> Panels | None:
         return None
     delay = f", PV {kept['dead_s']:.3g} s later" if kept["dead_s"] > 0 else ""
     pv, minutes = f"PV [{scale.label}]", "min since OP's turn"
-    paths = zip(*(_half_cycle(h, scale, kept["step_s"]) for h in kept["halves"]), strict=True)
-    op_lines, pv_lines, plane = map(_laid_over, paths)
+    halves = [_half_cycle(h, scale, kept["step_s"]) for h in kept["halves"]]
+    op_lines, pv_lines, plane = map(_laid_over, zip(*halves, strict=True))
     reach = _least_ends(float(np.median(plane[0].y)), scale)
     plots = (
         Plot("turns-op", "OP since its turn", minutes, "OP [%]", op_lines, reach=(0.0, 0.0)),

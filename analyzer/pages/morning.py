@@ -1,48 +1,57 @@
-"""The morning page: which loops to touch, what is new, what got better, what was not assessed."""
+"""The morning page: which loops to touch, what is new, what was not assessed, and the plant as a whole: its areas,
+its map of what each loop costs, and its figures over the nights."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import date
+
+import numpy as np
 
 from analyzer.columns import BY_NAME
-from analyzer.loop.cost import MARK, OF_RECORDED, SIGNIFICANCE, cost_column, mark
-from analyzer.loop.decisions import CAUSES, Cause, Status
-from analyzer.pages import maintenance, words
+from analyzer.limits import PAGES
+from analyzer.loop.cost import LOSS, MARK, OF_RECORDED, SIGNIFICANCE, cost, cost_column, mark
+from analyzer.loop.decisions import CAUSES, Cause, Status, counts
+from analyzer.pages import words, work
 from analyzer.pages.groups import morning_table
 from analyzer.pages.loop_pictures import close_span, sparkline
-from analyzer.pages.plant import NightSum, area_table, plant_history, plant_map
-from analyzer.pages.reading import BESIDE, ShownNight, link_to, needs_a_look, oscillates
+from analyzer.pages.reading import BESIDE, ShownNight, needs_a_look, oscillates, read_nights
 from analyzer.pages.summary import first_things, since
 from analyzer.plantwide.view import GroupView
+from analyzer.store.store import Store
 from analyzer.words.units import changed_settings, row_settings
-from reports.pages import Cell, Listing, Page, Section, Table, Tiles, section, there
+from reports.pages import (
+    Cell,
+    Line,
+    Listing,
+    Page,
+    Panels,
+    Plot,
+    Section,
+    Table,
+    Tile,
+    Tiles,
+    TreeMap,
+    section,
+    there,
+)
 
+NO_AREA = "no area stated"
+KEYS = (
+    *((cause, cause) for cause in CAUSES),
+    ("unclear", "another reason to look"),
+    ("calm", "nothing to do"),
+)
+SUMMED = ("loop", "status", "oscillating_pct", "cause", "importance", LOSS, SIGNIFICANCE)
 FOLLOWER = "\u2514 "
 """Before the name of a loop that stands under the one it follows."""
-ALL_SHARES = ("oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct")
-ALL_COSTS = (SIGNIFICANCE, "average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct")
 LINKS = (
-    ("Hand-over to maintenance", f"{maintenance.NAME}.html"),
-    ("Work list", "work.html"),
+    ("Hand-over to maintenance", f"{work.MAINTENANCE}.html"),
+    ("Work list", f"{work.WORK}.html"),
     ("Loops side by side", f"{BESIDE}.html"),
     ("All loops as CSV", "csv/index-ranking.csv"),
 )
-
-
-def _of_worst(night: ShownNight, row: words.Row, follows: bool, by: str) -> dict[str, Cell]:
-    """What a loop to touch is shown with and the store does not hold."""
-    name, trend = link_to(night, row["loop"]), night.trends.get(row["loop"])
-    drawn = None if trend is None else sparkline(trend, close_span(row, trend))
-    changed = row["kp_new"] is not None or row["ti_new"] is not None
-    return {
-        "loop": replace(name, text=FOLLOWER + name.text) if follows else name,
-        "trend": Cell("", figure=drawn),
-        by: words.marked_cell(row, by),
-        "cause": words.cause_cell(row["cause"]),
-        "settings": Cell(changed_settings(row) if changed else row_settings(row)),
-        "note": Cell(night.note(row["loop"])),
-    }
 
 
 def _what_marks(rows: Sequence[words.Row], *columns: str) -> str:
@@ -53,22 +62,36 @@ def _what_marks(rows: Sequence[words.Row], *columns: str) -> str:
 def worst_table(night: ShownNight) -> Table:
     """The loops to touch, the worst first, followers under the loop that moves them."""
     here, by = {r["loop"] for r in night.worst}, cost_column(night.rows)
+
+    def own(row: words.Row) -> dict[str, words.Told]:
+        name, trend = night.link(row["loop"]), night.trends.get(row["loop"])
+        drawn = None if trend is None else sparkline(trend, close_span(row, trend))
+        changed = row["kp_new"] is not None or row["ti_new"] is not None
+        return {
+            "loop": replace(name, text=FOLLOWER + name.text) if row["source_loop"] in here else name,
+            "trend": Cell("", figure=drawn),
+            by: words.marked_cell(row, by),
+            "cause": words.cause_cell(row["cause"]),
+            "settings": changed_settings(row) if changed else row_settings(row),
+            "note": night.note(row["loop"]),
+        }
+
     noted = any(night.note(r["loop"]) for r in night.worst)
     declared = words.page_columns("worst") if noted else words.page_columns("worst")[:-1]
     shown = (*declared[:4], words.heading(by), *declared[4:])
-    rows = (words.cells(r, shown, **_of_worst(night, r, r["source_loop"] in here, by)) for r in night.worst)
-    return words.page_table("worst", rows, columns=shown, note=_what_marks(night.worst, by))
+    return night.table("worst", night.worst, own, columns=shown, note=_what_marks(night.worst, by))
 
 
 def ranking(night: ShownNight) -> Table:
     """All loops of the night."""
-    rows = []
-    for r in night.rows:
-        own = {name: words.marked_cell(r, name) for name in ALL_COSTS}
-        own |= {name: words.marked_cell(r, name, ".0f") for name in ALL_SHARES}
-        own |= {"loop": link_to(night, r["loop"]), "cause": words.cause_cell(r["cause"])}
-        rows.append(words.cells(r, "ranking", **own))
-    return words.page_table("ranking", rows, note=_what_marks(night.rows, *ALL_COSTS))
+    figures = [c.key for c in words.page_columns("ranking") if c.numeric]
+
+    def own(row: words.Row) -> Mapping[str, words.Told]:
+        return {name: words.marked_cell(row, name) for name in figures} | {
+            "cause": words.cause_cell(row["cause"])
+        }
+
+    return night.table("ranking", night.rows, own, note=_what_marks(night.rows, *figures))
 
 
 def waiting(night: ShownNight) -> list[tuple[str, str]]:
@@ -90,9 +113,110 @@ def _night_tiles(night: ShownNight) -> Tiles:
 def lost_table(night: ShownNight) -> Table:
     """Loops that were not assessed, and why."""
     lost = sorted((r for r in night.rows if r["status"] != Status.OK), key=lambda r: r["loop"])
-    return words.page_table(
-        "not-assessed", (words.cells(r, "not-assessed") for r in lost), searchable=len(lost) > 12
-    )
+    return night.table("not-assessed", lost, lambda r: {"loop": r["loop"]}, searchable=len(lost) > 12)
+
+
+def by_area(rows: Sequence[words.Row]) -> dict[str, list[words.Row]]:
+    """Rows by the name of their area, '' where none is stated."""
+    return {a: [r for r in rows if (r["area"] or "") == a] for a in sorted({r["area"] or "" for r in rows})}
+
+
+def score(rows: Sequence[words.Row]) -> float | None:
+    """Share of assessed loops, by importance, with no fault found [%]; None where none is assessed."""
+    weights = [
+        (1.0 if r["importance"] is None else r["importance"], r["cause"] in (Cause.NONE, None))
+        for r in rows
+        if r["status"] == Status.OK
+    ]
+    total = sum(w for w, _ in weights)
+    return 100.0 * sum(w for w, good in weights if good) / total if total > 0 else None
+
+
+def _area(name: str, rows: Sequence[words.Row]) -> tuple[words.Told, ...]:
+    assessed = [r for r in rows if r["status"] == Status.OK]
+    worst = sorted((r for r in assessed if r["cause"] != Cause.NONE), key=lambda r: -(r[SIGNIFICANCE] or 0.0))
+    numbers = [len(rows), len(assessed)]
+    numbers += [sum(r["cause"] == c for r in assessed) for c in (*CAUSES, Cause.UNDECIDED)]
+    named = ", ".join(f"{r['loop']} ({words.number(r[SIGNIFICANCE])})" for r in worst[: PAGES.area_loops])
+    return (name or NO_AREA, score(rows), *numbers, sum(r[SIGNIFICANCE] or 0.0 for r in assessed), named)
+
+
+def area_table(rows: Sequence[words.Row]) -> Table:
+    """Areas with their worst loops, the lowest score first."""
+    areas = by_area(rows).items()
+    ordered = sorted(areas, key=lambda a: 101.0 if (found := score(a[1])) is None else found)
+    return words.page_table("areas", (_area(name, own) for name, own in ordered))
+
+
+def _plant_tiles(night: ShownNight, rows: Sequence[words.Row], by: str) -> tuple[Tile, ...]:
+    """An area's loops, those that cost most first, and the others in one."""
+    ordered = sorted(((cost(r, by), r) for r in rows), key=lambda c: (-c[0], c[1]["loop"]))
+    tiles = []
+    for worth, row in ordered[: PAGES.area_tiles]:
+        kind = "calm" if not needs_a_look(row) else row["cause"] if row["cause"] in CAUSES else "unclear"
+        text = f"{row['loop']}: {words.number(worth)}. {words.cell(row, 'reason').text}"
+        tiles.append(Tile(row["loop"], worth, kind, text, night.link(row["loop"]).href))
+    rest = [worth for worth, _ in ordered[PAGES.area_tiles :]]
+    if rest:
+        text = f"{len(rest)} more loops: {words.number(sum(rest))}"
+        tiles.append(Tile(f"{len(rest)} more", sum(rest), "calm", text))
+    return tuple(tiles)
+
+
+def plant_map(night: ShownNight) -> TreeMap | None:
+    """Areas and assessed loops as large as what they cost, coloured by why they are worth a look; None where nothing
+    is lost anywhere."""
+    rows = [r for r in night.rows if r["status"] == Status.OK]
+    by = cost_column(rows)
+    if not any(cost(r, by) > 0 for r in rows):
+        return None
+    what = "average absolute error times importance" if by == LOSS else "oscillation significance"
+    groups = tuple((area or NO_AREA, _plant_tiles(night, own, by)) for area, own in by_area(rows).items())
+    return TreeMap("plant", f"The plant by area: size is {what}", groups, KEYS)
+
+
+@dataclass(frozen=True, slots=True)
+class NightSum:
+    """One night of the plant: its name, loops that oscillate, those of each cause, and what all cost by a column."""
+
+    name: str
+    oscillate: int
+    causes: Mapping[Cause, int]
+    cost: float
+    by: str = LOSS
+
+
+def summed(name: str, rows: Sequence[words.Row]) -> NightSum:
+    """The sums of one night's rows."""
+    swinging = [r for r in rows if counts(r["oscillating_pct"])]
+    of = {c: sum(r["cause"] == c for r in swinging) for c in (*CAUSES, Cause.UNDECIDED)}
+    by = cost_column(rows)
+    return NightSum(name, len(swinging), of, sum(cost(r, by) for r in rows), by)
+
+
+def read_sums(store: Store, night: str) -> list[NightSum]:
+    """The sums of a night and of those before it, oldest first."""
+    names = [n for n in store.nights() if n <= night][-PAGES.history :]
+    return [summed(n, read_nights(store, [n], SUMMED)) for n in names]
+
+
+def plant_history(sums: Sequence[NightSum]) -> Panels | None:
+    """Curves over the nights: loops that oscillate, and what all cost, of the nights whose figure is that of the last
+    one; None where there are too few."""
+    if len(sums) < PAGES.curve_nights:
+        return None
+    day = np.array([date.fromisoformat(s.name[:10]).toordinal() for s in sums], float)
+    day -= day[-1]
+    lines = [Line("all that oscillate", day, np.array([s.oscillate for s in sums], float), kind="recorded")]
+    kinds = ((Cause.VALVE, "op"), (Cause.TUNING, "baseline"), (Cause.LOAD, "pv"))
+    lines += [Line(f"by {c}", day, np.array([s.causes[c] for s in sums], float), kind=k) for c, k in kinds]
+    axis, most = "days before this night", max(s.oscillate for s in sums) + 1.0
+    loops = Plot("oscillating", "Loops that oscillate", axis, "loops", tuple(lines), reach=(0.0, most))
+    by = sums[-1].by
+    cost, named = np.array([s.cost if s.by == by else np.nan for s in sums]), BY_NAME[by].heading.lower()
+    title = f"The loops' {named} together, now {words.number(float(cost[-1]))}"
+    costs = Plot("loss", title, axis, named, (Line(named, day, cost, kind="recorded"),), reach=(0.0, 1.0))
+    return Panels("over-the-nights", "The plant over the nights", (loops, costs))
 
 
 def morning_page(

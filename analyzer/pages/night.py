@@ -7,14 +7,13 @@ from dataclasses import replace
 
 from analyzer.explain.night import known
 from analyzer.limits import PAGES
-from analyzer.pages import groups, loop, maintenance, morning, work
+from analyzer.pages import groups, loop, morning, work
 from analyzer.pages.loop_pictures import trend_block
-from analyzer.pages.plant import read_sums
 from analyzer.pages.reading import BESIDE, ShownNight, Thinned, by_loop, read_night, read_nights, read_trends
 from analyzer.pages.words import ALL_LOOPS, pv_scale_of
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
-from reports.page_file import PageFileError, loads
+from reports.page_file import loads
 from reports.pages import Beside, Page, Section
 from reports.texts import slug
 
@@ -35,15 +34,15 @@ def pages_of_night(store: Store, name: str | None = None, top: int = 200) -> Ite
     shared = read_groups(store, night.name)
     nights = [n for n in store.nights() if n <= night.name]
     links = nights_around(nights[-PAGES.dated :], night.name)
-    about = morning.morning_page(night, shared, read_sums(store, night.name), links)
+    about = morning.morning_page(night, shared, morning.read_sums(store, night.name), links)
     yield replace(about, choices=nights_to_choose(nights[-PAGES.dated :], night.name))
-    yield maintenance.maintenance_page(night)
+    yield work.maintenance_page(night)
     yield side_by_side(store, night)
     yield work.work_page(store, night)
     members = {r["loop"] for g in shared for r in g.rows[: PAGES.group_loops]}
     trends = read_trends(store, members, [night.name])
     for g in shared:
-        yield groups.group_page(g, trends, night.name, frozenset(night.paged))
+        yield groups.group_page(g, trends, night)
     yield from _loop_pages(store, night, nights[-PAGES.history :], shared, {**trends, **night.trends})
 
 
@@ -78,7 +77,7 @@ def _loop_pages(
     for tag in night.paged:
         own = rows[tag]
         found = explained.get(tag)
-        drawn, settings = kept_page(found.get("page") if found else None), kept_page(compared.get(tag))
+        drawn, settings = (loads(text or "") for text in (found and found.get("page"), compared.get(tag)))
         group = by_number.get(own[-1]["group"] or "")
         said = [n.said(night.zone) for n in night.notes.get(tag, ())]
         part = None if group is None else groups.member_section(group, tag, around)
@@ -94,7 +93,7 @@ def dated_pages(store: Store, name: str | None, written: Callable[[str], bool]) 
     left out of which `written` says that their page was written after their results."""
     last = name or store.require()
     nights = [n for n in store.nights() if n <= last][-PAGES.dated :]
-    sums = read_sums(store, last)
+    sums = morning.read_sums(store, last)
     for night in nights:
         if night in nights[-2:] or not written(night):
             # loops' pages are the latest night's
@@ -121,11 +120,3 @@ def nights_to_choose(nights: Sequence[str], night: str) -> tuple[tuple[str, str]
     """Nights that have a page, the latest first, with their pages; '' for the one that is shown."""
     pages = {n: f"{name_of(n)}.html" for n in nights} | {nights[-1]: LATEST[1], night: ""}
     return tuple((n, pages[n]) for n in reversed(nights)) if len(nights) > 1 else ()
-
-
-def kept_page(text: str | None) -> Page | None:
-    """A page as a night kept it; None where it kept none, or one of another version."""
-    try:
-        return loads(text) if text else None
-    except PageFileError:
-        return None

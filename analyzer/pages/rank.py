@@ -1,4 +1,4 @@
-"""`triage rank`: the loops of a night in the order of the morning, or its groups, as text; reads what is shown."""
+"""`triage rank`: the loops of a night in the order of the morning, as text; reads what is shown."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from collections.abc import Mapping, Sequence
 from shutil import get_terminal_size
 from typing import Any
 
-from analyzer.columns import BELIEVED, BY_NAME, GROUP_LIST, LISTED, NOTED, RANKING, names
+from analyzer.columns import BELIEVED, BY_NAME, LISTED, NOTED, RANKING, names
 from analyzer.lanes.lanes import FIGURE, lanes_in
 from analyzer.loop.cost import LOSS, MARK, OF_RECORDED, SIGNIFICANCE, compares, cost_column, mark
-from analyzer.loop.decisions import CAUSES, Cause, Due, Lane
-from analyzer.pages.words import Row, duration, keys, number, page_columns
+from analyzer.loop.decisions import Cause, Due, Lane
+from analyzer.pages.words import SHARES, Row, cell, keys, marked_cell, number
 from analyzer.store import notes
 from analyzer.store.store import Store
-from analyzer.words.reason import in_short
 from analyzer.words.units import gain_unit
 from identification.errors import InputError
 from reports.markdown import escaped, rows_of_table
@@ -44,11 +43,8 @@ CAUSE_STYLES: Mapping[str, str] = {
     Cause.UNDECIDED: "magenta",
 }
 """Colours of causes on the terminal."""
-SHARES = tuple(f"osc_{cause}_pct" for cause in CAUSES)
 SHOWN = keys("list")
 """Columns for people, in their order; new settings stand in the cells of the old ones."""
-WHOLE = frozenset({"oscillating_pct", *SHARES})
-"""Shares that are shown without decimals."""
 WITH_UNITS = frozenset({"period_s", "kp", "ti"})
 """Numbers that are shown with their units, and so as texts."""
 LEAST_REASON = 44
@@ -145,7 +141,7 @@ def _rows_of_area(rows: list[dict[str, Any]], area: str | None) -> list[dict[str
 def rendered(rows: Sequence[Row], form: str, night: str, wide: bool = False, lane: Lane | None = None) -> str:
     """Loops as text in one of the formats; a `wide` table keeps all its columns, one of a lane shows its figure."""
     if form == "csv":
-        return _csv(rows, LIST_COLUMNS)
+        return csv_text(LIST_COLUMNS, ([r[c] for c in LIST_COLUMNS] for r in rows)).rstrip("\n")
     if form == "json":
         return json.dumps([{c: r[c] for c in LIST_COLUMNS} for r in rows], indent=1)
     if not rows:
@@ -161,10 +157,6 @@ def rendered(rows: Sequence[Row], form: str, night: str, wide: bool = False, lan
     return f"{text}\n\n{sign} {OF_RECORDED}" if marked else text
 
 
-def _csv(rows: Sequence[Row], columns: Sequence[str]) -> str:
-    return csv_text(columns, ([row[c] for c in columns] for row in rows)).rstrip("\n")
-
-
 def as_table(
     rows: Sequence[Row], night: str, width: int | None = None, columns: Sequence[str] | None = None
 ) -> str:
@@ -178,13 +170,10 @@ def as_table(
     ]
     head, body = table(headings, [[cells[name] for name in kept] for cells in shown], width)
     rule = " " + "\u2500" * (max(map(len, (head, *(line for lines in body for line in lines)))) - 1)
-    coloured = interactive() and not os.environ.get("NO_COLOR")
-    lines = [
-        _coloured(line, row["loop"], row["cause"]) if coloured and not k else line
-        for row, lines in zip(rows, body, strict=True)
-        for k, line in enumerate(lines)
-    ]
-    return "\n".join([f"Night {night}", "", head, rule, *lines])
+    if interactive() and not os.environ.get("NO_COLOR"):
+        for row, lines in zip(rows, body, strict=True):
+            lines[0] = _coloured(lines[0], row["loop"], row["cause"])
+    return "\n".join([f"Night {night}", "", head, rule, *(line for lines in body for line in lines)])
 
 
 def _coloured(line: str, loop: str, cause: str | None) -> str:
@@ -208,16 +197,11 @@ def brief(row: Row, columns: Sequence[str]) -> dict[str, str]:
     gain = gain_unit(row.get("gain_unit"), row.get("pv_unit"), row.get("op_unit"))
     noted = f" [note: {row['note']}]" if row.get("note") else ""
     special = {
-        "period_s": duration(row["period_s"]),
         "kp": _setting_text(row["kp"], row["kp_new"], gain),
         "ti": _setting_text(row["ti"], row["ti_new"], row.get("ti_unit") or "s", "none"),
-        "reason": in_short(row["reason"] or "")[0] + noted,
+        "reason": cell(row, "reason").text + noted,
     }
-    for name in (n for n in columns if not special.get(n)):
-        value = row[name]
-        whole = name in WHOLE and value is not None
-        special[name] = value if isinstance(value, str) else f"{value:.0f}" if whole else number(value)
-    return {name: visible(special[name] + mark(row, name)) for name in columns}
+    return {name: visible(special.get(name) or marked_cell(row, name).text) for name in columns}
 
 
 def _fitting(shown: Sequence[Mapping[str, str]], width: int) -> tuple[str, ...]:
@@ -240,47 +224,6 @@ def _setting_text(now: float | None, new: float | None, unit: str, off: str = "0
     if new is not None:
         return f"{present} -> {number(new)} {unit}"
     return f"{present} {unit}" if now else off
-
-
-def rendered_groups(rows: Sequence[Row], form: str, night: str) -> str:
-    """Groups (analyzer.pages.groups.group_row) as text in one of the formats."""
-    if form == "csv":
-        return _csv(rows, names(GROUP_LIST))
-    if form == "json":
-        lists = ("candidates", "members")
-        held = [{k: json.loads(v) if k in lists else v for k, v in r.items()} for r in rows]
-        return json.dumps(held, indent=1)
-    if form == "table":
-        return _group_table(rows, night)
-    heads = [column.title for column in page_columns("list-of-groups")]
-    return "\n".join(rows_of_table(heads, [map(escaped, _group_cells(r)) for r in rows]))
-
-
-def _group_cells(row: Row) -> tuple[str, ...]:
-    start = ", ".join(f"{loop} {pct:.0f} %" for loop, pct in json.loads(row["candidates"]).items())
-    members = ", ".join(m for m in json.loads(row["members"]) if m != row["fix_first"])
-    head = row["group"], f"{row['loops']:.0f}", duration(row["group_period_s"]), start or "unseen"
-    tail = row["source_action"] or "undecided", number(row["others_gain_pct"]), members
-    return tuple(map(visible, (*head, *tail)))
-
-
-def _group_table(rows: Sequence[Row], night: str) -> str:
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    if not rows:
-        return f"Night {night}: no loops share an oscillation"
-    drawn = Table(box=SIMPLE_HEAD, title=f"Night {night}: one cause, several loops", title_justify="left")
-    for column in page_columns("list-of-groups"):
-        drawn.add_column(column.title, justify="right" if column.numeric else "left")
-    for row in rows:
-        drawn.add_row(*(Text(cell) for cell in _group_cells(row)))
-    console = Console(width=None if interactive() else PIPED)
-    with console.capture() as capture:
-        console.print(drawn)
-    return "\n".join(line.rstrip() for line in capture.get().rstrip().splitlines())
 
 
 def interactive() -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -17,16 +17,15 @@ from analyzer.lanes.lanes import FIGURE
 from analyzer.limits import PAGES
 from analyzer.loop.decisions import Cause, Status, counts
 from analyzer.pages.rank import worst_first
-from analyzer.pages.words import keys
+from analyzer.pages.words import Told, cells, keys, page_table
 from analyzer.store import notes
 from analyzer.store.notes import Note, is_hidden, last
 from analyzer.store.store import Store
 from analyzer.store.table import TREND, read_stored
 from analyzer.words.units import Row, row_settings
-from reports.pages import Cell
+from reports.pages import Cell, Table
 from reports.texts import slug
 
-SIGNALS = ("sp", "pv", "op")
 BESIDE = "side-by-side"
 """Name of the page on which loops are laid beside each other; the address after # names them."""
 AROUND_D = 2
@@ -70,14 +69,6 @@ def nights_within(store: Store, span: Span) -> list[str]:
     return [n for n in store.nights() if first <= n <= last]
 
 
-def _tables(
-    store: Store, table: str, loops: Collection[str], nights: Sequence[str], columns: Sequence[str] | None
-) -> list[pa.Table]:
-    """The rows of some loops in a table of each night that has one."""
-    paths = [store.file(table, night) for night in nights] if loops else []
-    return [read_stored(p, columns, [("loop", "in", sorted(loops))]) for p in paths if p.exists()]
-
-
 def read_nights(
     store: Store, nights: Sequence[str], columns: Sequence[str], loops: Collection[str] | None = None
 ) -> list[dict[str, Any]]:
@@ -94,45 +85,53 @@ def by_loop(rows: Sequence[Row]) -> dict[str, list[Row]]:
     return dict(out)
 
 
+def _figures(
+    store: Store,
+    table: str,
+    loops: Collection[str],
+    nights: Sequence[str],
+    columns: Sequence[str] | None = None,
+) -> dict[str, dict[str, Floats]]:
+    """Columns of numbers by loop, in the order of the nights that have the table, NaN where not known."""
+    paths = [store.file(table, night) for night in nights] if loops else []
+    tables = [read_stored(p, columns, [("loop", "in", sorted(loops))]) for p in paths if p.exists()]
+    if not tables:
+        return {}
+    names = dict.fromkeys(n for t in tables for n in t.column_names if n not in ("loop", "night"))
+    kinds = {"loop": pa.string(), "night": pa.string(), **dict.fromkeys(names, pa.float64())}
+    alike = [t.cast(pa.schema([(n, kinds[n]) for n in t.column_names])) for t in tables]
+    joined = pa.concat_tables(alike, promote_options="default")
+    held = {n: joined.column(n).to_numpy(zero_copy_only=False) for n in ("loop", *names)}
+    tags = held.pop("loop")
+    return {str(tag): {n: x[tags == tag] for n, x in held.items()} for tag in dict.fromkeys(tags)}
+
+
 def read_hours(store: Store, loops: Collection[str], nights: Sequence[str]) -> dict[str, dict[str, Floats]]:
     """Hourly figures by loop, in order of time, NaN where not known; of an hour that stands twice the fuller
     one."""
-    tables = _tables(store, "hours", loops, nights, None)
-    if not tables:
-        return {}
-    joined = pa.concat_tables(tables, promote_options="default")
-    joined = joined.sort_by([("loop", "ascending"), ("hour_s", "ascending"), ("usable_h", "ascending")])
-    tags = joined.column("loop").to_numpy(zero_copy_only=False)
-    names = [c for c in joined.column_names if c not in ("loop", "night")]
-    arrays = {c: joined.column(c).to_numpy(zero_copy_only=False).astype(float) for c in names}
-    last = np.append((tags[1:] != tags[:-1]) | (np.diff(arrays["hour_s"]) != 0), True)
-    return {str(tag): {c: v[last & (tags == tag)] for c, v in arrays.items()} for tag in dict.fromkeys(tags)}
+    out = {}
+    for tag, held in _figures(store, "hours", loops, nights).items():
+        order = np.lexsort((held["usable_h"], held["hour_s"]))
+        last = order[np.append(np.diff(held["hour_s"][order]) != 0, True)]
+        out[tag] = {name: x[last] for name, x in held.items()}
+    return out
 
 
 def read_trends(store: Store, loops: Collection[str], nights: Sequence[str]) -> dict[str, Thinned]:
     """Thinned trends by loop, in order of time; a bucket of a gap stands where nothing was recorded."""
-    tables = _tables(store, "trends", loops, nights, ("loop", *TREND))
-    kinds = pa.schema([("loop", pa.string()), *((name, pa.float64()) for name in TREND)])
-    tables = [t.select(kinds.names).cast(kinds) for t in tables]
-    if not tables:
-        return {}
-    joined = pa.concat_tables(tables)
-    tags = joined.column("loop").to_numpy(zero_copy_only=False)
-    return {str(tag): _thinned_from(joined.filter(pa.array(tags == tag))) for tag in dict.fromkeys(tags)}
+    found = _figures(store, "trends", loops, nights, ("loop", *TREND))
+    return {tag: _thinned_from(held) for tag, held in found.items()}
 
 
-def _thinned_from(table: pa.Table) -> Thinned:
-    held = {c: table.column(c).to_numpy(zero_copy_only=False).astype(float) for c in TREND}
-    _, order = np.unique(held["time_s"], return_index=True)
-    held = {c: v[order] for c, v in held.items()}
-    time_s = held["time_s"]
+def _thinned_from(held: Mapping[str, Floats]) -> Thinned:
+    time_s, order = np.unique(held["time_s"], return_index=True)
     step = np.diff(time_s)
     jumps = np.flatnonzero(step > 3 * np.median(step)) + 1 if step.size else np.array([], int)
-    names = [f"{s}_{end}" for s in SIGNALS for end in ("min", "max")]
+    extremes = {name: held[name][order] for name in TREND if name not in ("time_s", "bad")}
     return Thinned(
         np.insert(time_s, jumps, time_s[jumps - 1] + 1.0),
-        {name: np.insert(held[name], jumps, held[name][jumps - 1]) for name in names},
-        np.insert(held["bad"] > 0.5, jumps, True),
+        {name: np.insert(x, jumps, x[jumps - 1]) for name, x in extremes.items()},
+        np.insert(held["bad"][order] > 0.5, jumps, True),
     )
 
 
@@ -173,6 +172,23 @@ class ShownNight:
         """The newest note of a loop, '' where there is none."""
         found = last(self.notes, loop)
         return "" if found is None else found.said(self.zone)
+
+    def link(self, loop: str) -> Cell:
+        """The loop's name, leading to its page where there is one."""
+        return Cell(loop, kind="strong", href=f"{slug(loop)}.html" if loop in self.paged else "")
+
+    def table(
+        self,
+        declared: str,
+        rows: Iterable[Row],
+        own: Callable[[Row], Mapping[str, Told]] = lambda row: {},
+        **stated: Any,
+    ) -> Table:
+        """A table of loops, as tables.toml declares it but for what is `stated`: each row's own cells, a link to the
+        loop's page, else what the store holds."""
+        shown = stated.get("columns", declared)
+        told = (cells(row, shown, **{"loop": self.link(row["loop"]), **own(row)}) for row in rows)
+        return page_table(declared, told, **stated)
 
 
 def oscillates(row: Row | None) -> bool:
@@ -218,11 +234,6 @@ def read_night(store: Store, name: str | None, top: int, drawn: bool = True) -> 
     return ShownNight(
         night, tuple(rows), remembered, earlier[-1] if earlier else "", worst, trends, known, paged
     )
-
-
-def link_to(night: ShownNight, loop: str) -> Cell:
-    """The loop's name, leading to its page where there is one."""
-    return Cell(loop, kind="strong", href=f"{slug(loop)}.html" if loop in night.paged else "")
 
 
 def action_text(row: Row, action: str = "") -> str:

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 from analyzer.lanes.lanes import FIGURE, lanes_in
 from analyzer.limits import PAGES
-from analyzer.loop.cost import cost, cost_column
+from analyzer.loop.cost import SIGNIFICANCE, cost, cost_column
 from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole, Lane, Status
 from analyzer.pages import words
-from analyzer.pages.maintenance import work_order
-from analyzer.pages.reading import ShownNight, action_text, link_to, needs_a_look, oscillates, read_night
+from analyzer.pages.reading import ShownNight, action_text, needs_a_look, oscillates, read_night
+from analyzer.pages.work import work_order
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from analyzer.words.units import changed_settings
@@ -86,26 +86,26 @@ def _of_group(source: words.Row, others: Sequence[str]) -> str:
     return f"Look at {name} first: {moved}."
 
 
-def _news(night: ShownNight) -> list[tuple[words.Row, str, str]]:
+def _news(night: ShownNight) -> list[words.Row]:
     """Loops of which there is something new since the night before: what it is, and its colour."""
-    found = []
+    found: list[words.Row] = []
     for row in night.rows:
         earlier = night.earlier.get(row["loop"])
-        if earlier:
-            new = (row["news"], row["news_tone"]) if row["news"] else _lane_news([*earlier, row])
-            found += [(row, *new)] if new else []
+        news = _lane_news([*earlier, row]) if earlier and not row["news"] else {}
+        if earlier and (row["news"] or news):
+            found.append({**row, **news})
     return found
 
 
-def _lane_news(nights: Sequence[words.Row]) -> tuple[str, str] | None:
+def _lane_news(nights: Sequence[words.Row]) -> words.Row:
     """Lanes beside oscillation that a loop came into or left, of those whose figures both nights know."""
     old, row = nights[-2:]
     known = [x for x in Lane if x is not Lane.OSCILLATION and None not in (old[FIGURE[x]], row[FIGURE[x]])]
     states = {x: _inside(nights, x)[-2:] for x in known}
     came, left = ([x for x in known if states[x] == change] for change in ([False, True], [True, False]))
     if came:
-        return f"new: {', '.join(came)}", "worse"
-    return (f"no more: {', '.join(left)}", "better") if left else None
+        return {"news": f"new: {', '.join(came)}", "news_tone": "worse"}
+    return {"news": f"no more: {', '.join(left)}", "news_tone": "better"} if left else {}
 
 
 def _inside(nights: Sequence[words.Row], lane: Lane) -> list[bool]:
@@ -123,23 +123,20 @@ def _inside(nights: Sequence[words.Row], lane: Lane) -> list[bool]:
 def news_lines(night: ShownNight) -> list[str]:
     """What is new since the night before, a line a loop, what got worse first."""
     order = {"worse": 0, "unclear": 1, "better": 2}
-    told = sorted((order[tone], row["loop"], text) for row, text, tone in _news(night))
+    told = sorted((order[row["news_tone"]], row["loop"], row["news"]) for row in _news(night))
     return [f"{loop} {text}" for _, loop, text in told]
 
 
 def news_table(night: ShownNight, tones: Sequence[str], name: str, title: str) -> Table:
     """Loops of which there is something new, of the colours asked for."""
-    rows = [
-        (
-            link_to(night, row["loop"]),
-            Cell(text, kind=tone),
-            *(words.cell(r, "oscillation_significance") for r in (night.earlier[row["loop"]][-1], row)),
-            Cell(action_text(row)),
-        )
-        for row, text, tone in _news(night)
-        if tone in tones
-    ]
-    return words.page_table("news", rows, name=name, title=f"{title} ({len(rows)})")
+
+    def own(row: words.Row) -> dict[str, words.Told]:
+        before, now = (words.cell(r, SIGNIFICANCE) for r in (night.earlier[row["loop"]][-1], row))
+        news = Cell(row["news"], kind=row["news_tone"])
+        return {"news": news, "before": before, "now": now, "action": Cell(action_text(row))}
+
+    rows = [row for row in _news(night) if row["news_tone"] in tones]
+    return night.table("news", rows, own, name=name, title=f"{title} ({len(rows)})")
 
 
 def since(night: ShownNight) -> Section:
@@ -192,12 +189,11 @@ def summary_page(store: Store, name: str | None = None) -> Page:
 
 def _worst(night: ShownNight, left: int) -> Table:
     """The worst loops with what to do, and how many are left out; their notes where there are any."""
-    noted = [(r, night.note(r["loop"])) for r in night.worst]
-    shown = words.page_columns("summary")[: 4 if any(note for _, note in noted) else 3]
-    rows = (
-        words.cells(r, shown, loop=Cell(r["loop"], kind="strong"), do=Cell(_do(r)), note=Cell(note))
-        for r, note in noted
-    )
-    return words.page_table(
-        "summary", rows, columns=shown, note=f"{left} more in the list." if left > 0 else ""
-    )
+
+    def own(row: words.Row) -> dict[str, words.Told]:
+        return {"loop": Cell(row["loop"], kind="strong"), "do": _do(row), "note": night.note(row["loop"])}
+
+    noted = any(night.note(r["loop"]) for r in night.worst)
+    shown = words.page_columns("summary")[: 4 if noted else 3]
+    more = f"{left} more in the list." if left > 0 else ""
+    return night.table("summary", night.worst, own, columns=shown, note=more)

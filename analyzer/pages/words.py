@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any
 
 from analyzer.columns import BY_NAME, GROUPS
+from analyzer.columns import Column as Declared
 from analyzer.history.plant_clock import stamp
 from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES
@@ -18,10 +19,15 @@ from reports.pages import Cell, Column, Facts, Floats, Listing, Table, Text
 
 __all__ = ["Row", "duration", "number", "stamp"]  # of the words that are not chosen here
 
+Told = Cell | str | float | None
+"""What a table tells in a cell: a text or a number stands for a cell of it alone."""
 ROOM = "analyzer.pages"
 """Where the tables and texts of pages stand."""
 ALL_LOOPS = ("All loops", "index.html")
 """The link from a page to the morning page."""
+SHARES = tuple(f"osc_{cause}_pct" for cause in CAUSES)
+WHOLE = frozenset({"oscillating_pct", *SHARES})
+"""Shares that lists show without decimals."""
 OF_GROUPS = {c.name: c for c in GROUPS if c.name not in BY_NAME}
 """Columns of the table of groups alone; in a heading their unit stands too."""
 
@@ -50,9 +56,13 @@ def texts(subject: str) -> dict[str, Any]:
     return found
 
 
+def _declared(name: str) -> Declared:
+    return BY_NAME.get(name) or OF_GROUPS[name]
+
+
 def heading(name: str, **more: bool) -> Column:
     """A column of the store as one of a page."""
-    declared = BY_NAME.get(name) or OF_GROUPS[name]
+    declared = _declared(name)
     unit = f" [{declared.unit}]" if name in OF_GROUPS and declared.unit else ""
     return Column(name, declared.heading + unit, declared.is_number, declared.hint, **more)
 
@@ -60,14 +70,11 @@ def heading(name: str, **more: bool) -> Column:
 @cache
 def page_columns(table: str) -> tuple[Column, ...]:
     """The columns of a table of a page, as tables.toml declares them."""
-    return tuple(map(_column, toml_of(ROOM, "tables.toml")[table]["columns"]))
-
-
-def _column(stated: str | dict[str, Any]) -> Column:
-    if isinstance(stated, dict):
-        return Column(**stated)
-    name, *more = stated.split()
-    return heading(name, **dict.fromkeys(more, True))
+    stated = toml_of(ROOM, "tables.toml")[table]["columns"]
+    parted = (c if isinstance(c, dict) else c.split() for c in stated)
+    return tuple(
+        Column(**c) if isinstance(c, dict) else heading(c[0], **dict.fromkeys(c[1:], True)) for c in parted
+    )
 
 
 def keys(*tables: str) -> tuple[str, ...]:
@@ -75,13 +82,19 @@ def keys(*tables: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(c.key for table in tables for c in page_columns(table)))
 
 
-def page_table(declared: str, rows: Iterable[tuple[Cell, ...]], **own: Any) -> Table:
+def page_table(declared: str, rows: Iterable[Iterable[Told]], **own: Any) -> Table:
     """A table of a page with its rows: as tables.toml declares it, but for what is its `own`."""
     stated = {
         k: tuple(v) if isinstance(v, list) else v for k, v in toml_of(ROOM, "tables.toml")[declared].items()
     }
-    whole = {"name": declared, "title": "", **stated, "columns": page_columns(declared), "rows": tuple(rows)}
-    return Table(**whole | own)
+    told = tuple(tuple(map(_as_cell, row)) for row in rows)
+    return Table(
+        **{"name": declared, "title": "", **stated, "columns": page_columns(declared), "rows": told} | own
+    )
+
+
+def _as_cell(told: Told) -> Cell:
+    return told if isinstance(told, Cell) else Cell(told) if isinstance(told, str) else plain_cell(told)
 
 
 def lead(*clauses: str) -> Text:
@@ -115,22 +128,22 @@ def cell(row: Row, name: str) -> Cell:
     value = row[name]
     if name == "reason":
         return Cell(in_short(value or "")[0])
-    if not BY_NAME[name].is_number:
+    if not _declared(name).is_number:
         return Cell(value or "")
     return Cell(duration(value) if name == "period_s" else number(value), value)
 
 
-def cells(row: Row, columns: str | Iterable[Column], **own: Cell) -> tuple[Cell, ...]:
-    """A row of a table by the keys of its columns: cells of its own, else what the store holds."""
+def cells(row: Row, columns: str | Iterable[Column], **own: Told) -> tuple[Told, ...]:
+    """A row of a table by the keys of its columns: what is its `own`, else what the store holds."""
     shown = page_columns(columns) if isinstance(columns, str) else columns
     return tuple(own[c.key] if c.key in own else cell(row, c.key) for c in shown)
 
 
-def marked_cell(row: Row, name: str, digits: str = "") -> Cell:
-    """A figure, marked where it compares with no other loop's."""
-    value = row[name]
-    text = number(value) if not digits or value is None else f"{value:{digits}}"
-    return Cell(text + mark(row, name), value)
+def marked_cell(row: Row, name: str) -> Cell:
+    """A figure in a list of loops: shares without decimals, marked where it compares with no other loop's."""
+    shown = cell(row, name)
+    text = f"{shown.number:.0f}" if name in WHOLE and shown.number is not None else shown.text
+    return Cell(text + mark(row, name), shown.number)
 
 
 def cause_cell(cause: str | None) -> Cell:

@@ -1,4 +1,5 @@
-"""The work list: what people have noted of loops, how far it has come, and what the nights since say of it."""
+"""What is to be done: a loop's order in three lines, the hand-over sheet for maintenance, and the work list, which
+says how far what people noted has come and what the nights since say of it."""
 
 from __future__ import annotations
 
@@ -8,15 +9,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from analyzer.history.plant_clock import stamp
+from analyzer.lanes.lanes import lanes_in
 from analyzer.limits import PAGES
-from analyzer.loop.decisions import Status
-from analyzer.pages.reading import ShownNight, by_loop, link_to, oscillates, read_nights
-from analyzer.pages.words import ALL_LOOPS, Row, cause_cell, cells, page_table, with_noun
+from analyzer.loop.decisions import Action, Cause, Fault, Lane, Status
+from analyzer.pages.reading import ShownNight, by_loop, oscillates, read_nights
+from analyzer.pages.words import ALL_LOOPS, Row, Told, cause_cell, duration, texts, with_noun
 from analyzer.store.notes import FINISHED, Work, work_on
 from analyzer.store.store import Store
-from reports.pages import Cell, Page, Section, Text, Tiles, section, there
+from analyzer.words.belief import wear_text
+from analyzer.words.units import changed_settings
+from reports.pages import Cell, Page, Section, Table, Text, Tiles, section, there
 
-NAME = "work"
+MAINTENANCE, WORK = "maintenance", "work"
+"""Names of the two pages."""
 FIGURES = {
     "average_absolute_error_pct": "average absolute error",
     "valve_travel_pct_per_h": "valve travel",
@@ -24,6 +29,107 @@ FIGURES = {
 }
 """What is won, and how it is called."""
 READ = ("loop", "status", "oscillating_pct", *FIGURES)
+
+
+def _fault_width(row: Row) -> float | None:
+    """Stickband or play [% of OP]; None where there is none."""
+    return row["stickband_pct"] or row["backlash_pct"] or None
+
+
+def _stroke(row: Row) -> tuple[str, str]:
+    """Steps of the stroke test of a valve at fault [%], and what it does in them; '' where it does not answer."""
+    width, kind = _fault_width(row) or 0.0, texts("by_hand").get(row["valve_fault"], "")
+    return f"{width / PAGES.stroke_steps:.2g}", kind.format(width=width) if width else ""
+
+
+def valve_test(row: Row) -> str:
+    """The stroke test of a valve at fault in a few words; its order says how it is done."""
+    step, answer = _stroke(row)
+    return f"steps of {step} %: {answer}" if answer else "steps of 5 %: PV, or the stem, does not answer"
+
+
+def _case(row: Row) -> str:
+    """The order that a row asks for."""
+    action = Action(row["action"])
+    if action is Action.REPAIR_VALVE and not _stroke(row)[1]:
+        return "dead valve"
+    if action is Action.NONE and row["cause"] == Cause.LOAD:
+        return "moved from outside"
+    if action is Action.UNDECIDED and row["cause"] == Cause.NONE:
+        return next((str(x) for x in (Lane.AT_LIMIT, Lane.WINDUP) if x in lanes_in(row)), action)
+    return action
+
+
+def _expected(row: Row) -> str:
+    """What new settings make of the cycle."""
+    if None not in (row["expected_period_s"], row["expected_pv_amplitude_pct"]):
+        swing = f"{row['expected_pv_amplitude_pct']:.2g} % of span"
+        return f"a cycle of {duration(row['expected_period_s'])} and {swing}: the valve stays as it is"
+    if row["cause"] == Cause.VALVE:
+        return "the cycle comes to rest, by simulation, though the valve stays as it is"
+    return "the swing dies away within a few periods"
+
+
+def work_order(row: Row) -> tuple[tuple[str, str], ...]:
+    """Lead and text of three lines, '' where there is nothing to say; none for a night that advised nothing."""
+    if not row["action"]:
+        return ()
+    said = {name: row.get(name) or "" for name in ("loop", "advice", "reason")}
+    said |= {
+        "form": row.get("form") or "ideal",
+        "source": row.get("source_loop") or "the loop that it follows",
+    }
+    said |= {"lack": f": {row['lack']}" if row.get("lack") else "", "period": duration(row.get("period_s"))}
+    if row["action"] == Action.REPAIR_VALVE:
+        said |= dict(zip(("step", "answer"), _stroke(row), strict=True))
+    if row["action"] == Action.RETUNE:
+        said |= {"settings": changed_settings(row), "expected": _expected(row)}
+    order = {part: text.format(**said) for part, text in texts("orders")[_case(row)].items()}
+    look = order["look"] or order.get("else", "")
+    return ("Do", order["do"]), ("Look for", look), ("Then", order["after"])
+
+
+def wearing(night: ShownNight) -> Table:
+    """Valves whose width grows, the fastest first: for the next shutdown."""
+    rows = [r for r in night.rows if r["wear_pct_per_month"] is not None]
+    rows.sort(key=lambda r: -r["wear_pct_per_month"])
+    return night.table("wear", rows, lambda row: {"forecast": wear_text(row)})
+
+
+def faulty(night: ShownNight) -> Table:
+    """Valves at fault, by making a cycle or for all that nights say: those to be repaired first, then by width."""
+    assessed = [r for r in night.rows if r["status"] == Status.OK]
+    faults = (Fault.BACKLASH, Fault.STICTION)
+    rows = [r for r in assessed if r["cause"] == Cause.VALVE or r["valve_fault"] in faults]
+    rows.sort(key=lambda r: (r["action"] != Action.REPAIR_VALVE, -(_fault_width(r) or 0.0)))
+    return night.table("valves", rows, _of_valve)
+
+
+def _of_valve(row: Row) -> dict[str, Told]:
+    """What the store does not hold of a valve, and place for what is found."""
+    fault = "" if row["valve_fault"] in (None, Fault.NONE) else row["valve_fault"]
+    width = row["stickband_pct"] or row["backlash_pct"]
+    return {"valve_fault": Cell(fault, kind="valve"), "width": width, "test": valve_test(row), "found": ""}
+
+
+def worn(night: ShownNight) -> Table:
+    """The valves that travel most."""
+    rows = [r for r in night.rows if r["valve_travel_pct_per_h"] is not None]
+    rows.sort(key=lambda r: -r["valve_travel_pct_per_h"])
+    return night.table("travel", rows[: PAGES.travelled])
+
+
+def maintenance_page(night: ShownNight) -> Page:
+    """The sheet of a night."""
+    first, growing = faulty(night), wearing(night)
+    sections = there(
+        Section(f"Valves at fault ({len(first.rows)})", (first,)),
+        section(f"Valves that wear ({len(growing.rows)})", growing if growing.rows else None),
+        Section("Valves that travel most", (worn(night),)),
+    )
+    valves = with_noun(len(first.rows), "valve")
+    subtitle = f"{valves} at fault in the night of {night.name}, for the valve shop."
+    return Page(MAINTENANCE, "Hand-over to maintenance", subtitle, sections, (ALL_LOOPS,))
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,28 +172,11 @@ def _change(before: float, since: float) -> str:
     return f"{100.0 * (since / before - 1.0):+.0f} %".replace("-", "\u2212")
 
 
-def _of_work(night: ShownNight, row: Row, work: Work, both: Sides) -> dict[str, Cell]:
-    """What is told of a piece of work, and what the nights since say of it."""
-    late = bool(work.due) and work.due < night.name and work.state not in FINISHED
-    return {
-        "loop": link_to(night, row["loop"]),
-        "state": Cell(work.state, kind="better" if work.state in FINISHED else ""),
-        "owner": Cell(work.owner),
-        "due": Cell(work.due, kind="worse" if late else ""),
-        "note": Cell(f"{work.note.text} ({stamp(work.note.time_s, night.zone)[:10]})"),
-        "cause": cause_cell(row["cause"]),
-        "since": Cell(said_since(work, both)),
-    }
-
-
-def won(night: ShownNight, works: Mapping[str, Work], history: Mapping[str, Sequence[Row]]) -> Tiles | None:
+def won(night: ShownNight, works: Mapping[str, Work], parted: Mapping[str, Sides]) -> Tiles | None:
     """What work that was finished since the start of the month brought; None where none was."""
     month = night.name[:7]
-    done = [
-        sides(history.get(loop, ()), day)
-        for loop, w in works.items()
-        if w.state in FINISHED and (day := stamp(w.since_s, night.zone)[:10])[:7] == month
-    ]
+    finished = [loop for loop, w in works.items() if w.state in FINISHED]
+    done = [parted[loop] for loop in finished if stamp(works[loop].since_s, night.zone)[:7] == month]
     items = []
     for column, name in FIGURES.items():
         known = [m for m in (x.means(column) for x in done) if m is not None]
@@ -103,18 +192,33 @@ def work_page(store: Store, night: ShownNight) -> Page:
     works = {loop: work_on(notes) for loop, notes in night.notes.items() if notes}
     names = [n for n in store.nights() if n <= night.name][-PAGES.work_nights :]
     history = by_loop(read_nights(store, names, READ, works))
-    rows = {r["loop"]: r for r in night.rows if r["loop"] in works}
-    told = []  # what is not finished first, by its date; then what was reached last
-    order = {k: (w.state in FINISHED, w.due or "9999", -w.since_s, k) for k, w in works.items()}
-    for k in sorted(rows, key=lambda loop: order[loop]):
-        both = sides(history.get(k, ()), stamp(works[k].since_s, night.zone)[:10])
-        told.append(cells(rows[k], "work", **_of_work(night, rows[k], works[k], both)))
+    parted = {k: sides(history.get(k, ()), stamp(w.since_s, night.zone)[:10]) for k, w in works.items()}
+
+    def own(row: Row) -> dict[str, Told]:
+        """What is told of a piece of work, and what the nights since say of it."""
+        work, finished = works[row["loop"]], works[row["loop"]].state in FINISHED
+        late = bool(work.due) and work.due < night.name and not finished
+        return {
+            "state": Cell(work.state, kind="better" if finished else ""),
+            "owner": work.owner,
+            "due": Cell(work.due, kind="worse" if late else ""),
+            "note": f"{work.note.text} ({stamp(work.note.time_s, night.zone)[:10]})",
+            "cause": cause_cell(row["cause"]),
+            "since": said_since(work, parted[row["loop"]]),
+        }
+
+    def urgency(row: Row) -> tuple[bool, str, float, str]:
+        """What is not finished first, by its date; then what was reached last."""
+        work = works[row["loop"]]
+        return work.state in FINISHED, work.due or "9999", -work.since_s, row["loop"]
+
+    rows = sorted((r for r in night.rows if r["loop"] in works), key=urgency)
     note = f"Since: nights after the day of the note, beside the {PAGES.before_work} before it."
     empty = Text(('Nothing is noted: triage note STORE LOOP "..." --state open --due DATE.',))
     sections = there(
-        section(f"Won since {night.name[:7]}-01", won(night, works, history)),
-        Section("Work", (page_table("work", told, note=note) if told else empty,)),
+        section(f"Won since {night.name[:7]}-01", won(night, works, parted)),
+        Section("Work", (night.table("work", rows, own, note=note) if rows else empty,)),
     )
-    links = (ALL_LOOPS, ("As CSV", f"csv/{NAME}-work-list.csv"))
-    waiting = with_noun(sum(works[k].state not in FINISHED for k in rows), "loop")
-    return Page(NAME, "Work list", f"{waiting} waiting after the night of {night.name}", sections, links)
+    links = (ALL_LOOPS, ("As CSV", f"csv/{WORK}-work-list.csv"))
+    waiting = with_noun(sum(works[r["loop"]].state not in FINISHED for r in rows), "loop")
+    return Page(WORK, "Work list", f"{waiting} waiting after the night of {night.name}", sections, links)

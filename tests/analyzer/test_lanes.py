@@ -12,8 +12,8 @@ from analyzer.loop.decisions import Action, Finding, Lane, Need, Needs, Remedy, 
 from analyzer.loops.spec import LoopSpec
 from analyzer.night import chunk
 from analyzer.night.nights import Night
-from analyzer.pages.maintenance import work_order
 from analyzer.pages.rank import worst_first
+from analyzer.pages.work import work_order
 from analyzer.store.rows import night_row
 from proofs.plant import CONFIG, START_S, Sketch, series, simulate, spec
 from tests.identification.signals import hand_loop

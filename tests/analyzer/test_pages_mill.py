@@ -13,7 +13,7 @@ from analyzer.history.export import ReadOptions, open_export
 from analyzer.loops.changes import read_changes
 from analyzer.loops.tags import match, read_loops
 from analyzer.pages import before_after
-from analyzer.pages.changes import ChangeCase, Spans, change_cases, detected
+from analyzer.pages.before_after import ChangeCase, change_cases, detected
 from analyzer.store.store import Store
 from reports.markdown import render
 
@@ -42,7 +42,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
 @pytest.fixture(scope="module")
 def found(store: Store) -> dict[str, ChangeCase]:
     """What became of each change."""
-    known, missing = change_cases(store, read_changes(MILL / "changes.csv"), Spans())
+    known, missing = change_cases(store, read_changes(MILL / "changes.csv"))
     assert missing == []
     return {c.found.loop: c for c in known}
 
@@ -70,7 +70,7 @@ def test_loop_3_improves_only_in_travel(found: dict[str, ChangeCase]) -> None:
 def test_untouched_loops_do_not_change(store: Store) -> None:
     """Loops that nobody touched are called neither better nor worse at the same moment."""
     moment = read_changes(MILL / "changes.csv")[0]
-    known, _ = change_cases(store, [replace(moment, loop=loop) for loop in OTHERS], Spans())
+    known, _ = change_cases(store, [replace(moment, loop=loop) for loop in OTHERS])
     calls = {c.found.loop: {x.verdict for x in c.found.primary} for c in known}
     assert len(calls) == len(OTHERS)
     assert all(v <= {ChangeVerdict.UNCLEAR, ChangeVerdict.INCOMPARABLE} for v in calls.values())

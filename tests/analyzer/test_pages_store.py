@@ -14,9 +14,9 @@ from analyzer.columns import row_of
 from analyzer.config import Config
 from analyzer.loops.changes import TuningChange
 from analyzer.pages import before_after, loop, morning, night
-from analyzer.pages.changes import Spans, change_cases, detected, wear_texts
+from analyzer.pages.before_after import change_cases, detected, wear_texts
 from analyzer.pages.loop_pictures import autocorrelation, rhythm_plots, turn_panels
-from analyzer.pages.plant import score
+from analyzer.pages.morning import score
 from analyzer.pages.reading import read_hours, read_night, read_trends
 from analyzer.pages.words import PvScale
 from analyzer.store.store import Store
@@ -60,7 +60,7 @@ def test_ranking_holds_the_nights_numbers(store: Store) -> None:
 def test_before_after_means_are_the_hours(store: Store) -> None:
     """Means before and after equal the means of the store's hours, the hours of the change left out."""
     loop = NASTY[0]
-    (case,), missing = change_cases(store, [TuningChange(loop, CHANGED_S)], Spans())
+    (case,), missing = change_cases(store, [TuningChange(loop, CHANGED_S)])
     assert missing == []
     hours = read_hours(store, [loop], store.nights())[loop]
     at, name = hours["hour_s"], "average_absolute_error_pct"
@@ -73,9 +73,7 @@ def test_before_after_means_are_the_hours(store: Store) -> None:
 
 def test_loops_that_the_store_lacks_are_named(store: Store) -> None:
     """A change of a loop that the store does not hold is named with the reason, the others are looked at."""
-    found, missing = change_cases(
-        store, [TuningChange("GONE", CHANGED_S), TuningChange(NASTY[1], CHANGED_S)], Spans()
-    )
+    found, missing = change_cases(store, [TuningChange("GONE", CHANGED_S), TuningChange(NASTY[1], CHANGED_S)])
     assert [c.found.loop for c in found] == [NASTY[1]]
     assert [m[0] for m in missing] == ["GONE"]
     assert "GONE" in render(before_after.changes_page(found, missing, ""))
@@ -164,7 +162,7 @@ def test_area_score_weighs_importance() -> None:
 
 def test_wear_is_never_invented(store: Store) -> None:
     """Valve life and cost appear only where the plant states its numbers, and follow from them."""
-    (case,), _ = change_cases(store, [TuningChange(NASTY[0], CHANGED_S)], Spans())
+    (case,), _ = change_cases(store, [TuningChange(NASTY[0], CHANGED_S)])
     assert wear_texts(case.found, {}) == ()
     assert wear_texts(case.found, {"extra": '{"valve_life_travel_pct": "nonsense"}'}) == ()
     stated = '{"valve_life_travel_pct": "8760", "cost_per_error_pct_h": "2", "cost_unit": "EUR"}'

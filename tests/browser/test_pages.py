@@ -15,7 +15,7 @@ import pytest
 
 from analyzer.loops.changes import TuningChange
 from analyzer.pages import before_after, night
-from analyzer.pages.changes import Spans, change_cases
+from analyzer.pages.before_after import change_cases
 from reports.folder import write_html
 from tests.reports.small_store import NASTY, START_S, small_store
 
@@ -39,7 +39,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("pages")
     store = small_store(out / "store", loops=40)
     changes = [TuningChange(tag, START_S + 7 * 86400.0, 1, 2, 3, 4, "<b>me</b>") for tag in NASTY[:3]]
-    found, missing = change_cases(store, changes, Spans())
+    found, missing = change_cases(store, changes)
     report = before_after.changes_page(found, missing, "seven days")
     written = [*night.pages_of_night(store, None, 8), report]
     write_html(written, out / "folder")

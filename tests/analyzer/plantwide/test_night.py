@@ -15,7 +15,9 @@ from analyzer.cli import main
 from analyzer.columns import GROUP_LIST, names
 from analyzer.lanes.lanes import lanes_in
 from analyzer.loop.decisions import counts
+from analyzer.pages import groups
 from analyzer.pages.night import pages_of_night
+from analyzer.plantwide.view import GroupView
 from analyzer.store.store import Store
 from reports.html import render
 from reports.pages import Graph, HeatMap, Trend
@@ -135,8 +137,8 @@ def test_a_second_run_of_some_loops_keeps_the_others_group(run_plant: RunPlant, 
     arguments = ["run", str(run_plant.export), "--loops", str(tmp_path / "loops.csv"), "--store", str(store)]
     assert CliRunner().invoke(main, [*arguments, "--jobs", "1"], catch_exceptions=False).exit_code == 0
     kept = Store(store)
-    groups = kept.read("groups", kept.require()).to_pylist()
-    assert [r["loop"] for r in groups] == [r["loop"] for r in rows(run_plant, "groups")]
+    found = kept.read("groups", kept.require()).to_pylist()
+    assert [r["loop"] for r in found] == [r["loop"] for r in rows(run_plant, "groups")]
 
 
 @pytest.mark.parametrize("form", ["table", "json", "csv", "markdown"])
@@ -153,3 +155,12 @@ def test_a_night_without_groups_says_so(tmp_path, form):
     assert done.exit_code == 0
     if form == "table":
         assert "no loops share an oscillation" in done.output
+
+
+def test_list_and_page_say_one_confidence():
+    """A confidence is rounded once: list and morning page say the same percentage of a source."""
+    known = {"role": "source", "group_period_s": 60.0, "source_pct": 63.46, "gain_pct": None}
+    night = {"cause": "valve", "action": "repair valve", "kp_new": None, "ti_new": None}
+    group = GroupView("1", ({**known, "loop": "A"},), {"A": night})
+    assert "A 63 %" in [cell.text for cell in groups.morning_table([group], False).rows[0]]
+    assert all("A 63 %" in groups.rendered([group], "N", form) for form in ("table", "markdown"))
