@@ -190,13 +190,14 @@ def executor(
 def _process(pipe: Connection, *given: Any) -> Any:
     """A worker's process, started: forked from a server that has imported what all need; afresh where the system has
     no such server, or no room for its socket."""
+    asked: dict[str, Any] = {"target": _serve, "args": (pipe, dict(os.environ), *given), "daemon": True}
     with contextlib.suppress(ValueError, OSError):
         forked = multiprocessing.get_context("forkserver")
         forked.set_forkserver_preload([PRELOADED])
-        process: Any = forked.Process(target=_serve, args=(pipe, *given), daemon=True)
+        process: Any = forked.Process(**asked)
         process.start()
         return process
-    process = multiprocessing.get_context("spawn").Process(target=_serve, args=(pipe, *given), daemon=True)
+    process = multiprocessing.get_context("spawn").Process(**asked)
     process.start()
     return process
 
@@ -211,8 +212,16 @@ def _cause_of_death(status: int | None, limits: WorkerLimits) -> str:
     return f"its worker process was ended by {name}{hint}"
 
 
-def _serve(pipe: Connection, function: Callable[[Any, Began], Any], limits: WorkerLimits) -> None:
-    """A worker's life: tasks in, results out, until the pipe closes."""
+def _serve(
+    pipe: Connection,
+    surroundings: dict[str, str],
+    function: Callable[[Any, Began], Any],
+    limits: WorkerLimits,
+) -> None:
+    """A worker's life: tasks in, results out, until the pipe closes; the environment variables are those of the
+    process that has started it, now, and not when the server began."""
+    os.environ.clear()
+    os.environ.update(surroundings)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # a library's warning says nothing to an engineer

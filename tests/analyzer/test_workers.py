@@ -39,6 +39,8 @@ def act(task: tuple[str, ...], began: Began) -> tuple[str, ...]:
                 np.ones(2_000_000_000)
             except MemoryError:
                 word = "no memory"
+        if word.startswith("$"):
+            word = os.environ.get(word[1:], "unset")
         if word == "wrong":
             raise ValueError("of all things")
         done.append(word)
@@ -149,6 +151,15 @@ def test_workers_end_with_their_parent(tmp_path):
             break
         time.sleep(0.05)
     assert [pid for pid in workers if alive(pid)] == []
+
+
+def test_workers_see_the_environment_as_it_is_when_they_start(monkeypatch: pytest.MonkeyPatch):
+    """A password that is set after the first workers have run is seen by the next ones, and one taken back is not."""
+    carried_out(("a",))
+    monkeypatch.setenv("TRIAGE_SECRET", "now")
+    assert carried_out(("$TRIAGE_SECRET",)) == [("now",)]
+    monkeypatch.delenv("TRIAGE_SECRET")
+    assert carried_out(("$TRIAGE_SECRET",)) == [("unset",)]
 
 
 @posix
