@@ -99,6 +99,14 @@ class ReferenceLimits(Limits, section="reference"):
     """What the most flexible model may go with, that has no name for it."""
 
 
+class FrictionLimits(Limits, section="friction"):
+    """Where stems that stick are sought for an explanation, and how long one holds its place."""
+
+
+class StartLimits(Limits, section="starts"):
+    """Where effects begin that are found by what the plain loop leaves."""
+
+
 class SignalLimits(Limits, section="signals"):
     """How spectra, cycles and correlations are read, and what of noise is an outlier."""
 
@@ -117,4 +125,5 @@ LIMITS = ExplainLimits()
 """The limits where none are given."""
 FIT, SLIPS, STEM, INTERVALS = FitLimits(), SlipLimits(), StemLimits(), IntervalLimits()
 LAW, LOCATION, REFERENCE, SIGNALS = LawLimits(), LocationLimits(), ReferenceLimits(), SignalLimits()
+FRICTION, STARTS = FrictionLimits(), StartLimits()
 """Numbers of a method, the same for every plant: no plant has reasons of its own to change them."""

@@ -21,16 +21,8 @@ from identification.models import Pid
 from identification.record import Floats, LoopRecord, Mask
 from identification.simulation.lag import first_order
 
-PV_FILTERS = (0.0, 1.0, 2.0, 3.0, 5.0, 8.0, 13.0, 21.0)
-"""Filters of the controller's PV that are tried [samples]; ours: none is far from one of them."""
-SLOPE_FILTERS = (0.0, 2.0, 8.0)
-"""Filters of the slope that are tried [samples]; ours."""
-MORE_SLOPE_FILTERS = (0.35, 0.7, 1.2, 4.0)
-"""Those that are tried as well where a derivative is stated [samples]; ours."""
 ON_ERROR = ((1.0, 1.0), (1.0, 0.0), (0.0, 0.0))
 """What gain and derivative take of the set point's moves: the usual three [-]."""
-LONGER = 4
-"""Factor between lengths of increments; ours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,12 +192,12 @@ class _Seen:
 
 def _ways(record: LoopRecord, longest_s: float, stated: Pid) -> Iterator[_Seen]:
     """The record as the usual ways of the law see it, the plainest first; longest_s : filter of PV [s]."""
-    slope_filters = SLOPE_FILTERS + (MORE_SLOPE_FILTERS if stated.td_s > 0 else ())
+    slope_filters = LAW.slope_filters + (LAW.more_slope_filters if stated.td_s > 0 else ())
     out_of_law, n = _out_of_law(record) | clamped(record.op), len(record)
-    reach = min(n / 20, max(LAW.reach * stated.ti_s / record.dt_s, LONGER))
-    lengths = [LONGER**k for k in range(12) if LONGER**k <= reach]
+    reach = min(n / 20, max(LAW.reach * stated.ti_s / record.dt_s, LAW.longer))
+    lengths = [LAW.longer**k for k in range(12) if LAW.longer**k <= reach]
     on_error = ON_ERROR if float(np.ptp(record.sp)) > 0 and not record.sp_estimated else ON_ERROR[:1]
-    filters = [f for f in PV_FILTERS if f == 0.0 or f * record.dt_s <= longest_s]
+    filters = [f for f in LAW.pv_filters if f == 0.0 or f * record.dt_s <= longest_s]
     for smooth, late in product(filters, (0, 1)):
         pv = first_order(record.pv, smooth)
         pv = np.concatenate((pv[:1], pv[:-1])) if late else pv

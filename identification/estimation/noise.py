@@ -16,9 +16,8 @@ from identification.limits import FIT
 from identification.record import Floats, Mask
 
 Edges = NDArray[np.int64]
-EDGES = np.array([0, 1, 2, 3, 4, 5, 6, 8, 10, 13, 17, 22, 29, 38, 50, 66, 88, 117], dtype=np.int64)
-"""Lags between consecutive edges act together, by their mean; ours: single lags where noise is, a third of an
-octave where load is, reaching as far as a loop of 100 samples' time constant needs."""
+EDGES = np.array(FIT.lag_edges, dtype=np.int64)
+"""Of a wide noise model: lags between consecutive edges act together, by their mean."""
 NO_NOISE = np.zeros(1, dtype=np.int64)
 """Edges of no lags at all: innovations are the errors of the simulation themselves."""
 TILE = 1024

@@ -20,6 +20,7 @@ from identification.estimation.descent import compass
 from identification.estimation.noise import generic_noise
 from identification.estimation.prediction_error import Fitted, Model, Problem, descended, residual_fit
 from identification.estimation.window import Fit, Window
+from identification.limits import FRICTION
 from identification.mismatch.effect import Friction
 from identification.mismatch.outside import about
 from identification.mismatch.recording import SeenInCycles
@@ -36,25 +37,13 @@ WEARS = (Friction.PLAY, Friction.STICKS)
 """What a worn valve has."""
 OF_CYCLES = (Slot.T, Slot.L, Slot.K, Slot.STICKBAND, Slot.JUMP, Slot.COAST)
 """Parameters that the cycles tell."""
-PLACES = 9
-"""Places of the stem that are tried within its friction band; ours: an eighth of the band apart."""
-WIDTHS = tuple(float(w) for w in np.geomspace(0.9, 1.8, 10))
-"""Stickbands that are tried of a stem with mass, in widths of the best play; ours: of 18 simulated stems of dry
-friction they were 1.1 to 1.8."""
-SHARES, TIMES = (0.4, 0.6, 0.8), (0.12, 0.25, 0.5)
-"""Jumps that are tried, in stickbands, and natural times, in samples; ours: faster stems move within a sample, slower
-ones are a lag."""
-STEPS = (0.08, 0.04, 0.02, 0.01)
-"""Relative steps; ours: a pit is a tenth of the stickband wide."""
+PLACES, CARRIED_ON = FRICTION.places, FRICTION.carried_on
+"""What limits.toml says of a stem's place, as kernels take it."""
 MOVES = (
     *((1, 0, 0, 0), (-1, 0, 0, 0), (0, 1, 0, 0), (0, -1, 0, 0)),
     *((0, 0, 1, 0), (0, 0, -1, 0), (0, 0, 0, 1), (0, 0, 0, -1), (1, 1, 0, 0), (-1, -1, 0, 0)),
 )
 """Moves of stickband, jump, natural time and dead time that are tried."""
-DEAD_STEPS = 4.0
-"""Samples of dead time that a step of one takes; ours."""
-CARRIED_ON = 0.9
-"""Squares left by another place, in those left by the stem carried on, from which it is placed anew; ours."""
 
 
 def is_friction(name: str) -> bool:
@@ -98,7 +87,8 @@ def _with_mass(p: Problem, model: Model) -> list[Model]:
     """The best starts of stems with mass: stickbands about the play's width, jumps and natural times scanned, the
     best moved by ever smaller steps, for slips make pits that a descent does not see from afar."""
     scanned, limits = [], p.limits.search
-    for width, share, samples in product(WIDTHS, SHARES, TIMES):
+    widths = np.geomspace(*FRICTION.widths)
+    for width, share, samples in product(widths, FRICTION.jumps, FRICTION.times):
         c = model.c.copy()
         c[Slot.STICKBAND] *= width
         c[Slot.JUMP] = share * c[Slot.STICKBAND]
@@ -107,7 +97,8 @@ def _with_mass(p: Problem, model: Model) -> list[Model]:
         trial = Model(model.added, c)
         scanned.append((residual_fit(p, trial).loss, trial))
     best = sorted(scanned, key=lambda pair: pair[0])[: limits.masses_moved]
-    moved = (compass(p, trial, loss, _heavier, MOVES, STEPS, most=limits.mass_moves) for loss, trial in best)
+    most, steps = limits.mass_moves, FRICTION.steps
+    moved = (compass(p, trial, loss, _heavier, MOVES, steps, most=most) for loss, trial in best)
     return [trial for trial, _ in sorted(moved, key=lambda pair: pair[1])[: limits.starts]]
 
 
@@ -116,7 +107,7 @@ def _heavier(p: Problem, model: Model, move: tuple[int, ...], step: float) -> tu
     c = model.c.copy()
     for slot, way in zip((Slot.STICKBAND, Slot.JUMP, Slot.STEM_T), move, strict=False):
         c[slot] *= math.exp(step * way)
-    c[Slot.L] = max(c[Slot.L] + move[3] * step * DEAD_STEPS * p.inputs.dt_s, 0.0)
+    c[Slot.L] = max(c[Slot.L] + move[3] * step * FRICTION.dead_steps * p.inputs.dt_s, 0.0)
     if c[Slot.JUMP] > c[Slot.STICKBAND]:
         return model, math.inf
     trial = Model(model.added, c)

@@ -20,9 +20,6 @@ from identification.limits import LIMITS, LOCATION, SIGNALS
 from identification.record import Floats, Mask
 from identification.signals.robust import robust_deviation
 
-PAST = 2
-"""Samples by which features are older than the innovation; ours: one, and one for what looks at a neighbour."""
-
 
 @dataclass(frozen=True, slots=True)
 class Group:
@@ -105,7 +102,7 @@ def groups(pv: Floats, op: Floats, dt_s: float, late: int, memory: int) -> tuple
     `memory` [samples] of the loop. All features are of the past: an innovation is part of its own PV, and feedback
     makes it part of every later OP.
     """
-    o, before = delayed(op, late + PAST), delayed(pv, PAST)
+    o, before = delayed(op, late + LOCATION.past), delayed(pv, LOCATION.past)
     way, since = turns(o, least_turn(o))
     since_s, window = since * dt_s, min(max(memory // 4, 1), pv.size)
     travel = np.abs(o - delayed(o, window)) / (window * dt_s)

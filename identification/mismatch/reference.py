@@ -23,16 +23,6 @@ from identification.simulation.open_loop import simulate, through_valve
 from identification.simulation.parameters import Slot
 from identification.simulation.vessel import plain_vessel
 
-PRIORS = (0.003, 0.3)
-"""Precisions of the ridge's prior over that of a sample, per sample, of which the better counts: of .003 to 3 strange
-physics that rings stands out by the first, all else by the second (proofs/concealed)."""
-MEMORIES = (3.0, 10.0, 30.0, 100.0)
-"""How far back the loop's history reaches, in time constants; ours."""
-LEVELS, BANDS = (0.2, 0.4, 0.6, 0.8), (0.03, 0.15, 0.4)
-"""Quantiles at which something may switch, and its hysteresis in the range; ours."""
-FINER = 8
-"""Lines of a clock's spectrum for one of the record's, for the last harmonic has to keep step over it."""
-
 
 @dataclass(frozen=True, slots=True)
 class Foretold:
@@ -85,16 +75,16 @@ def switched(x: Floats, at: float, band: float) -> Floats:
 def by_level(o: LoopSignals) -> list[Floats]:
     """Gain and load that go with PV's level, and what PV switches."""
     out = [o.response(o.flow * o.pv), o.response(o.flow * o.pv**2), o.pv**2, o.pv**3]
-    edges, span = np.quantile(o.pv, LEVELS[:3]), float(np.ptp(o.pv))
-    return out + [o.response(switched(o.pv, at, band * span)) for at in edges for band in BANDS[:2]]
+    edges, span = np.quantile(o.pv, REFERENCE.levels[:3]), float(np.ptp(o.pv))
+    return out + [o.response(switched(o.pv, at, band * span)) for at in edges for band in REFERENCE.bands[:2]]
 
 
 def by_switch(o: LoopSignals) -> list[Floats]:
     """Load and gain that another regime of the flow has, which ends elsewhere than it began."""
     span = float(np.subtract(*np.quantile(o.flow, (0.99, 0.01))))
     out = []
-    for at in np.quantile(o.flow, LEVELS):
-        for band in BANDS:
+    for at in np.quantile(o.flow, REFERENCE.levels):
+        for band in REFERENCE.bands:
             on = switched(o.flow, at, band * span)
             out += [o.response(on), o.response(on * (o.flow - at))]
     return out
@@ -105,7 +95,8 @@ def by_history(o: LoopSignals) -> list[Floats]:
     travel = np.abs(np.diff(o.flow, prepend=o.flow[0]))
     longest_s = REFERENCE.of_record * o.flow.size * o.dt_s
     out = []
-    for memory_s in (m * o.lag_s for m in MEMORIES if m == MEMORIES[0] or m * o.lag_s <= longest_s):
+    shortest_s, *others_s = (m * o.lag_s for m in REFERENCE.memories)
+    for memory_s in (shortest_s, *(m for m in others_s if m <= longest_s)):
         been, gone = (lagged(x - x.mean(), memory_s, o.dt_s) for x in (o.pv, travel))
         out += [o.response(x) for x in (been, gone, o.flow * been, o.flow * gone)]
     return out
@@ -196,7 +187,7 @@ def foretold(p: Problem, fit: Fitted, clock: bool = True) -> Foretold:
         x = rest(np.nan_to_num(np.stack(signals) * root).T)
         size = x.std(axis=0)
         kept = size > 1e-9 * size.max(initial=1e-30)
-        won = max(_gained(fit, e, _by_ridge(e, x[:, kept] / size[kept], prior)) for prior in PRIORS)
+        won = max(_gained(fit, e, _by_ridge(e, x[:, kept] / size[kept], prior)) for prior in REFERENCE.priors)
         best = Foretold(way, won) if won > best.gain else best
     return best
 
@@ -231,11 +222,12 @@ def _by_clock(e: Floats, root: Floats) -> Floats:
     for part in _folds(n):
         known = np.ones(n, dtype=bool)
         known[part] = False
-        power = np.abs(np.fft.rfft(bounded * known, FINER * n)) ** 2
-        lines = np.arange(FINER * REFERENCE.clock_cycles, power.size // (each.size + 1))
+        power = np.abs(np.fft.rfft(bounded * known, REFERENCE.finer * n)) ** 2
+        lines = np.arange(REFERENCE.finer * REFERENCE.clock_cycles, power.size // (each.size + 1))
         if lines.size == 0:
             return e
-        angle = 2.0 * np.pi * lines[np.argmax(power[np.outer(each, lines)].sum(axis=0))] / (FINER * n)
+        highest = lines[np.argmax(power[np.outer(each, lines)].sum(axis=0))]
+        angle = 2.0 * np.pi * highest / (REFERENCE.finer * n)
         turn = np.outer(np.arange(n) * angle, each)
         wave = np.concatenate((np.cos(turn), np.sin(turn)), axis=1) * root[:, None]
         gram, slope = wave[known].T @ wave[known], wave[known].T @ e[known]

@@ -22,21 +22,12 @@ from identification.estimation.prediction_error import (
     scales,
     sensitivities,
 )
+from identification.limits import STARTS
 from identification.mismatch.recording import Recording
 from identification.record import Floats, Mask
 from identification.simulation.open_loop import simulate, through_valve
 from identification.simulation.parameters import STEPS, Slot, Variant, neutral
 from identification.simulation.vessel import plain_vessel
-
-LEAD = 200
-"""Samples of rest before a pulse is whitened; ours: the noise model reaches 117 back."""
-DELAYS = 40
-"""Dead times tried at most for two modes, from none to that of the plain loop, which a missing lag or zero has
-lengthened; a mode that answers at once is found to the sample alone."""
-LONGER = (0.7, 1.0, 1.4, 2.0)
-"""Time constants tried for the first mode, in that of the plain loop."""
-LEADING = 0.95
-"""First coefficient of the noise model that knows nothing: nearly a difference."""
 
 
 def early_part(p: Problem) -> tuple[Problem, int]:
@@ -116,7 +107,7 @@ def step_places(p: Problem, fit: Fitted) -> tuple[int, ...]:
 
 
 def step_pulse(p: Problem, fit: Fitted) -> Floats:
-    """Whitened response to a step of the load at the first sample, shape (n - LEAD,)."""
+    """Whitened response to a step of the load at the first sample, shape (n - lead,)."""
     one = neutral()
     one[Slot.T], one[Slot.K], one[Slot.STEP] = fit.model.c[Slot.T], fit.model.c[Slot.K], 1.0
     quiet = replace(p.inputs, op=np.full(p.y.size, p.inputs.middle), step_at=(0,))
@@ -124,8 +115,9 @@ def step_pulse(p: Problem, fit: Fitted) -> Floats:
 
 
 def _pulse(answer: Floats, p: Problem, fit: Fitted) -> Floats:
-    """An answer whitened after a lead of rest, shape (n - LEAD,)."""
-    return whitened(np.concatenate((np.zeros(LEAD), answer))[: p.y.size], fit.ar, p.edges)[LEAD:]
+    """An answer whitened after a lead of rest, shape (n - lead,)."""
+    led = np.concatenate((np.zeros(STARTS.lead), answer))[: p.y.size]
+    return whitened(led, fit.ar, p.edges)[STARTS.lead :]
 
 
 def _best_place(e: Floats, pulse: Floats, shut: Mask) -> int:
@@ -212,7 +204,7 @@ def screened(x: Round, models: list[Model]) -> list[Model]:
 def mode_starts(p: Problem, near: Fitted, row: Variant) -> list[Model]:
     """Starts of a two-mode row whose second mode has the share of the gain that the row is about."""
     blind = np.zeros_like(near.ar)
-    blind[:1] = LEADING
+    blind[:1] = STARTS.leading
     out = []
     for ar in (near.ar, blind) if near.ar.size else (near.ar,):
         models = [model for _, model in sorted(grid_of_modes(p, near, row, ar), key=lambda point: point[0])]
@@ -225,10 +217,10 @@ def grid_of_modes(p: Problem, near: Fitted, row: Variant, ar: Floats) -> Iterato
     """What each point of the grid leaves under one noise model, and its model; both gains are solved linearly."""
     dt_s, t0, dead0 = p.inputs.dt_s, float(near.model.c[Slot.T]), float(near.model.c[Slot.L])
     y, level = whitened(p.y, ar, p.edges), whitened(np.ones(p.y.size), ar, p.edges)
-    firsts, others = [t0 * f for f in LONGER], [t0 * f for f in row.modes]
+    firsts, others = [t0 * f for f in STARTS.longer], [t0 * f for f in row.modes]
     found = responses(p, near, {*firsts, *others}, ar)
     longest = min(math.ceil(dead0 / dt_s), p.y.size - 1)
-    for samples in range(0, longest + 1, longest // DELAYS + 1):
+    for samples in range(0, longest + 1, longest // STARTS.delays + 1):
         late = {t: np.concatenate((np.full(samples, x[0]), x[: x.size - samples])) for t, x in found.items()}
         for first, other in product(firsts, others):
             rows = np.stack([late[first], late[other], level])
