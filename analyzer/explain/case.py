@@ -22,7 +22,8 @@ from analyzer.history.series import Series
 from analyzer.limits import EXPLAIN
 from analyzer.loop.assess import convicted
 from analyzer.loop.cause import NO_CAUSE, Verdict
-from analyzer.loop.decisions import Cause, Fault, Lack, Need, Needs
+from analyzer.loop.decisions import Cause, Fault
+from analyzer.loop.fitness import pv_that_jumps
 from analyzer.loop.identified import intervals
 from analyzer.loop.oscillation import counting, detect
 from analyzer.loop.quality import Prepared, prepare
@@ -35,7 +36,7 @@ from analyzer.night.nights import ALWAYS, Night, cut
 from identification.controller.check import StatedSettings
 from identification.errors import InputError, NotAssessedError
 from identification.estimation.evidence import trials_between_moves
-from identification.mismatch.recording import Recording, SeenInCycles, coarser_by, is_experiment, least_jump
+from identification.mismatch.recording import Recording, SeenInCycles, coarser_by, is_experiment
 from identification.record import Floats
 
 
@@ -178,11 +179,9 @@ def case(
         raise NotAssessedError(f"{spec.loop}: needs OP, has none")
     if float(np.ptp(r.op)) == 0 or float(np.ptp(r.pv)) == 0:
         raise NotAssessedError(f"{spec.loop}: needs OP and PV that move, one of them stands still")
-    jump = least_jump(r.pv, config.explain.recorder)
-    if jump > 0.0:
-        stands = float(np.mean(np.diff(r.pv) == 0.0))
-        needs = Needs(Lack.FINER, Need.PV_AS_MEASURED, (100.0 * stands, jump))
-        raise NotAssessedError(f"{spec.loop}: {needs}")
+    jumps = pv_that_jumps(r, config.explain.recorder)
+    if jumps is not None:
+        raise NotAssessedError(f"{spec.loop}: {jumps}")
     stamps = raw.stamp_s[~raw.bad]
     stamps = stamps[(stamps >= r.start_s - r.dt_s) & (stamps <= r.start_s + r.duration_s)]
     verdict = verdict_on(spec, whole, config)

@@ -25,15 +25,15 @@ def unfit_for_cause(prepared: Prepared, oscillation: Oscillation | None, config:
         return Needs(Lack.OP, Need.OP)
     if float(np.ptp(record.op)) == 0.0:
         return Needs(Lack.MOVING_OP, Need.MOVING_OP)
-    jumps = _jumps(record, config.explain.recorder)
+    jumps = pv_that_jumps(record, config.explain.recorder)
     return jumps or compressed(prepared, oscillation, q) or at_limits(record, q)
 
 
-def _jumps(record: LoopRecord, limits: RecorderLimits) -> Needs | None:
+def pv_that_jumps(record: LoopRecord, limits: RecorderLimits) -> Needs | None:
     """What a PV lacks that stands and then jumps, as behind a valve that sticks, though it is the sensor that does;
     None of any other."""
-    jump = least_jump(record.pv[~record.bad], limits)
-    stands = float(np.mean(np.diff(record.pv) == 0.0))
+    measured = record.pv[~record.bad]
+    jump, stands = least_jump(measured, limits), float(np.mean(np.diff(measured) == 0.0))
     return Needs(Lack.FINER, Need.PV_AS_MEASURED, (100.0 * stands, jump)) if jump > 0.0 else None
 
 

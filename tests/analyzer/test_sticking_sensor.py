@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from analyzer.loop.assess import assess
 from analyzer.loop.decisions import Lack
+from analyzer.loop.fitness import pv_that_jumps
 from proofs.plant import CONFIG, Sketch, Trends, prepared
 
 HEALTHY = Sketch("none", (1.2, 60.0, 10.0), 1.2, 60.0, noise=0.1, load_std=1.0)
@@ -45,3 +48,18 @@ def test_a_sound_sensor_is_not_doubted() -> None:
     found = assess(prepared(behind_a_sticking_sensor(0.0, 3)), HEALTHY.controller, CONFIG)
     assert found.verdict.cause == "none"
     assert found.verdict.needs is None or "stands" not in str(found.verdict.needs)
+
+
+def test_held_over_values_of_a_gap_do_not_stand_as_a_sensor_does() -> None:
+    """What stands and jumps is asked of the samples that were recorded: half a record without any, held over from the
+    last, changes neither the share that stands nor the least jump."""
+    record = prepared(behind_a_sticking_sensor(1.5, 3)).record
+    alone = pv_that_jumps(record, CONFIG.explain.recorder)
+    gap = record.pv.size
+    with_gap = replace(
+        record,
+        pv=np.append(record.pv, np.full(gap, record.pv[-1])),
+        bad=np.append(record.bad, np.ones(gap, dtype=bool)),
+    )
+    assert alone is not None
+    assert pv_that_jumps(with_gap, CONFIG.explain.recorder) == alone
