@@ -12,6 +12,9 @@ from enum import StrEnum
 from importlib.resources import files
 from typing import Any
 
+Row = Mapping[str, Any]
+"""A row of a table of results: its cells by column."""
+
 
 class Kind(StrEnum):
     """What a column's cells hold; an empty cell is what is not known."""

@@ -23,11 +23,11 @@ from analyzer.belief.cycle import CycleBelief, Pair, RemedyBelief
 from analyzer.belief.pool import Pool
 from analyzer.belief.valve import ValveBelief, Witness
 from analyzer.belief.wear import PhaseKnown, Width, forgotten, with_repetitions
+from analyzer.columns import Row
 from analyzer.config import BeliefLimits, Config
 from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, Status, counts
 from identification.estimation.backlash_stiction import WIDTHS
 
-Row = Mapping[str, Any]
 NEEDED, EARLIER = 10.0, 0.1
 """Evidence needed [nat], and standard deviation of a width's logarithm, of nights that earlier versions kept."""
 CONSTANTS = ("slope", "time_constant_s", "gain", "dead_time_s", "width", "slip_jump")

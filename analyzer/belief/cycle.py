@@ -14,14 +14,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
+from analyzer.columns import Row
 from analyzer.config import BeliefLimits
 from analyzer.loop.decisions import CAUSES, Action, Cause, counts
 
-Row = Mapping[str, Any]
 WITH_PAIR = ("kp_new", "ti_new", "advice", "expected_period_s", "expected_pv_amplitude_pct")
 """What a night says of a pair of settings that it advises."""
 CHOICES = (Action.RETUNE, Action.REPAIR_VALVE, Action.CHECK_SETTINGS)

@@ -10,7 +10,7 @@ from typing import Any
 from analyzer.belief.belief import Belief, belief_of, kept_as, step
 from analyzer.belief.pool import Pooled
 from analyzer.belief.wear import growth, wear
-from analyzer.columns import BELIEFS, row_of
+from analyzer.columns import BELIEFS, Row, row_of
 from analyzer.config import Config
 from analyzer.loop.decisions import CAUSES, Lane
 from analyzer.store import notes
@@ -20,7 +20,6 @@ from analyzer.store.table import rows_table
 from analyzer.words import belief as words
 from identification.errors import InputError
 
-Row = Mapping[str, Any]
 Held = tuple[tuple[float | None, float | None], tuple[float, float]]
 """Settings in force, as loops.csv states them, and those that nights have told to type in instead."""
 Followed = tuple[str, Sequence[Row], Sequence[str]]

@@ -15,8 +15,8 @@ import numpy as np
 from analyzer.columns import BY_NAME
 from analyzer.comparison.block_bootstrap import Difference, Floats, Side, difference
 from analyzer.config import ComparisonLimits
+from analyzer.history.plant_clock import HOUR_S
 
-HOUR_S = 3600.0
 LIMITS = ComparisonLimits()
 """The limits in force where none are given."""
 

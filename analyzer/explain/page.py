@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from analyzer.explain import drawings, words
 from analyzer.explain.explained import Explained
-from analyzer.explain.words import NOTES, number_text, places, rms, share, title
+from analyzer.explain.words import NOTES, Data, number_text, places, rms, share, title
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.pages.words import duration, number, stamp
 from identification.mismatch.words import check, located_sentence, remarks
 from reports.pages import Block, Facts, Page, Section, Table, Text, Tiles
 from reports.texts import slug
-
-Data = Mapping[str, Any]
 
 
 def explanation_page(e: Explained, zone: str = UTC_NAME) -> Page:

@@ -15,6 +15,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from analyzer.history.plant_clock import DAY_S, HOUR_S
 from analyzer.history.stamps import Fields, fields, midnights_told, stamp_seconds
 from analyzer.history.table import WORDS, as_text, is_text, numbers
 from analyzer.limits import HISTORY
@@ -43,7 +44,6 @@ class TimeScale:
         return said + another if self in SINCE_START.values() else said
 
 
-HOUR_S, DAY_S = 3600.0, 86400.0
 MISSING_HOUR = "samples stand in the hour that the time zone leaves out in spring and are left out"
 REPEATED_HOUR = "samples stand in the hour that the time zone repeats in autumn; told apart by their order"
 SCALES = tuple(TimeScale(**scale) for scale in WORDS["scales"])

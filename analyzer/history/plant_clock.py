@@ -8,6 +8,7 @@ from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 from identification.errors import InputError
 
 UTC_NAME = "UTC"
+HOUR_S, DAY_S = 3600.0, 86400.0
 
 
 def zone_of(name: str | None) -> ZoneInfo:

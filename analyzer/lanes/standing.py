@@ -8,7 +8,8 @@ import math
 import numpy as np
 
 from analyzer.config import Config, LaneLimits
-from analyzer.loop.assessments import HOUR_S, hour_edges, noise_band
+from analyzer.history.plant_clock import HOUR_S
+from analyzer.loop.assessments import hour_edges, noise_band
 from analyzer.loop.quality import Prepared
 from identification.limits import SIGNALS
 from identification.models import Pid

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from analyzer.config import CauseLimits, Config
-from analyzer.loop.assessments import HOUR_S, Assessments, Hour, assess_span, hourly
+from analyzer.history.plant_clock import HOUR_S
+from analyzer.loop.assessments import Assessments, Hour, assess_span, hourly
 from analyzer.loop.cause import (
     NO_CAUSE,
     Verdict,

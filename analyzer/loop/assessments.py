@@ -15,11 +15,11 @@ import numpy as np
 from numba import njit
 
 from analyzer.config import FigureLimits
+from analyzer.history.plant_clock import HOUR_S
 from analyzer.loop.oscillation import Oscillations
 from identification.record import Floats, LoopRecord, Mask
 from identification.signals.robust import robust_deviation
 
-HOUR_S = 3600.0
 ROUNDING = 1e-9
 """Moves under this [% of OP] are rounding and turn nothing: a signal may stand exactly at the edge of the band."""
 

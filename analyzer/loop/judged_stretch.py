@@ -18,7 +18,7 @@ from itertools import chain, pairwise
 import numpy as np
 
 from analyzer.config import Config, SettingsLimits
-from analyzer.loop.assessments import HOUR_S
+from analyzer.history.plant_clock import HOUR_S
 from analyzer.loop.quality import Prepared
 from analyzer.loops.changes import TuningChange, settings_before
 from analyzer.loops.spec import LoopSpec

@@ -14,14 +14,13 @@ import numpy as np
 
 from analyzer.comparison.block_bootstrap import Floats
 from analyzer.config import Config
-from analyzer.history.plant_clock import UTC_NAME, date_of
+from analyzer.history.plant_clock import DAY_S, UTC_NAME, date_of
 from analyzer.history.stamps import parse_times
 from analyzer.loops.spec import LoopSpec, csv_table
 from identification.errors import InputError
 
 TIMES = ("ti_old", "ti_new")
 COLUMNS = ("loop", "time", "kp_old", "ti_old", "kp_new", "ti_new", "who")
-DAY_S = 86400.0
 SETTINGS = ("kp", "ti", "td", "form", "gain_unit", "ti_unit", "scan_s")
 """What a dated row of loops.csv changes; tags, ranges and texts are those of the last row."""
 

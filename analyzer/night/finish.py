@@ -12,7 +12,7 @@ from typing import Any
 import pyarrow as pa
 
 from analyzer.belief.nights import settle
-from analyzer.columns import GROUPS, NIGHTS, Column, names
+from analyzer.columns import GROUPS, NIGHTS, Column, Row, names
 from analyzer.config import Config, NightLimits
 from analyzer.lanes.lanes import in_lanes
 from analyzer.loop.decisions import Status
@@ -28,7 +28,6 @@ JOINED = tuple(t.name for t in KEPT if t.in_pieces and t.name != "nights")
 """Tables whose pieces are taken as they are; the table of nights and that of groups are made of theirs."""
 WORTH = {Status.OK: 2, Status.NOT_ASSESSED: 1}
 """What a status is worth when two records of one loop meet; a failure is worth nothing."""
-Row = Mapping[str, Any]
 
 
 def fuller(old: Row, new: Row, limits: NightLimits) -> bool:

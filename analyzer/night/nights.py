@@ -12,7 +12,7 @@ import numpy as np
 
 from analyzer.config import Config, NightLimits
 from analyzer.history.export import Export
-from analyzer.history.plant_clock import UTC_NAME, date_of, midnights
+from analyzer.history.plant_clock import DAY_S, UTC_NAME, date_of, midnights
 from analyzer.history.series import Series, stamp_text
 from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
 from analyzer.loop.quality import Prepared, prepare
@@ -22,7 +22,6 @@ from identification.errors import InputError
 from identification.models import Pid
 from identification.record import LoopRecord
 
-DAY_S = 86400.0
 Span = tuple[float, float]
 """Start and end of a span of time [s since 1970-01-01 UTC]."""
 ALWAYS: Span = (-math.inf, math.inf)

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from analyzer.columns import Row
 from analyzer.config import PlantLimits
 from analyzer.loop.decisions import (
     CAUSES,
@@ -30,7 +31,6 @@ from analyzer.plantwide.groups import Group, groups_of
 from analyzer.plantwide.source import Candidate, Lags, candidates_of
 from analyzer.plantwide.wave import Wave
 
-Row = Mapping[str, Any]
 Loops = Mapping[str, Finding]
 """The loops of a night by name."""
 

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
-from analyzer.columns import GROUPS, names
+from analyzer.columns import GROUPS, Row, names
 from analyzer.loop.decisions import Action, Cause, GroupRole
 from analyzer.store.store import Store
 from analyzer.store.table import no_column
 
-Row = Mapping[str, Any]
 OF_LOOPS = (
     *("loop", "cause", "valve_fault", "action", "kp_new", "ti_new", "kp", "ti", "form", "gain_unit"),
     *("ti_unit", "pv_unit", "op_unit", "description", "area", "master", "spectrum", "start_s"),

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
 from dataclasses import asdict, astuple
 from typing import TYPE_CHECKING, Any
 
-from analyzer.columns import row_of
+from analyzer.columns import Row, row_of
 from analyzer.lanes.lanes import action_of
 from analyzer.loop.decisions import (
     CAUSES,
@@ -37,7 +36,6 @@ from analyzer.words.reason import as_stored, reason
 if TYPE_CHECKING:
     from analyzer.loop.assess import Assessment
 
-Row = Mapping[str, Any]
 SWING = {
     "oscillation_significance": "significance",
     "oscillating_pct": "oscillating_pct",

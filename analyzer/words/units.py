@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from analyzer.columns import Row
 
 if TYPE_CHECKING:
     from analyzer.loops.spec import LoopSpec
     from identification.models import Pid
-
-Row = Mapping[str, Any]
-"""A loop's night, by column."""
 
 
 def number(value: float | None) -> str:

@@ -12,6 +12,7 @@ from identification.estimation.descent import half_width, nats
 from identification.estimation.prediction_error import Fitted, Problem, deviations, residual_fit
 from identification.mismatch import words
 from identification.mismatch.catalogue import EFFECTS, fault
+from identification.mismatch.catalogue.supply_variation import AT_REST
 from identification.mismatch.effect import Block, exact
 from identification.mismatch.explanation import Explanation, by_cycles, is_stack
 from identification.mismatch.outside import about
@@ -21,8 +22,6 @@ from identification.models import Estimate
 from identification.record import Floats
 from identification.simulation.parameters import Slot, Variant
 
-AT_REST = "flow_at_rest_pct"
-"""Parameter of a supply: the flow that goes with it while OP is at its middle."""
 INTEGRATING = ("level",)
 """Loop types that need not settle, of which a short record still tells the slope."""
 
@@ -140,7 +139,7 @@ def too_short(found: Explanation, s: Recording) -> str:
 
 def untold_gain(found: Explanation, effects: tuple[EffectFound, ...]) -> str:
     """What an experiment does not tell of a supply whose flow at rest may be anything; empty of any other."""
-    at_rest = next((e.parameters[AT_REST] for e in effects if AT_REST in e.parameters), None)
+    at_rest = next((e.parameters[AT_REST.name] for e in effects if AT_REST.name in e.parameters), None)
     open_ended = at_rest is not None and at_rest.low < 0.0 < at_rest.high
     return words.TOLD["wanders"] if open_ended and found.p.by_simulation else ""
 

@@ -83,5 +83,5 @@ def test_a_supply_whose_part_in_the_gain_is_not_seen_is_told_with_that() -> None
     said = answer(found, s)
     assert said.verdict == "supply-variation"
     assert not said.caution
-    any_sign = replace(said.effects[0], parameters={AT_REST: Estimate(10.0, -35.0, 55.0, "% OP")})
+    any_sign = replace(said.effects[0], parameters={AT_REST.name: Estimate(10.0, -35.0, 55.0, "% OP")})
     assert untold_gain(found, (any_sign,)) == TOLD["wanders"]
