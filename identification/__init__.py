@@ -16,7 +16,7 @@ def _keep_kernels_by_source() -> None:
     after an update in place every loop would fail, or be told by old code.
     """
     here = Path(__file__).parent
-    sources = sorted(p for p in here.rglob("*") if p.suffix in (".py", ".toml"))
+    sources = [*sorted(here.rglob("*.py")), here / "limits.toml"]
     stats = [(str(p.relative_to(here)), p.stat()) for p in sources]
     stamps = [(name, s.st_mtime_ns, s.st_size) for name, s in stats]
     kept = here / "__pycache__" / f"kernels-{hashlib.sha256(repr(stamps).encode()).hexdigest()[:12]}"

@@ -187,11 +187,12 @@ def alternatives(found: Explanation) -> tuple[str, ...]:
     """Names that the data cannot tell from the first effect: as good, or of the same mark by their nature."""
     if not found.accepted:
         return ()
-    winner = next(c for c in found.accepted if c.name == found.best.names[0])
+    winner = found.accepted[0]
     least = max(winner.penalised - found.p.limits.search.tie, 0.0)
-    close = [c.name for c in found.first if c.penalised > least]
+    beside_none = len(winner.fit.names) == 1  # else its gain is not over the plain loop, as theirs are
+    close = [c.name for c in found.first if beside_none and c.penalised > least]
     names = dict.fromkeys((*close, *EFFECTS[winner.name].indistinguishable))
-    return tuple(n for n in names if n != winner.name)
+    return tuple(n for n in names if n not in found.best.names)
 
 
 def plain_loops(found: Explanation) -> dict[str, dict[str, float]]:

@@ -217,7 +217,7 @@ def replacement_step(found: Explanation, tell: Progress, s: Recording) -> Explan
     x, limits = round_of(found.p, found.best, s), found.p.limits.search
     # a load step taken here is at the places of this round
     found = replace(found, p=x.p)
-    for i, old in enumerate(found.accepted):
+    for old in found.accepted:
         lasts = x.p.by_simulation and not EFFECTS[old.name].timed
         beside = replace(x, near=found.less([old]).best)
         least = max(gain(found.best, beside.near) - penalty(x.p, old.row) + limits.tie, 0.0)
@@ -229,7 +229,8 @@ def replacement_step(found: Explanation, tell: Progress, s: Recording) -> Explan
         first = next(others, None)
         if first is not None and first.penalised > least and passes(beside, first.fit, EFFECTS[first.name]):
             best = descended(x.p, first.fit.model, limits.full_steps)
-            found = replace(found, best=best, accepted=(*found.accepted[:i], first, *found.accepted[i + 1 :]))
+            kept = (c for c in found.accepted if c is not old)
+            found = replace(found, best=best, accepted=(*kept, first))
     return found
 
 

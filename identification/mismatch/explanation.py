@@ -45,7 +45,8 @@ class Explanation:
     """What was found.
 
     recorder, controller : what was found about them; p : the problem that the fits solve; plain, best : fits
-    without and with the effects; accepted : the candidates taken, in order; first : the candidates of the first
+    without and with the effects; accepted : the candidates taken, in the order
+    of the best fit's; first : the candidates of the first
     round; law : the control law recovered; late_s : PV's lateness that was taken out [s]; left : gain of what is
     left and has no name, 0 where nothing is, and left_by : the way of the reference that foretells it
     (reference.py); proof : plain and best on held-out data; refuted : names of effects that explain the fitted part
@@ -73,6 +74,11 @@ class Explanation:
     others: tuple[OnOther, ...] = ()
     outside: Candidate | None = None
     by_innovations: Explanation | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        """Refuse effects taken that are not those of the best fit, in its order: the first is the one told."""
+        if tuple(c.name for c in self.accepted) != self.best.names:
+            raise ValueError(f"taken {[c.name for c in self.accepted]}, fitted {list(self.best.names)}")
 
     @property
     def proven(self) -> HeldOut:
@@ -166,11 +172,13 @@ def agreed(told: Explanation, by_misfit: Explanation) -> Explanation:
     What the misfit tells, innovations have to second: by a gain of what one constant costs, two signs. What is left
     is what both miss: a load that wanders is no lack of the model, and innovations see none in it.
     """
-    p, limits, left = by_misfit.p, told.p.limits.search, min(told.left, by_misfit.left)
+    limits, left = told.p.limits.search, min(told.left, by_misfit.left)
+    p = replace(by_misfit.p, inputs=replace(by_misfit.p.inputs, step_at=told.p.inputs.step_at))
     anew = descended(p, told.best.model, limits.full_steps)
     other = replace(told, p=p, plain=by_misfit.plain, best=anew, left=left, by_innovations=told)
     other = carried_over(most_telling_first(other))
-    seen = descended(told.p, by_misfit.best.model, limits.full_steps)
+    inputs = replace(told.p.inputs, step_at=by_misfit.p.inputs.step_at)
+    seen = descended(replace(told.p, inputs=inputs), by_misfit.best.model, limits.full_steps)
     is_seconded = gain(seen, told.plain) > limits.one_constant
     return nearer(other, replace(by_misfit, left=left, by_innovations=told)) if is_seconded else other
 

@@ -43,8 +43,8 @@ class LoopSignals:
     """What a way may act by, as a model of constants c, shape (SIZE,), has it: what is `through` the valve [% OP],
     the same and PV as known before [% PV] about their means, shape (n,) each, and the time constant [s].
 
-    In an experiment, where no controller moves the valve, nothing goes from sample to sample, so that recorded PV
-    tells them whatever makes them: there PV is the simulation's.
+    An experiment's errors are those of its simulation and go on from sample to sample, so that recorded PV tells them
+    whatever makes them: there PV is the simulation's.
     """
 
     def __init__(self, p: Problem, c: Floats) -> None:

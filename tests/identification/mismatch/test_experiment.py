@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from identification.controller.check import StatedSettings
-from identification.mismatch.answer import AT_REST, answer, untold_gain
+from identification.mismatch.answer import answer, untold_gain
+from identification.mismatch.catalogue.supply_variation import AT_REST
 from identification.mismatch.diagnosis import explain
-from identification.mismatch.recording import coarser_by, is_experiment
+from identification.mismatch.recording import Recording, coarser_by, is_experiment
 from identification.mismatch.words import TOLD
 from identification.models import Estimate
 from proofs.experiments import Plant, asked, carried_misfit, drawn, slow_mode
@@ -85,3 +86,25 @@ def test_a_supply_whose_part_in_the_gain_is_not_seen_is_told_with_that() -> None
     assert not said.caution
     any_sign = replace(said.effects[0], parameters={AT_REST.name: Estimate(10.0, -35.0, 55.0, "% OP")})
     assert untold_gain(found, (any_sign,)) == TOLD["wanders"]
+
+
+@pytest.mark.parametrize("seed", [1, 3, 16])
+def test_a_load_that_steps_in_an_experiment_is_told_and_simulated(seed: int) -> None:
+    """Into a lag moved by hand a load steps by 6 % of OP: its size is told within its interval, and a simulation with
+    it leaves little more than the noise (a difference equation, not the simulator)."""
+    rng, count = np.random.default_rng(seed), 1200
+    op = 50.0 + np.repeat(rng.uniform(-6.0, 6.0, count // 60), 60)
+    y, wander, pv = 0.0, 0.0, np.empty(count)
+    for k in range(count):
+        wander = 0.99 * wander + 0.02 * rng.normal()
+        pushed = op[max(k - 3, 0)] - 50.0 + (6.0 if k >= 400 else 0.0) + wander
+        y += (1.2 * pushed - y) / 12.0
+        pv[k] = 50.0 + y + 0.05 * rng.normal()
+    s = Recording(None, pv, op, np.ones(count, dtype=bool), 1.0, np.arange(count, dtype=float))
+    found = explain(s)
+    told = answer(found, s)
+    size = told.effects[0].parameters["size_1_pct"]
+    assert told.verdict == "load-step"
+    assert size.low - 0.1 < 6.0 < size.high + 0.1
+    assert size.high > size.low
+    assert found.best.loss < 0.05 < 1.0 < found.plain.loss

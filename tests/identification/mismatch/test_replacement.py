@@ -52,13 +52,21 @@ def replaced() -> Explanation:
 def test_load_step_in_anothers_place_stays_where_it_was_found() -> None:
     """Simulated anew the set leaves what it left as it was fitted: its load steps where this round has located it."""
     found = replaced()
-    assert set(found.best.names) == {"load-step", "valve-characteristic"}
+    assert found.best.names == ("valve-characteristic", "load-step")
     assert residual_fit(found.p, found.best.model).loss == pytest.approx(found.best.loss, rel=1e-9)
 
 
-def test_what_is_told_first_is_no_alternative_of_itself() -> None:
-    """Alternatives are those of the effect that is told first, in whosever place the others were taken."""
+def test_nothing_told_is_an_alternative() -> None:
+    """What is told, first or second, is not among what could be told in the place of the first."""
     found = replaced()
-    told = found.best.names[0]
     first = tuple(Candidate(c.fit, 9e9, 9e9) for c in found.accepted)
-    assert told not in alternatives(Explanation(found.p, found.plain, found.best, found.accepted, first))
+    again = Explanation(found.p, found.plain, found.best, found.accepted, first)
+    assert not set(alternatives(again)) & set(found.best.names)
+
+
+def test_what_is_taken_is_what_is_fitted_in_its_order() -> None:
+    """The effect that is told first is the first of those taken: it is the last that is given up."""
+    found = replaced()
+    assert tuple(c.name for c in found.accepted) == found.best.names
+    with pytest.raises(ValueError, match="taken"):
+        Explanation(found.p, found.plain, found.best, found.accepted[::-1])

@@ -22,5 +22,6 @@ def test_three_effects_of_a_loop_are_a_stack_and_two_are_a_pair(count: int, stac
     p, fit = prepared(inputs_of(s), s.pv - s.pv.mean(), s.usable)
     rows = [next(r for r in CANDIDATES if r.name == n) for n in ("slow-mode", "backlash", "gain-drift")]
     taken = tuple(Candidate(replace(fit, model=Model((r,), fit.model.c)), 20.0, 10.0) for r in rows[:count])
-    assert is_stack(Explanation(p, fit, fit, accepted=taken)) is stacked
-    assert not is_stack(Explanation(replace(p, edges=NO_NOISE), fit, fit, accepted=taken))
+    best = replace(fit, model=Model(tuple(rows[:count]), fit.model.c))
+    assert is_stack(Explanation(p, fit, best, accepted=taken)) is stacked
+    assert not is_stack(Explanation(replace(p, edges=NO_NOISE), fit, best, accepted=taken))
