@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.models import Estimate, Integrator, Loop, Pid
+from identification.models import Backlash, Estimate, Integrator, Loop, Pid
 from identification.record import Floats, LoopRecord
 from identification.signals.correlation import lag_sums
 from identification.simulation.closed_loop import closed_loop, scan_step
-from tuning.describing import band, is_play, scaled_valve
+from tuning.describing import band, is_play
 from tuning.frequency_response import integral_s, maximum_sensitivity, slowest_s
 from tuning.limit_cycle import KICK
 from tuning.limits import METHOD
@@ -77,8 +77,11 @@ def loop_in_digits(loop: Loop) -> Loop:
     def rounded(x: float) -> float:
         return float(f"{x:.{DIGITS}g}")
 
-    process, width = type(loop.process)(*map(rounded, astuple(loop.process))), band(loop.valve)
-    valve = scaled_valve(loop.valve, rounded(width) / width) if width > 0.0 else loop.valve
+    process, valve = type(loop.process)(*map(rounded, astuple(loop.process))), loop.valve
+    if isinstance(valve, Backlash):
+        valve = Backlash(rounded(valve.width))
+    elif valve is not None:
+        valve = replace(valve, stickband=rounded(valve.stickband), slip_jump=rounded(valve.slip_jump))
     return replace(loop, process=process, valve=valve)
 
 

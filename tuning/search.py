@@ -83,14 +83,14 @@ def _as_simulated(loop: Loop) -> Loop:
 
 
 def _figures(loop: Loop, load: Floats) -> tuple[float, float]:
-    """Stem travel [%/h] and average absolute error [% PV] on a load in DIGITS, without the warm-up."""
+    """Stem travel [%/h] and average absolute error [% PV] on a load in digits, without the warm-up."""
     r = settled(run(_as_simulated(loop), load))
     travel = float(np.abs(np.diff(r.stem)).sum())
     return travel / r.duration_s * 3600.0, float(np.mean(np.abs(r.pv)))
 
 
 def mean_error(loops: Sequence[Loop], controller: Pid, load: Floats) -> float:
-    """Average absolute error [% PV] on a load in DIGITS, shape (n,), mean over the loops with one controller."""
+    """Average absolute error [% PV] on a load in digits, shape (n,), mean over the loops with one controller."""
     return float(np.mean([_figures(replace(one, controller=controller), load)[1] for one in loops]))
 
 

@@ -13,7 +13,7 @@ from analyzer.limits import LOOP
 from identification.models import Loop, Pid
 from identification.record import Floats, LoopRecord
 from reports.pages import as_held
-from tuning.forecast import RECOMMENDED, REPAIRED, Tried, alternatives, tried
+from tuning.forecast import RECOMMENDED, REPAIRED, Tried, alternatives, loop_in_digits, tried
 from tuning.frequency_response import integral_s
 from tuning.harmonic_balance import TravelMap, travel_map
 from tuning.limits import TuningLimits
@@ -112,7 +112,7 @@ def compared(
     """
     if load.size < limits.least_steps or loop.process.slope * loop.controller.kp <= 0.0:
         return None
-    load = as_held(load)
+    loop, load = loop_in_digits(loop), as_held(load)
     table = bench(loop, others, load, limits)
     moves = table.travel[0] > 0.0  # of a stem that rests no settings are calmer, and a ratio says nothing
     found = trade(table) if moves else Trade((), {})

@@ -23,7 +23,7 @@ from identification.models import Estimate, Loop, Pid, Process, Valve
 from identification.record import Floats
 from reports.pages import Field, Line, Panels, Picture, Place, Plot
 from tuning.describing import describe
-from tuning.forecast import Forecast, predict, run
+from tuning.forecast import Forecast, in_digits, loop_in_digits, predict, run
 from tuning.frequency_response import is_stable, slowest_s
 from tuning.harmonic_balance import curves, travel_map
 from tuning.limit_cycle import Confirmed, confirm
@@ -188,7 +188,7 @@ def _trend_panels(t: Tuning, new: Pid, title: str) -> Panels:
     pv: list[Line] = []
     op: list[Line] = []
     for name, kind, c in (("now", "pv", t.model.controller), ("proposed", "brought", new)):
-        r = run(replace(t.model, controller=c), t.load)
+        r = run(replace(loop_in_digits(t.model), controller=c), in_digits(t.load))
         last = slice(-min(len(r), int(15 * (t.period_s or 600) / r.dt_s)), None)
         hours, stem = r.time_s[last] / 3600.0, r.stem
         pv.append(Line(name, hours, r.pv[last], kind=kind))

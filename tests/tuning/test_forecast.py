@@ -97,7 +97,13 @@ def test_digits_that_nobody_knows_change_no_forecast(seed):
     """A stem that sticks carries a rounding error on; another last digit of load or process is forecast alike."""
     case = stick_case(seed)
     new = replace(case.loop.controller, kp=0.6 * case.loop.controller.kp)
-    other = replace(case.loop.process, time_constant_s=case.loop.process.time_constant_s * (1 + 1e-11))
+    process, valve, near = case.loop.process, case.loop.valve, 1 + 1e-11
     once = predict(case.loop, new, case.load)
-    again = predict(replace(case.loop, process=other), new, case.load + 1e-13)
-    assert (again.before, again.after) == (once.before, once.after)
+    others = (
+        replace(case.loop, process=replace(process, time_constant_s=process.time_constant_s * near)),
+        replace(case.loop, valve=replace(valve, stickband=valve.stickband * near)),
+        replace(case.loop, valve=replace(valve, slip_jump=valve.slip_jump * near)),
+    )
+    for other in others:
+        again = predict(other, new, case.load + 1e-13)
+        assert (again.before, again.after) == (once.before, once.after)
