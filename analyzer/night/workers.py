@@ -20,8 +20,9 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from multiprocessing import forkserver
 from multiprocessing.connection import Connection, wait
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, Generic, NamedTuple, Self, TypeVar
 
 from analyzer.config import WorkerLimits
 
@@ -36,6 +37,10 @@ POLL_S = 0.5
 MEGABYTE = 2**20
 OUT_OF_TIME = -int(getattr(signal, "SIGXCPU", 24))
 """Exit status of a worker that used up its processor time."""
+
+
+SERVER_GONE = 255
+"""Exit status of workers whose server is gone, which alone knows their own (multiprocessing.popen_forkserver)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,23 +193,68 @@ def executor(
 
 
 def _process(pipe: Connection, *given: Any) -> Any:
-    """A worker's process, started: forked from a server that has imported what all need; afresh where the system has
-    no such server, or no room for its socket."""
-    asked: dict[str, Any] = {"target": _serve, "args": (pipe, dict(os.environ), *given), "daemon": True}
-    with contextlib.suppress(ValueError, OSError):
-        forked = multiprocessing.get_context("forkserver")
-        forked.set_forkserver_preload([PRELOADED])
-        process: Any = forked.Process(**asked)
-        process.start()
-        return process
+    """A worker's process, started: on Linux forked from a server that has imported what all need, else, or where the
+    server cannot be had, afresh."""
+    asked: dict[str, Any] = {"target": _serve, "args": (pipe, _surroundings(), *given), "daemon": True}
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError, EOFError):  # no room for its socket, or it died while it began
+            forked = multiprocessing.get_context("forkserver")
+            forked.set_forkserver_preload([PRELOADED])
+            with _undisturbed():
+                forkserver.ensure_running()
+            process: Any = forked.Process(**asked)
+            process.start()
+            return process
     process = multiprocessing.get_context("spawn").Process(**asked)
     process.start()
     return process
 
 
+@contextlib.contextmanager
+def _undisturbed() -> Iterator[None]:
+    """What the server begins under: it imports nothing that lies in the folder where the night is run, as a script
+    named reports.py, and leaves Ctrl-C to this process."""
+    before, name = os.environ.get("PYTHONSAFEPATH"), "PYTHONSAFEPATH"
+    os.environ[name] = "1"
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
+
+
+class _Surroundings(NamedTuple):
+    """Environment variables and file mode mask of the process that starts a worker."""
+
+    environ: dict[str, str]
+    mask: int
+
+
+def _surroundings() -> _Surroundings:
+    mask = os.umask(0o77)
+    os.umask(mask)
+    return _Surroundings(dict(os.environ), mask)
+
+
+def _take_on(given: _Surroundings) -> None:
+    """Be in the surroundings of the process that starts this one now, and not of the server when it began; what
+    libraries read as they are imported stays as it was then."""
+    os.environ.clear()
+    os.environ.update(given.environ)
+    os.umask(given.mask)
+    if sys.platform != "win32":
+        time.tzset()
+
+
 def _cause_of_death(status: int | None, limits: WorkerLimits) -> str:
     if status == OUT_OF_TIME:
         return f"took more than {limits.processor_s:g} s of processor time"
+    if status == SERVER_GONE:
+        return "the process that starts workers was ended, as the system does where memory ends"
     if status is None or status >= 0:
         return f"its worker process ended by itself (status {status})"
     name = signal.Signals(-status).name if -status in set(signal.Signals) else f"signal {-status}"
@@ -214,14 +264,12 @@ def _cause_of_death(status: int | None, limits: WorkerLimits) -> str:
 
 def _serve(
     pipe: Connection,
-    surroundings: dict[str, str],
+    surroundings: _Surroundings,
     function: Callable[[Any, Began], Any],
     limits: WorkerLimits,
 ) -> None:
-    """A worker's life: tasks in, results out, until the pipe closes; the environment variables are those of the
-    process that has started it, now, and not when the server began."""
-    os.environ.clear()
-    os.environ.update(surroundings)
+    """A worker's life: tasks in, results out, until the pipe closes."""
+    _take_on(surroundings)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # a library's warning says nothing to an engineer
@@ -251,7 +299,11 @@ def _serve(
 
 
 def _end_with_parent() -> None:
-    """End this process when its parent does, however that ends: at once on Linux, else as a thread sees it."""
+    """End this process when its parent does, however that ends: at once on Linux, else as a thread sees it.
+
+    On Linux the end of the parent's pipe is a signal to this process, which no long call holds up; so is the death of
+    the process that forked it, the parent or a server of the parent's.
+    """
     parent = multiprocessing.parent_process()
 
     def watch() -> None:
@@ -262,10 +314,16 @@ def _end_with_parent() -> None:
     threading.Thread(target=watch, daemon=True).start()
     if sys.platform == "linux":
         import ctypes
+        import fcntl
 
         set_death_signal = 1
         with contextlib.suppress(OSError, AttributeError):
             ctypes.CDLL(None).prctl(set_death_signal, int(signal.SIGKILL))
+        if parent is not None:
+            with contextlib.suppress(OSError):
+                fcntl.fcntl(parent.sentinel, fcntl.F_SETOWN, os.getpid())
+                flags = fcntl.fcntl(parent.sentinel, fcntl.F_GETFL)
+                fcntl.fcntl(parent.sentinel, fcntl.F_SETFL, flags | os.O_ASYNC)
 
 
 def _limit_memory(megabytes: float, machine_share: float) -> None:

@@ -41,6 +41,10 @@ def act(task: tuple[str, ...], began: Began) -> tuple[str, ...]:
                 word = "no memory"
         if word.startswith("$"):
             word = os.environ.get(word[1:], "unset")
+        if word == "mask":
+            word = oct(os.umask(0o22))
+        if word == "computing":
+            sum(range(10**11))  # one call, which lets no thread of this process in
         if word == "wrong":
             raise ValueError("of all things")
         done.append(word)
@@ -118,7 +122,7 @@ from test_workers import LIMITS, act
 from analyzer.night.workers import Workers
 if __name__ == "__main__":
     with Workers(2, act, LIMITS) as workers:
-        workers.submit(("hanging",)); workers.submit(("hanging",))
+        workers.submit(("hanging",)); workers.submit(("computing",))
         workers._feed()
         print(*(w.process.pid for w in workers._workers), flush=True)
         list(workers.results())
@@ -135,7 +139,7 @@ def alive(pid: int) -> bool:
 
 @linux
 def test_workers_end_with_their_parent(tmp_path):
-    """Where the parent is killed with signal 9 its workers are gone, none writes on."""
+    """Where the parent is killed with signal 9 its workers are gone, one within a single long call too."""
     script = tmp_path / "parent.py"
     script.write_text(PARENT)
     command = [sys.executable, str(script), str(Path(__file__).parent)]
@@ -143,6 +147,7 @@ def test_workers_end_with_their_parent(tmp_path):
         assert parent.stdout is not None
         workers = [int(pid) for pid in parent.stdout.readline().split()]
         assert len(workers) == 2
+        time.sleep(2.0)  # until both are at their task
         assert all(alive(pid) for pid in workers)
         parent.kill()
         parent.wait()
@@ -160,6 +165,45 @@ def test_workers_see_the_environment_as_it_is_when_they_start(monkeypatch: pytes
     assert carried_out(("$TRIAGE_SECRET",)) == [("now",)]
     monkeypatch.delenv("TRIAGE_SECRET")
     assert carried_out(("$TRIAGE_SECRET",)) == [("unset",)]
+
+
+@posix
+def test_what_workers_write_has_the_mode_of_now():
+    """The mask for files is that of the process as it starts a worker, not that of the first one ever."""
+    carried_out(("a",))
+    before = os.umask(0o27)
+    try:
+        assert carried_out(("mask",)) == [("0o27",)]
+    finally:
+        os.umask(before)
+
+
+@linux
+@pytest.mark.parametrize("name", ["reports", "tuning"])
+def test_a_script_where_the_night_is_run_is_not_taken_for_ours(tmp_path: Path, name: str):
+    """A file of an engineer's own that is named as one of our packages is neither run nor in the way."""
+    (tmp_path / f"{name}.py").write_text("raise SystemError('run')")
+    script = tmp_path / "elsewhere" / "main.py"
+    script.parent.mkdir()
+    root, here = Path(__file__).parents[2], Path(__file__).parent
+    script.write_text(
+        f"import sys\nsys.path[1:1] = [{str(root)!r}, {str(here)!r}]\nfrom test_workers import carried_out\n"
+        "if __name__ == '__main__':\n    print(carried_out(('a', 'b')))\n"
+    )
+    command = [sys.executable, str(script)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert (done.stdout.strip(), done.stderr) == ("[('a', 'b')]", "")
+
+
+@linux
+def test_without_a_server_workers_start_afresh(monkeypatch: pytest.MonkeyPatch):
+    """A server that dies as it begins costs no worker."""
+
+    def died() -> None:
+        raise EOFError("unexpected EOF")
+
+    monkeypatch.setattr("multiprocessing.forkserver.ensure_running", died)
+    assert sorted(carried_out(("a",), ("b",))) == [("a",), ("b",)]
 
 
 @posix
