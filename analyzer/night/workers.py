@@ -20,7 +20,7 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from multiprocessing import forkserver
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any, Generic, NamedTuple, Self, TypeVar
 
@@ -216,6 +216,7 @@ def _undisturbed() -> Iterator[None]:
     named reports.py, and leaves Ctrl-C to this process."""
     before, name = os.environ.get("PYTHONSAFEPATH"), "PYTHONSAFEPATH"
     os.environ[name] = "1"
+    resource_tracker.ensure_running()  # which unblocks signals as it begins
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

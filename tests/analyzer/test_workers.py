@@ -41,6 +41,8 @@ def act(task: tuple[str, ...], began: Began) -> tuple[str, ...]:
                 word = "no memory"
         if word.startswith("$"):
             word = os.environ.get(word[1:], "unset")
+        if word == "deaf":
+            word = str(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ()))
         if word == "mask":
             word = oct(os.umask(0o22))
         if word == "computing":
@@ -165,6 +167,13 @@ def test_workers_see_the_environment_as_it_is_when_they_start(monkeypatch: pytes
     assert carried_out(("$TRIAGE_SECRET",)) == [("now",)]
     monkeypatch.delenv("TRIAGE_SECRET")
     assert carried_out(("$TRIAGE_SECRET",)) == [("unset",)]
+
+
+@linux
+def test_the_server_hears_no_keyboard_while_it_begins():
+    """Ctrl-C, which reaches all processes of a terminal, is held from the server from its first instruction on, and
+    so from the workers that it forks."""
+    assert carried_out(("deaf",)) == [("True",)]
 
 
 @posix
