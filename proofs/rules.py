@@ -60,7 +60,7 @@ RULES: Mapping[str, Rule] = {
     "tight loops that are robust": ({(cause, "_robust"): _never}, WHOLE),
     "likely valves of compressed trends": ({(cause, "compressed"): _never}, WHOLE),
     "causes of compressed trends": ({(fitness, "compressed"): _never}, WHOLE),
-    "PV that stands and jumps": ({(fitness, "_jumps"): _never}, WHOLE),
+    "PV that stands and jumps": ({(fitness, "pv_that_jumps"): _never}, WHOLE),
     "plays within PV's grid": ({(assess, "hidden_by_grid"): lambda *_: False}, WHOLE),
     "calm loops whose stretches do not agree": ({(cause, "agrees"): _always}, WHOLE),
     "calm loops with one sign": _limits("cause", signs=1),
