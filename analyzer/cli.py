@@ -87,7 +87,7 @@ def rank(
     if groups:
         from analyzer.pages import groups as shared
 
-        click.echo(shared.rendered(*shared.grouped(Store(store), by["night"], top), form))
+        click.echo(shared.rendered_groups(*shared.grouped(Store(store), by["night"], top), form))
         return
     rows, name = ranked(Store(store), **by)
     hidden = () if everything or form in ("csv", "json") else hidden_loops(rows, name)

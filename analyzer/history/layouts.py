@@ -259,9 +259,8 @@ def open_pairs(table: Table, options: ReadOptions) -> Source | None:
 def _groups(table: Table) -> list[tuple[int, list[int]]]:
     """Each column of stamps with the columns behind it up to the next; none where a column has nothing behind it."""
     timed = [_is_time(name) for name in table.names]
-    above = [
-        NUMBERED.sub("", a) != "" and b == "" for a, b in pairwise((*table.names, "."))
-    ]  # a tag, of both
+    # a tag, of both
+    above = [NUMBERED.sub("", a) != "" and b == "" for a, b in pairwise((*table.names, "."))]
     texts = [is_text(kind) or pa.types.is_temporal(kind) for kind in table.types]
     likely = [i for i, may in enumerate(zip(texts, timed, above, strict=True)) if any(may)]
     heads = dict(zip(likely, table.head(likely), strict=True))
@@ -285,9 +284,8 @@ def _paired(table: Table, time: int, beside: Sequence[int], options: ReadOptions
     """The tags that share one clock: those behind it that hold values, with their quality."""
     quality = [i for i in beside if plain(NUMBERED.sub("", table.names[i])) in COLUMNS["quality"]]
     held = [i for i in beside if i not in quality]
-    above = NUMBERED.sub(
-        "", table.names[time]
-    )  # a tag, of which letters behind say nothing, or the time's name
+    # a tag, of which letters behind say nothing, or the time's name
+    above = NUMBERED.sub("", table.names[time])
     clock = stamps_clock(table, time, options, above if plain(above) in COLUMNS["stamp"] else "")
     single = quality[0] if len(quality) == 1 and len(held) == 1 else -1
     return [TagColumn(clock, i, single) for i in held]

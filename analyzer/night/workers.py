@@ -37,8 +37,6 @@ POLL_S = 0.5
 MEGABYTE = 2**20
 OUT_OF_TIME = -int(getattr(signal, "SIGXCPU", 24))
 """Exit status of a worker that used up its processor time."""
-
-
 SERVER_GONE = 255
 """Exit status of workers whose server is gone, which alone knows their own (multiprocessing.popen_forkserver)."""
 

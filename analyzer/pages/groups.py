@@ -62,7 +62,7 @@ def group_row(g: GroupView) -> dict[str, Any]:
     return row_of(told, GROUP_LIST)
 
 
-def rendered(groups: Sequence[GroupView], night: str, form: str) -> str:
+def rendered_groups(groups: Sequence[GroupView], night: str, form: str) -> str:
     """Groups as text in one of the formats."""
     rows = [group_row(g) for g in groups]
     if form == "csv":

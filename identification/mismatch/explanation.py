@@ -44,16 +44,15 @@ from identification.simulation.parameters import Slot
 class Explanation:
     """What was found.
 
-    recorder, controller : what was found about them; p : the problem that the fits solve; plain, best : fits
-    without and with the effects; accepted : the candidates taken, in the order
-    of the best fit's; first : the candidates of the first
-    round; law : the control law recovered; late_s : PV's lateness that was taken out [s]; left : gain of what is
-    left and has no name, 0 where nothing is, and left_by : the way of the reference that foretells it
+    recorder, controller : what was found about them; p : the problem that the fits solve; plain, best : fits without
+    and with the effects; accepted : the candidates taken, in the order of the best fit's; first : the candidates of
+    the first round; law : the control law recovered; late_s : PV's lateness that was taken out [s]; left : gain of
+    what is left and has no name, 0 where nothing is, and left_by : the way of the reference that foretells it
     (reference.py); proof : plain and best on held-out data; refuted : names of effects that explain the fitted part
-    and not the rest; unproven : whether OP moved once, so that nothing is left to prove the effects on; cycles :
-    the faulty valve that the loop's cycles show; others : misfits on other recordings, where some were held out
-    whole; by_innovations : in an experiment, what innovations alone explain; outside : physics of no name that
-    explains it better than any that has one.
+    and not the rest; unproven : whether OP moved once, so that nothing is left to prove the effects on; cycles : the
+    faulty valve that the loop's cycles show; others : misfits on other recordings, where some were held out whole;
+    by_innovations : in an experiment, what innovations alone explain; outside : physics of no name that explains it
+    better than any that has one.
     """
 
     p: Problem = field(repr=False)

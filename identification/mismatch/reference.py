@@ -64,7 +64,7 @@ class LoopSignals:
         return x - lagged(x, REFERENCE.fast * self.lag_s, self.dt_s)
 
 
-def switched(x: Floats, at: float, band: float) -> Floats:
+def on_above(x: Floats, at: float, band: float) -> Floats:
     """1 where x, shape (n,), was last above `at` plus half a band, 0 where it was last below it less half a band."""
     told = np.where(x > at + band / 2.0, 1.0, np.where(x < at - band / 2.0, 0.0, np.nan))
     told[0] = float(x[0] > at)
@@ -76,7 +76,7 @@ def by_level(o: LoopSignals) -> list[Floats]:
     """Gain and load that go with PV's level, and what PV switches."""
     out = [o.response(o.flow * o.pv), o.response(o.flow * o.pv**2), o.pv**2, o.pv**3]
     edges, span = np.quantile(o.pv, REFERENCE.levels[:3]), float(np.ptp(o.pv))
-    return out + [o.response(switched(o.pv, at, band * span)) for at in edges for band in REFERENCE.bands[:2]]
+    return out + [o.response(on_above(o.pv, at, band * span)) for at in edges for band in REFERENCE.bands[:2]]
 
 
 def by_switch(o: LoopSignals) -> list[Floats]:
@@ -85,7 +85,7 @@ def by_switch(o: LoopSignals) -> list[Floats]:
     out = []
     for at in np.quantile(o.flow, REFERENCE.levels):
         for band in REFERENCE.bands:
-            on = switched(o.flow, at, band * span)
+            on = on_above(o.flow, at, band * span)
             out += [o.response(on), o.response(on * (o.flow - at))]
     return out
 

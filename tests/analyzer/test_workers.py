@@ -126,6 +126,8 @@ if __name__ == "__main__":
     with Workers(2, act, LIMITS) as workers:
         workers.submit(("hanging",)); workers.submit(("computing",))
         workers._feed()
+        for worker in workers._workers:
+            worker.pipe.poll(60)  # until it says that it has begun
         print(*(w.process.pid for w in workers._workers), flush=True)
         list(workers.results())
 """
@@ -149,7 +151,7 @@ def test_workers_end_with_their_parent(tmp_path):
         assert parent.stdout is not None
         workers = [int(pid) for pid in parent.stdout.readline().split()]
         assert len(workers) == 2
-        time.sleep(2.0)  # until both are at their task
+        time.sleep(0.2)
         assert all(alive(pid) for pid in workers)
         parent.kill()
         parent.wait()

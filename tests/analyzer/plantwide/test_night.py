@@ -163,4 +163,4 @@ def test_list_and_page_say_one_confidence():
     night = {"cause": "valve", "action": "repair valve", "kp_new": None, "ti_new": None}
     group = GroupView("1", ({**known, "loop": "A"},), {"A": night})
     assert "A 63 %" in [cell.text for cell in groups.morning_table([group], False).rows[0]]
-    assert all("A 63 %" in groups.rendered([group], "N", form) for form in ("table", "markdown"))
+    assert all("A 63 %" in groups.rendered_groups([group], "N", form) for form in ("table", "markdown"))

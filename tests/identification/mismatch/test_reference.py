@@ -7,7 +7,7 @@ import pytest
 
 from identification.limits import LIMITS
 from identification.mismatch.plain_loop import inputs_of, prepared
-from identification.mismatch.reference import Foretold, foretold, switched
+from identification.mismatch.reference import Foretold, foretold, on_above
 from proofs.concealed.plant import Plant
 from proofs.experiments import drawn
 from tests.proofs.concealed.sealed_loop import PLANT, N, recording
@@ -77,4 +77,4 @@ def test_the_errors_of_an_experiment_s_simulation_are_not_foretold() -> None:
 def test_a_switch_remembers_where_it_was_last() -> None:
     """Between its ends a switch stands as it was, by hand."""
     x = np.array([0.0, 2.0, 0.6, -0.4, -2.0, 0.4, 0.9, 1.1])
-    assert switched(x, 0.0, 2.0).tolist() == [0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+    assert on_above(x, 0.0, 2.0).tolist() == [0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0]
