@@ -1,0 +1,123 @@
+"""Cause, fault and settings on loops of another hand: python -m benchmarks.world --seed 1 --each 8 [--ways
+plain ...]"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from analyzer.config import Config
+from analyzer.history.export import open_export
+from analyzer.loops.spec import LoopSpec
+from analyzer.night import batch
+from analyzer.night.nights import Plant
+from analyzer.store.store import Store
+from benchmarks.world.draw import KINDS, Drawn, drawn, run
+from benchmarks.world.recorder import Recording, recorded
+from proofs.common import command_line, table
+
+START_US = 1_772_409_600_000_000
+COLUMNS = (
+    *(
+        "loop",
+        "status",
+        "cause",
+        "valve_fault",
+        "action",
+        "oscillating_pct",
+        "period_s",
+        "backlash_pct",
+        "stickband_pct",
+    ),
+    *(
+        "osc_valve_pct",
+        "osc_tuning_pct",
+        "osc_load_pct",
+        "kp_new",
+        "ti_new",
+        "reason",
+        "gain",
+        "time_constant_s",
+    ),
+    *("dead_time_s", "slope_pct_per_s", "advice"),
+)
+
+
+def export(folder: Path, records: dict[str, Recording]) -> list[Path]:
+    """One wide file a loop."""
+    for name, r in records.items():
+        stamp = (START_US + np.round(r["stamp_s"] * 1e6)).astype("datetime64[us]")
+        columns = {f"{name}.{role.upper()}": r[role] for role in ("sp", "pv", "op")}
+        pq.write_table(pa.table({"timestamp": stamp, **columns}), folder / f"{name}.parquet")
+    return sorted(folder.glob("*.parquet"))
+
+
+def spec_of(d: Drawn) -> LoopSpec:
+    """The loop as loops.csv states it."""
+    tags = {role: f"{d.name}.{role.upper()}" for role in ("sp", "pv", "op")}
+    c = d.controller
+    return LoopSpec(d.name, pv_lo=0.0, pv_hi=100.0, kp=c.kp, ti=c.ti_s, scan_s=c.scan_s, **tags)
+
+
+def told(loops: list[Drawn], records: dict[str, Recording], jobs: int) -> dict[str, dict[str, Any]]:
+    """Rows of the night by loop."""
+    with tempfile.TemporaryDirectory() as folder:
+        files = export(Path(folder), records)
+        store = Store(Path(folder) / "store")
+        batch.run(Plant(open_export(files), tuple(map(spec_of, loops)), Config()), store, jobs)
+        return {r["loop"]: r for r in store.own_rows("nights", store.nights()[-1], COLUMNS)}
+
+
+def right(d: Drawn, row: dict[str, Any]) -> bool:
+    """Whether cause and fault are those of the truth."""
+    if d.kind == "healthy":
+        return row["valve_fault"] in ("none", None) and row["cause"] == "none"
+    if d.kind in ("backlash", "stiction"):
+        return row["cause"] == "valve"
+    if d.kind == "worn-sine":
+        return row["cause"] in ("load", "valve") and row["valve_fault"] not in ("none", None)
+    return row["cause"] == d.cause
+
+
+def line(d: Drawn, row: dict[str, Any], said: str) -> str:
+    """One loop's truth and what was said of it."""
+    p, c = d.process, d.controller
+    true = f"Ms {d.ms:.1f} P {d.period_s:.0f} L {p.dead_s:.0f} T {p.lag_s:.0f} kp {c.kp:.3g} ti {c.ti_s:.3g}"
+    valve = f"band {d.valve.band:.2g} moves {d.moves:.0f}"
+    shares = "/".join(f"{row[f'osc_{cause}_pct'] or 0:.0f}" for cause in ("valve", "tuning", "load"))
+    seen = f"osc {row['oscillating_pct']} P {row['period_s']} v/t/l {shares}"
+    return f"{d.name} {true} {valve}: {said} {row['action']} {seen} {row['reason']}"
+
+
+def main() -> None:
+    """Draw, record, assess, count."""
+    asked = command_line(__doc__, seed=[1], each=8, ways=["plain"], jobs=2, kinds=list(KINDS), show=False)
+    for way in asked.ways:
+        counts: dict[str, Counter[str]] = {k: Counter() for k in asked.kinds}
+        for seed in asked.seed:
+            loops = drawn(seed, asked.each, tuple(asked.kinds))
+            records = {d.name: recorded(run(d), way, d.seed) for d in loops}
+            rows = told(loops, records, asked.jobs)
+            for d in loops:
+                row = rows[d.name]
+                said = f"{row['cause']}/{row['valve_fault']}" if row["status"] == "ok" else row["status"]
+                counts[d.kind][said] += 1
+                counts[d.kind]["right"] += right(d, row)
+                if asked.show and not right(d, row):
+                    print(f"{seed} {line(d, row, said)}", file=sys.stderr)
+        n = asked.each * len(asked.seed)
+        print(f"\n{way}\n")
+        print(
+            table("kind|right|answers", [(k, f"{c.pop('right')} of {n}", dict(c)) for k, c in counts.items()])
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,231 @@
+"""Loops drawn at random with their truth: what makes each cycle, and what a perfect repair or retune would change."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.signal import lfilter
+
+from benchmarks.world.simulate import (
+    BACKLASH,
+    HE,
+    KANO,
+    KARNOPP,
+    Controller,
+    Floats,
+    Process,
+    Trends,
+    Valve,
+    sensitivity,
+    simulate,
+)
+
+KINDS = ("backlash", "stiction", "tight", "load", "healthy", "worn-sine")
+HOURS = 24
+SWELL = 1.5
+"""Spread of the error over that without the fault from which a loop shows it."""
+RETURN = 0.35
+"""First returning peak of the error's autocorrelation from which it does."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A loop with its truth: kind as in KINDS; period_s of the cycle, 0 where there is none; ms, largest
+    sensitivity of the linear loop; swell as SWELL; seed."""
+
+    name: str
+    kind: str
+    process: Process
+    controller: Controller
+    valve: Valve
+    seed: int
+    ms: float
+    period_s: float
+    swell: float
+    moves: float
+
+    @property
+    def cause(self) -> str:
+        """What `cause` should say."""
+        return {"backlash": "valve", "stiction": "valve", "tight": "tuning", "healthy": "none"}.get(
+            self.kind, "load"
+        )
+
+    @property
+    def fault(self) -> str:
+        """What `valve_fault` should say."""
+        if self.valve.kind == BACKLASH:
+            return "backlash"
+        return "stiction" if self.valve.kind else "none"
+
+
+def wander(rng: np.random.Generator, n: int, corner_s: float, h: float) -> Floats:
+    """White noise through one lag, of variance 1, shape (n,)."""
+    pole = math.exp(-h / corner_s)
+    start = rng.standard_normal()
+    white = rng.standard_normal(n) * math.sqrt(1 - pole**2)
+    return np.asarray(lfilter([1.0], [1.0, -pole], white, zi=[pole * start])[0])
+
+
+def _process(rng: np.random.Generator, kind: str) -> Process:
+    """A lag, two lags, an integrator, or one with a small inverse response."""
+    dead = float(np.exp(rng.uniform(math.log(3), math.log(60))))
+    form = rng.choice(["lag", "two", "level", "inverse"], p=[0.45, 0.25, 0.22, 0.08])
+    ratio = float(np.exp(rng.uniform(math.log(1.2), math.log(25))))
+    gain = float(np.exp(rng.uniform(math.log(0.4), math.log(2.5))))
+    if form == "level":
+        return Process(gain / (ratio * dead * 4), 0.0, 0.2 * dead * (rng.random() < 0.5), dead)
+    second = dead * rng.uniform(0.2, 0.8) if form == "two" else 0.0
+    return Process(gain, ratio * dead, second, dead, -0.3 * dead if form == "inverse" else 0.0)
+
+
+def _nominal(p: Process, scan_s: float) -> tuple[float, float]:
+    """SIMC settings with tau_c = dead time (Skogestad 2003), half rule for the second lag."""
+    late = p.dead_s + 0.5 * p.second_s + max(-p.lead_s, 0.0) + 0.5 * scan_s
+    lag = p.lag_s + 0.5 * p.second_s
+    if p.lag_s <= 0:
+        return 1 / (p.gain * 2 * late), 8 * late
+    return lag / (p.gain * 2 * late), min(lag, 8 * late)
+
+
+def _settings(rng: np.random.Generator, kind: str, p: Process) -> Controller | None:
+    """Settings of a kind; None where those drawn are of none."""
+    scan = 1.0
+    kp, ti = _nominal(p, scan)
+    if kind == "tight":
+        way = rng.choice(["gain", "ti", "both"])
+        more = rng.uniform(2.2, 3.6)
+        c = Controller(
+            kp * (more if way != "ti" else 1.0), ti / (1.0 if way == "gain" else rng.uniform(3, 14)), scan
+        )
+        ms = sensitivity(p, c)[0]
+        return c if 3.8 <= ms <= 9 else None
+    if kind in ("backlash", "stiction"):
+        c = Controller(kp * rng.uniform(0.5, 1.1), ti * rng.uniform(0.15, 1.0), scan)
+    else:
+        c = Controller(kp * rng.uniform(0.4, 1.0), ti * rng.uniform(0.9, 2.0), scan)
+    return c if sensitivity(p, c)[0] <= 2.3 else None
+
+
+def loads(d: Drawn, n: int, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
+    """Load before and behind the process, and noise, shape (n,) each."""
+    h = d.controller.scan_s
+    scale = d.process.dead_s + d.process.second_s
+    corner = float(np.exp(rng.uniform(math.log(2 * scale), math.log(600 * scale))))
+    size = float(np.exp(rng.uniform(math.log(0.15), math.log(0.8))))
+    before = size * wander(rng, n, corner, h)
+    if rng.random() < 0.4:
+        at = rng.integers(0, n, 4)
+        for k in at:
+            before[k:] += rng.normal() * size * 2
+    noise = float(np.exp(rng.uniform(math.log(0.01), math.log(0.08)))) * rng.standard_normal(n)
+    behind = np.zeros(n)
+    if d.kind in ("load", "worn-sine"):
+        period = d.period_s
+        phase = 2 * math.pi * np.arange(n) * h / period
+        if d.kind == "load" and rng.random() < 0.4:  # a neighbour's cycle wanders
+            phase = phase + 0.15 * np.cumsum(rng.standard_normal(n)) * math.sqrt(h / period) * 2
+        wave = np.sin(phase)
+        if d.kind == "load" and rng.random() < 0.3:
+            wave = np.clip(2.0 * wave, -1, 1)
+        before = before + (3.0 if d.kind == "load" else 2.0) * max(size, 0.4) * wave
+    return before, behind, noise
+
+
+def set_point(d: Drawn, n: int, rng: np.random.Generator) -> Floats:
+    """Set point with d.moves steps a day, shape (n,)."""
+    sp = np.full(n, 50.0)
+    for k in np.sort(rng.integers(int(0.05 * n), n, int(d.moves))):
+        sp[k:] = 50.0 + rng.uniform(-5, 5)
+    return sp
+
+
+def run(
+    d: Drawn,
+    day: int = 0,
+    hours: float = HOURS,
+    settings: Controller | None = None,
+    valve: Valve | None = None,
+) -> Trends:
+    """One day of a loop: other days have other loads; with other settings or another valve on the same load."""
+    n = int(hours * 3600 / d.controller.scan_s)
+    rng = np.random.default_rng([d.seed, day])
+    before, behind, noise = loads(d, n, rng)
+    sp = set_point(d, n, rng)
+    return simulate(
+        d.process, settings or d.controller, d.valve if valve is None else valve, sp, before, behind, noise
+    )
+
+
+def returning(e: Floats) -> float:
+    """First peak of the autocorrelation behind its first zero."""
+    x = e - e.mean()
+    f = np.abs(np.fft.rfft(x, 2 * x.size)) ** 2
+    r = np.fft.irfft(f)[: x.size // 3]
+    r = r / max(r[0], 1e-30)
+    below = np.flatnonzero(r < 0)
+    return float(r[below[0] :].max()) if below.size else 0.0
+
+
+def _period(e: Floats, h: float) -> float:
+    """Period of the first returning peak of the autocorrelation [s], 0 where there is none."""
+    x = e - e.mean()
+    r = np.fft.irfft(np.abs(np.fft.rfft(x, 2 * x.size)) ** 2)[: x.size // 3]
+    below = np.flatnonzero(r < 0)
+    if not below.size:
+        return 0.0
+    k = below[0] + int(np.argmax(r[below[0] : below[0] * 6]))
+    return float(k * h)
+
+
+def _valve(rng: np.random.Generator, kind: str) -> Valve:
+    band = float(np.exp(rng.uniform(math.log(0.8), math.log(6.0))))
+    if kind in ("backlash", "worn-sine"):
+        return Valve(BACKLASH, band)
+    if kind == "stiction":
+        return Valve(int(rng.choice([HE, KANO, KARNOPP])), band, band * rng.uniform(0.3, 1.0))
+    return Valve()
+
+
+def one(seed: int, kind: str, name: str) -> Drawn | None:
+    """A loop of a kind, None where what was drawn does not show it plainly (or, healthy, swings)."""
+    rng = np.random.default_rng([seed, KINDS.index(kind)])
+    p = _process(rng, kind)
+    c = _settings(rng, kind, p)
+    if c is None:
+        return None
+    ms, resonance = sensitivity(p, c)
+    valve = _valve(rng, kind)
+    moves = float(rng.choice([0, 0, 2, 8]))
+    d = Drawn(name, kind, p, c, valve, seed, ms, resonance, 1.0, moves)
+    if kind in ("load", "worn-sine"):
+        d = replace(d, period_s=float(resonance * np.exp(rng.uniform(math.log(0.8), math.log(6)))))
+    if kind == "healthy":
+        return replace(d, period_s=0.0)
+    ours = run(d)
+    e = ours.pv - ours.sp
+    if kind in ("backlash", "stiction"):
+        without = run(d, valve=Valve())
+        swell = float(np.std(e) / max(np.std(without.pv - without.sp), 1e-9))
+        if swell < SWELL or returning(e) < RETURN:
+            return None
+        return replace(d, swell=swell, period_s=_period(e, c.scan_s))
+    if kind == "tight":
+        return d if returning(e) >= RETURN else None
+    return d if returning(e) >= RETURN else None
+
+
+def drawn(seed: int, each: int, kinds: tuple[str, ...] = KINDS) -> list[Drawn]:
+    """So many loops of each kind."""
+    found: list[Drawn] = []
+    for kind in kinds:
+        have, k = 0, 0
+        while have < each:
+            d = one(1000 * seed + k, kind, f"{kind.upper()}{have:03d}")
+            k += 1
+            if d is not None:
+                found.append(d)
+                have += 1
+    return found

@@ -1,0 +1,40 @@
+"""What a historian keeps of a loop: everyday ways of recording that leave the fault as it is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.world.simulate import Floats, Trends
+
+Recording = dict[str, Floats]
+"""stamp_s [s from the start], sp, pv, op, shape (m,) each."""
+WAYS = ("plain", "every 5 s", "every 10 s", "rounded", "rows missing", "late stamps", "averages")
+
+
+def plain(t: Trends, every: int = 1) -> Recording:
+    """Snapshots of every so many scans."""
+    k = np.arange(0, t.pv.size, every)
+    return {"stamp_s": k * t.scan_s, "sp": t.sp[k], "pv": np.round(t.pv[k], 4), "op": np.round(t.op[k], 4)}
+
+
+def recorded(t: Trends, way: str, seed: int) -> Recording:
+    """A loop's trends kept in one of WAYS."""
+    rng = np.random.default_rng(seed)
+    if way.startswith("every"):
+        return plain(t, int(way.split()[1]))
+    r = plain(t)
+    if way == "rounded":
+        return {**r, "pv": np.round(r["pv"], 1), "op": np.round(r["op"], 1)}
+    if way == "rows missing":
+        keep = rng.random(r["pv"].size) > 0.03
+        return {name: x[keep] for name, x in r.items()}
+    if way == "late stamps":
+        late = rng.random(r["pv"].size) < 0.12
+        return {**r, "stamp_s": r["stamp_s"] + 0.6 * late}
+    if way == "averages":
+        m = r["pv"].size // 5 * 5
+        return {
+            name: (x[:m].reshape(-1, 5).mean(axis=1) if name != "stamp_s" else x[:m:5])
+            for name, x in r.items()
+        }
+    return r

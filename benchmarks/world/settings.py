@@ -1,0 +1,73 @@
+"""Advice taken: new settings typed in on the true plant under the same load: python -m
+benchmarks.world.settings --seed 1"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from benchmarks.world.__main__ import told
+from benchmarks.world.draw import Drawn, drawn, run
+from benchmarks.world.recorder import recorded
+from benchmarks.world.simulate import Controller, sensitivity
+from proofs.common import command_line, table
+
+
+def outcome(d: Drawn, new: Controller) -> tuple[float, float, float, float]:
+    """Error and stem travel of a day over those before, maximum sensitivity before and after, all [-]."""
+    old, ours = run(d), run(d, settings=new)
+    error = [float(np.mean(np.abs(t.pv - t.sp))) for t in (old, ours)]
+    travel = [float(np.abs(np.diff(t.stem)).sum()) for t in (old, ours)]
+    return error[1] / error[0], travel[1] / max(travel[0], 1e-9), d.ms, sensitivity(d.process, new)[0]
+
+
+def verdict(error: float, travel: float) -> str:
+    """Cured, better, none or harm: cured where travel or error falls by 30 % and neither rises by 15 %."""
+    if max(error, travel) > 1.15:
+        return "harm"
+    return "cured" if min(error, travel) <= 0.7 else "better" if min(error, travel) <= 0.95 else "none"
+
+
+def line(d: Drawn, row: dict[str, Any], found: tuple[float, ...] | None) -> str:
+    """What was advised and what came of it."""
+    c, p = d.controller, d.process
+    process = f"K {p.gain:.3g} T {p.lag_s:.0f}+{p.second_s:.0f} L {p.dead_s:.0f}"
+    what = f"{d.name} {process} Kp {c.kp:.3g} Ti {c.ti_s:.0f} Ms {d.ms:.1f}"
+    if found is None:
+        return f"{what}: {row['cause']} {row['action']} {row['reason']} | {row['advice']}"
+    error, travel, _, ms = found
+    new = f"{row['kp_new']:.3g} {row['ti_new']:.0f}"
+    return f"{what}: {new} error {error:.2f} travel {travel:.2f} Ms {ms:.2f} {verdict(error, travel)}"
+
+
+def main() -> None:
+    """Draw, record, assess, type in, count."""
+    asked = command_line(__doc__, seed=[1], each=8, way="plain", jobs=2, kinds=["tight"], show=False)
+    rows, n = [], asked.each * len(asked.seed)
+    for kind in asked.kinds:
+        found: list[tuple[float, ...]] = []
+        for seed in asked.seed:
+            loops = drawn(seed, asked.each, (kind,))
+            told_of = told(loops, {d.name: recorded(run(d), asked.way, d.seed) for d in loops}, asked.jobs)
+            for d in loops:
+                row, came = told_of[d.name], None
+                if row["kp_new"] is not None:
+                    came = outcome(d, replace(d.controller, kp=row["kp_new"], ti_s=row["ti_new"]))
+                    found.append(came)
+                if asked.show:
+                    print(line(d, row, came), file=sys.stderr)
+        said = [verdict(e, t) for e, t, *_ in found]
+        a = np.array(found).reshape(-1, 4)
+        middle = [f"{100 * (np.median(a[:, k]) - 1):+.0f}" if found else "" for k in (0, 1)]
+        worst = f"{100 * (a[:, 0].max() - 1):+.0f}" if found else ""
+        ms = f"{a[:, 3].max():.2f}" if found else ""
+        rows.append((kind, n, len(found), said.count("cured"), said.count("harm"), *middle, worst, ms))
+    heads = "kind|loops|new settings|cured|harm|error, median %|stem travel, median %|worst error %|largest Ms after"
+    print(table(heads, rows, True))
+
+
+if __name__ == "__main__":
+    main()
