@@ -103,6 +103,10 @@ class FrictionLimits(Limits, section="friction"):
     """Where stems that stick are sought for an explanation, and how long one holds its place."""
 
 
+class SmoothLimits(Limits, section="smooth"):
+    """How a process is fitted under a load that is smooth, and under one that has a line."""
+
+
 class StartLimits(Limits, section="starts"):
     """Where effects begin that are found by what the plain loop leaves."""
 
@@ -125,5 +129,5 @@ LIMITS = ExplainLimits()
 """The limits where none are given."""
 FIT, SLIPS, STEM, INTERVALS = FitLimits(), SlipLimits(), StemLimits(), IntervalLimits()
 LAW, LOCATION, REFERENCE, SIGNALS = LawLimits(), LocationLimits(), ReferenceLimits(), SignalLimits()
-FRICTION, STARTS = FrictionLimits(), StartLimits()
+FRICTION, STARTS, SMOOTH = FrictionLimits(), StartLimits(), SmoothLimits()
 """Numbers of a method, the same for every plant: no plant has reasons of its own to change them."""

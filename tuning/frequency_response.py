@@ -168,6 +168,14 @@ def maximum_sensitivity(loop: Loop) -> float:
     return 1.0 / float(_least_distance(process, c.kp, law, omega * c.scan_s))
 
 
+def resonance_s(loop: Loop) -> float:
+    """Period [s] at which the loop's linear part amplifies loads most: of the largest abs(1/(1 + L)) that is a
+    peak, or of the largest where none is."""
+    omega = frequencies(loop, LOOKED_AT, lowest=1e-2)
+    size = 1.0 / np.abs(1.0 + loop_response(loop, omega))
+    return float(2.0 * math.pi / omega[int(np.argmax(size))])
+
+
 @njit(cache=True)
 def _least_distance(process: Scanned, kp: float, law: tuple[float, float], angles: Floats) -> float:
     """Least distance of the sampled loop's response to -1 over some angles [rad] of z, shape (m,)."""

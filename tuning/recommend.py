@@ -81,12 +81,14 @@ def recommend(
     uncertainty: Sequence[Loop] = (),
     load: Floats | None = None,
     limits: TuningLimits = LIMITS,
+    error: float | None = None,
 ) -> Proposal:
     """The proposal for one loop: identified process and valve with the present controller.
 
     cause, why the loop is in trouble, one of tuning.Cause, ValueError for any other; uncertainty, other loops that
     the data allow; load, load and noise as they add to PV, on the controller's clock, shape (n,) [% PV], ValueError
-    where it is not finite; None, or one too short to tell (tuning.limits): steps at the valve.
+    where it is not finite; None, or one too short to tell (tuning.limits): steps at the valve; error, the recorded
+    average absolute error [% PV], which a loop that is hardly stable is simulated too badly to tell, None: simulated.
     """
     _check(cause, load)
     if cause not in (Cause.VALVE, Cause.TUNING):
@@ -95,11 +97,19 @@ def recommend(
     if kp * slope <= 0.0:
         return Proposal(Action.CHECK_SETTINGS, WHY["wrong_sign"].format(kp=kp, slope=slope))
     load = None if load is None or load.size < limits.least_steps else load
-    return (_tight if cause == Cause.TUNING else _valve)(loop, uncertainty, load, limits)
+    if cause == Cause.TUNING:
+        return _tight(loop, uncertainty, load, limits, error)
+    return _valve(loop, uncertainty, load, limits)
 
 
-def _tight(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: TuningLimits) -> Proposal:
-    """SIMC for a loop that swings by its tuning: the nominal, or on a known load the one of least error."""
+def _tight(
+    loop: Loop, others: Sequence[Loop], load: Floats | None, limits: TuningLimits, error: float | None = None
+) -> Proposal:
+    """SIMC for a loop that rings by its tuning: the nominal, or on a known load the one of least error.
+
+    The aim is robustness, and a rise of the error up to tight_price is its price; where robust settings cost
+    more, a first step towards them is proposed.
+    """
     now = maximum_sensitivity(loop)
     if now <= limits.ms_most:
         return Proposal(Action.UNDECIDED, WHY["robust"].format(ms=robustness(now)), ms_before=now)
@@ -109,17 +119,57 @@ def _tight(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
         return Proposal(Action.UNDECIDED, why, ms_before=now)
     new, ms = found[0]
     if load is not None:
-        load = in_digits(load)
-        new, ms = min(found, key=lambda pair: mean_error((loop, *others), pair[0], load))
-        left = max(
-            mean_error((one,), new, load) / max(mean_error((one,), one.controller, load), 1e-9)
-            for one in (loop, *others)
-        )
-        if left > 1.0 - limits.worth_error:
-            return Proposal(Action.UNDECIDED, little_less_error(left, now), ms_before=now)
+        cases = _Cases((loop, *others), in_digits(load), error)
+        new, ms = min(found, key=lambda pair: cases.mean(pair[0]))
+        left = cases.worst(new)
+        if left > limits.tight_price:
+            return _first_step(cases, new, now, left, limits)
     known = {"old": settings(loop.controller), "new": settings(new), "ms": robustness(ms)}
     was = robustness(now) + " on the identified process" * math.isinf(now)
-    return Proposal(Action.RETUNE, WHY["tight"].format(was=was, **known), new, ms_before=now, ms=ms)
+    why = WHY["tight"].format(was=was, **known)
+    if load is not None and left > 1.0:
+        why = f"{why} {WHY['tight_price'].format(size=100.0 * (left - 1.0))}"
+    return Proposal(Action.RETUNE, why, new, ms_before=now, ms=ms)
+
+
+@dataclass(frozen=True, slots=True)
+class _Cases:
+    """What settings are tried on: loops that the data allow, one load in digits [% PV], and the present error on it
+    [% PV], None: as simulated."""
+
+    loops: tuple[Loop, ...]
+    load: Floats
+    error: float | None
+
+    def mean(self, new: Pid) -> float:
+        """Mean error of the loops with a controller [% PV]."""
+        return mean_error(self.loops, new, self.load)
+
+    def worst(self, new: Pid) -> float:
+        """Error with a controller over the present one, on the loop on which it is largest [-]."""
+        return max(
+            mean_error((one,), new, self.load)
+            / max(self.error or mean_error((one,), one.controller, self.load), 1e-9)
+            for one in self.loops
+        )
+
+
+def _first_step(cases: _Cases, robust_one: Pid, now: float, left: float, limits: TuningLimits) -> Proposal:
+    """Settings between the present and robust ones that cost no more than the price allowed, the most robust of them;
+    none where they win too little robustness."""
+    loop, old = cases.loops[0], cases.loops[0].controller
+    gains, times = robust_one.kp / old.kp, robust_one.ti_s / integral_s(old)
+    for share in (0.8, 0.6, 0.4):
+        kp, ti = old.kp * gains**share, integral_s(old) * times**share
+        new = replace(old, kp=rounded(kp), ti_s=rounded(ti))
+        ms = maximum_sensitivity(replace(loop, controller=new))
+        if ms > limits.step_ms or not math.isfinite(ti):
+            break
+        if cases.worst(new) <= limits.tight_price:
+            known = {"ms": robustness(now), "robust": settings(robust_one), "size": 100.0 * (left - 1.0)}
+            why = WHY["first_step"].format(new=settings(new), now=robustness(ms), **known)
+            return Proposal(Action.RETUNE, why, new, ms_before=now, ms=ms)
+    return Proposal(Action.UNDECIDED, little_less_error(left, now), ms_before=now)
 
 
 def _simc_settings(
@@ -127,8 +177,8 @@ def _simc_settings(
 ) -> list[tuple[Pid, float]]:
     """SIMC settings with their Ms from the `first` step of the closed-loop time constant on, all samples robust.
 
-    The loop's own time constant and the shortest of its samples' give the integral times. A derivative stays as it
-    is, for nobody is told to switch it off.
+    The loop's own time constant and the shortest of its samples' give the integral times. The gain of a loop
+    that rings is not raised. A derivative stays as it is, for nobody is told to switch it off.
     """
     h = scan_step(loop)
     tau_c = METHOD.tau_c_per_delay * effective_delay(loop.process, h)
@@ -138,7 +188,8 @@ def _simc_settings(
     for k in range(first, limits.slower_most):
         nominal = simc(loop.process, tau_c * limits.slower**k, h)
         for ti in dict.fromkeys((nominal.ti_s, min([nominal.ti_s, *lags]))):
-            new = replace(loop.controller, kp=rounded(nominal.kp), ti_s=rounded(ti))
+            kp = math.copysign(min(abs(nominal.kp), abs(loop.controller.kp)), nominal.kp)
+            new = replace(loop.controller, kp=rounded(kp), ti_s=rounded(ti))
             ms = robust((loop, *others), new, most)
             found += [] if ms is None else [(new, ms)]
         if len(found) >= limits.enough:

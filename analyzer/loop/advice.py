@@ -6,11 +6,12 @@ import math
 from dataclasses import dataclass, field, replace
 
 from analyzer.config import AdviceLimits, Config
+from analyzer.loop.agreement import agreement
 from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
 from analyzer.loop.decisions import Action, Cause, Due, Lack, Need, Needs
 from analyzer.loop.fitness import too_thin
-from analyzer.loop.identified import cautious, load_of, tuned, uncertain
+from analyzer.loop.identified import cautious, load_of, recorded_error, tuned, uncertain
 from analyzer.loop.oscillation import counting
 from analyzer.loop.settings_side_by_side import Comparison, compared
 from analyzer.loops.spec import LoopSpec
@@ -224,7 +225,8 @@ def _for_tuning(verdict: Verdict, loop: Loop, period_s: float | None, config: Co
     slow = replace(loop, process=cautious(fit.process, period_s))
     others = (loop, *uncertain(fit, loop)[:2])
     load = load_of(fit, loop.controller)
-    return Proposed(recommend(slow, verdict.cause, others, load, config.tuning), loop, load, others)
+    error = recorded_error(fit, loop.controller)
+    return Proposed(recommend(slow, verdict.cause, others, load, config.tuning, error), loop, load, others)
 
 
 def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Config) -> Proposed:
@@ -235,6 +237,10 @@ def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Con
     if rests and math.isinf(integral_s(loop.controller)):
         return Proposed(Proposal(Action.CHECK_SETTINGS, SAID["no_integral"]))
     load = load_of(fit, loop.controller)
+    if period_s is not None and load.size >= config.tuning.least_steps:
+        apart = agreement(sought, fit, load, period_s).worst(config.advice)
+        if apart is not None:
+            return Proposed(Proposal(Action.UNDECIDED, SAID["disagrees"].format(*apart)))
     return Proposed(recommend(sought, verdict.cause, others, load, config.tuning), sought, load, others)
 
 

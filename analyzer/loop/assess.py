@@ -27,10 +27,11 @@ from analyzer.loop.cause import (
 from analyzer.loop.decisions import Cause, Lack, LacksError, Need, Needs
 from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
 from analyzer.loop.judged_stretch import Earlier, Stretch, differing, judged_stretch
-from analyzer.loop.measure import Measured, measure, time_scale
+from analyzer.loop.measure import Measured, measure, ringing_period, time_scale
 from analyzer.loop.oscillation import Oscillation, Oscillations, barely_seen, counting, detect
 from analyzer.loop.page_trends import BUCKETS, FINE_BUCKETS, close_view, thinned
 from analyzer.loop.quality import Prepared
+from analyzer.loop.ringing import same_period
 from analyzer.loop.setpoint_moves import Move, moves
 from analyzer.loop.shared_valve import Shared
 from analyzer.plantwide.wave import Wave, waves_of
@@ -124,18 +125,34 @@ def convicted(
     prepared: Prepared, found: Oscillations, controller: Pid | None, config: Config, kind: str
 ) -> tuple[Oscillations, Verdict]:
     """What oscillates, of `found` what counts by itself, and why: a cycle that alone is not regular enough to count
-    does so where PV convicts the valve of making it, for noise of no spectrum fits a valve's model."""
+    does so where the identified loop, or its valve, is seen to make it."""
     verdict = cause_of(prepared, found, controller, config, kind)
     quiet = verdict.measured
     if counting(found) is not None or not prepared.op_known or quiet is None:
         return found, verdict
-    if quiet.evidence < config.cause.near_evidence:
+    if quiet.evidence >= config.cause.near_evidence:
+        near = detect(prepared.record, config.oscillation.nearly())
+        if counting(near) is not None:
+            told = cause_of(prepared, near, controller, config, kind)
+            if _made_by_valve(told, config.cause):
+                return near, told
+    period_s = ringing_period(quiet, config.cause)
+    if period_s is None:
         return found, verdict
-    near = detect(prepared.record, config.oscillation.nearly())
-    if counting(near) is None:
-        return found, verdict
+    return _rung(prepared, period_s, controller, config, kind) or (found, verdict)
+
+
+def _rung(
+    prepared: Prepared, period_s: float, controller: Pid | None, config: Config, kind: str
+) -> tuple[Oscillations, Verdict] | None:
+    """What oscillates and why in a loop whose identified model rings at a period [s]; None where the error
+    does not."""
+    near = detect(prepared.record, config.oscillation.nearly(), whole=True)
+    first = counting(near)
+    if first is None or not same_period(first.period_s, period_s, config.cause):
+        return None
     told = cause_of(prepared, near, controller, config, kind)
-    return (near, told) if _made_by_valve(told, config.cause) else (found, verdict)
+    return (near, told) if told.cause is Cause.TUNING else None
 
 
 def _made_by_valve(verdict: Verdict, limits: CauseLimits) -> bool:

@@ -37,10 +37,12 @@ from analyzer.loop.identified import sensitivity
 from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
+from analyzer.loop.ringing import Ringing
 from identification.errors import NotAssessedError
 from identification.estimation.gauss_newton import descend
 from identification.estimation.irregular_slips import SlipPath, fit_irregular, path_evidence
 from identification.estimation.noise import generic_noise
+from identification.estimation.smooth_load import as_fit
 from identification.estimation.window import Fit
 from identification.limits import FIT
 from identification.record import LoopRecord
@@ -174,6 +176,9 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
     """
     if oscillation is None:
         return _quiet(m, limits)
+    bounded = m.kurtosis < limits.kept_size and m.saturated < limits.held
+    if m.ringing is not None and m.ringing.is_tight(m.evidence, bounded, limits):
+        return _rings(m, m.ringing, oscillation, limits)
     seen = measures(m, oscillation)
     if not np.isfinite(seen).all():
         return replace(not_assessed(None), measured=m)
@@ -185,6 +190,21 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
     cause = first if confidence[first] >= _least(first, m, limits) else Cause.UNDECIDED
     fault = fault_of(m, limits) if cause is Cause.VALVE else Fault.NONE
     return Verdict(cause, confidence, fault, signs_of(m, oscillation, seen), measured=m)
+
+
+def _rings(m: Measured, ringing: Ringing, oscillation: Oscillation, limits: CauseLimits) -> Verdict:
+    """The verdict on a loop that rings by itself; its process is the one under a smooth load, for a free noise
+    model takes the ringing for the load's."""
+    clear = min(max(1.0 - ringing.line_nat / ringing.line_needed(limits), 0.0), 1.0)
+    pct = limits.named_pct + (limits.ringing_pct - limits.named_pct) * clear
+    rest = 0.5 * (100.0 - pct)
+    confidence = {Cause.VALVE: rest, Cause.TUNING: pct, Cause.LOAD: rest}
+    signs = (
+        Sign(Cause.TUNING, pct / 100.0, SignKind.RINGING, (ringing.ms, ringing.period_s)),
+        Sign(Cause.TUNING, max(clear, 0.05), SignKind.SMOOTH_LOAD, (ringing.line_nat,)),
+    )
+    told = replace(m, linear=as_fit(ringing.smooth, m.window))
+    return Verdict(Cause.TUNING, confidence, Fault.NONE, signs, measured=told)
 
 
 def _least(cause: Cause, m: Measured, limits: CauseLimits) -> float:

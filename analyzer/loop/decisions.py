@@ -35,6 +35,8 @@ class SignKind(StrEnum):
     HARMONIC = "harmonic"
     WAVE_LEFT = "wave_left"
     REGULARITY = "kurtosis"
+    RINGING = "ringing"
+    SMOOTH_LOAD = "smooth load"
     LIMITS = "saturated"
     DEAD_TIME = "dead_time_share"
     CALM_EVIDENCE = "evidence of a calm loop"
@@ -49,7 +51,7 @@ class SignKind(StrEnum):
 OF_LOAD = (SignKind.LOAD_LEFT, SignKind.PROCESS, SignKind.WAVE_LEFT, SignKind.REGULARITY)
 """Signs that a load itself leaves: a peak in what the model leaves, another process away from the period, harmonics
 that no faulty valve makes, a size and rhythm kept; that a valve or a limit is not seen at work is none of them."""
-COUNTS_PCT = 50.0
+COUNTS_PCT = 20.0
 """A loop counts as oscillating from this share of the time on [%]; contract of the ranking."""
 
 

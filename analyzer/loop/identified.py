@@ -78,12 +78,16 @@ def gain_room(m: Measured) -> float | None:
 def load_of(fit: Fit, controller: Pid) -> Floats:
     """Load and noise [% PV] that the model leaves, on the scan's clock, the latest scans, shape (m,).
 
+    Moves of the set point are taken off it: a PI at a constant set point answers such a load as it does the moves.
+
     The window's blocks have lost the noise from scan to scan. OP still has it, times the gain, and it dithers the
     stem; white noise of that size is added.
     """
     window = fit.window
     scan_s = controller.scan_s or window.dt_s
     left = disturbance(fit)
+    if window.sp is not None:
+        left = left - (window.sp - window.sp.mean())
     clock = np.arange(int(window.duration_s / scan_s)) * scan_s
     load = np.interp(clock, np.arange(left.size) * window.dt_s, left)[-LOOP.load_scans :]
     if window.factor > 1:
@@ -91,12 +95,23 @@ def load_of(fit: Fit, controller: Pid) -> Floats:
     return np.asarray(load, dtype=np.float64)
 
 
+def recorded_error(fit: Fit, controller: Pid) -> float:
+    """Average absolute error of what a fit rests on [% PV]; about PV's mean where the set point stands still.
+    The noise that blocks have lost is added as in `load_of`."""
+    window = fit.window
+    sp = 0.0 if window.sp is None else window.sp - window.y.mean()
+    slow = float(np.mean(np.abs((window.centred - sp)[window.usable])))
+    fast = scan_noise(window, controller) if window.factor > 1 else 0.0
+    return math.hypot(slow, math.sqrt(2.0 / math.pi) * fast)
+
+
 def scan_noise(window: Window, controller: Pid) -> float:
     """Standard deviation of PV's noise from sample to sample [% PV], read from OP's second differences.
 
     Those of white noise have sqrt(6) times its deviation; the median leaves steps aside (Rousseeuw, Croux 1993).
     """
-    jumps = np.abs(np.diff(window.op, 2))
+    held = max(round(controller.scan_s * window.factor / window.dt_s), 1)  # OP stands still between two scans
+    jumps = np.abs(np.diff(window.op[::held], 2))
     if jumps.size == 0 or controller.kp == 0:
         return 0.0
     return robust_deviation(jumps) / math.sqrt(6.0) / abs(controller.kp)

@@ -11,6 +11,7 @@ from analyzer.config import CauseLimits
 from analyzer.limits import LOOP
 from analyzer.loop.assessments import at_limits_share, noise_band
 from analyzer.loop.oscillation import Oscillation
+from analyzer.loop.ringing import Ringing, calm_resonance, ringing_of
 from identification.controller.pid_regression import fit_pi
 from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import better_linear, fit_linear, fit_play, fit_stick_slip
@@ -59,7 +60,9 @@ class Measured:
     turns agree on the better valve, None with too few; kurtosis [-] of the band at the period, 3 for noise, 1.5 where
     the size is kept; wave_left [-], harmonics of PV's cycle that the better valve leaves, over its fundamental;
     steady [-], of a calm loop, how the stretches between moves of the stem agree on the better valve: their mean gain
-    over its standard error, and asked, what it gains while PV is due to answer moves of the set point [nat].
+    over its standard error, and asked, what it gains while PV is due to answer moves of the set point [nat]; ringing,
+    whether the loop itself makes the cycle, None without settings; scale_s, the period or another time
+    scale of the loop [s].
     """
 
     linear: Fit
@@ -83,6 +86,8 @@ class Measured:
     wave_left: float = 0.0
     steady: float = 0.0
     asked: float = 0.0
+    ringing: Ringing | None = None
+    scale_s: float = 60.0
 
     @property
     def window(self) -> Window:
@@ -161,6 +166,7 @@ def measure(
         controller=controller,
         moves=stem_moves(best),
         excited=bool(due.any()),
+        scale_s=scale,
     )
     if oscillation is None:
         if window.position is not None:
@@ -168,6 +174,12 @@ def measure(
         alone = not record.mask("idle").any()  # else another one moves PV too
         return _without_a_cycle(seen_alone, best, linear, due if alone else None)
     return _of_a_cycle(seen_alone, best, linear, scale, error)
+
+
+def ringing_period(m: Measured, limits: CauseLimits) -> float | None:
+    """Period [s] at which the identified loop of a calm record rings; None where it is damped, or not known."""
+    ms, period_s = calm_resonance(m.linear, m.controller, m.scale_s)
+    return period_s if ms >= limits.ringing_ms else None
 
 
 def _without_a_cycle(m: Measured, best: Fit, linear: Fit, due: Mask | None) -> Measured:
@@ -182,6 +194,7 @@ def _of_a_cycle(m: Measured, best: Fit, linear: Fit, scale: float, error: Spectr
     dt_s = linear.window.dt_s
     found = replace(
         m,
+        ringing=ringing_of(linear, (best,) if m.evidence > 0.0 else (), m.controller, scale),
         line_linear=_prominence(residual(linear), dt_s, scale),
         line_valve=_prominence(residual(best), dt_s, scale),
         consistency=_consistency(linear, scale),
@@ -323,6 +336,25 @@ def latest_fit_stretch(record: LoopRecord, n: int, calm: bool = False) -> int:
     return int(firsts[among[far[among] >= far[among].max() - 1e-9][0]])
 
 
+def bridged(usable: Mask, period: float) -> Mask:
+    """Usable samples, shape (n,), and those in holes shorter than a share of a period [samples]."""
+    most = int(LOOP.bridged * period)
+    out = usable.copy()
+    edges = np.flatnonzero(np.diff(np.concatenate(([1], usable.astype(np.int8), [1]))))
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        if last - first <= most:
+            out[first:last] = True
+    return out
+
+
+def across(x: Floats, hole: Mask) -> Floats:
+    """A signal, shape (n,), with a straight line from end to end of each hole."""
+    if not hole.any() or hole.all():
+        return x
+    at = np.flatnonzero(~hole)
+    return np.where(hole, np.interp(np.arange(x.size), at, x[at]), x)
+
+
 def window_of(
     record: LoopRecord, scale_s: float, limits: CauseLimits, kind: str = "", calm: bool = False
 ) -> Window:
@@ -331,13 +363,14 @@ def window_of(
     n = min(len(record) // factor, limits.window) * factor
     first = latest_fit_stretch(record, n, calm)
     part = record.span(first, first + n)
-    usable = block_means(part.usable.astype(np.float64), factor) > 0.99
+    whole = bridged(part.usable, scale_s / record.dt_s)
+    usable = block_means(whole.astype(np.float64), factor) > 0.99
     known = {name: (t, dead) for name, t, dead in limits.fast_process}
     most = known.get(kind.lower(), (math.inf, math.inf))
     op = np.ascontiguousarray(part.op)
     stem = None if part.position is None else np.ascontiguousarray(part.position)
     return Window(
-        block_means(part.pv, factor),
+        block_means(across(part.pv, whole & ~part.usable), factor),
         op,
         usable,
         record.dt_s * factor,
@@ -345,6 +378,7 @@ def window_of(
         *most,
         position=stem,
         first=first,
+        sp=None if part.sp_estimated or not np.ptp(part.sp) else block_means(part.sp, factor),
     )
 
 

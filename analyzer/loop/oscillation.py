@@ -88,14 +88,15 @@ def begun_up(error: Floats) -> int:
     return arrived if abs(error[0]) > LOOP.far * usual else 0
 
 
-def error_spectrum(record: LoopRecord) -> Spectrum:
-    """Spectrum of the error, once it has come to the set point, without what the set point explains."""
+def error_spectrum(record: LoopRecord, whole: bool = False) -> Spectrum:
+    """Spectrum of the error, once it has come to the set point, without what the set point explains unless the
+    `whole` of it is wanted."""
     error, good = record.error, np.flatnonzero(record.at_work)
     if good.size < error.size:
         error = np.interp(np.arange(error.size), good, error[good])
     first = 0 if record.sp_estimated else begun_up(error)
     found = spectrum(error[first:], record.dt_s)
-    if record.sp_estimated or float(np.ptp(record.sp[first:])) == 0.0:
+    if whole or record.sp_estimated or float(np.ptp(record.sp[first:])) == 0.0:
         return found
     sp = spectrum(record.sp[first:], record.dt_s)
     lines = without_setpoint(found.lines, sp.lines)
@@ -239,9 +240,10 @@ def counting(found: Oscillations) -> Oscillation | None:
     return first if first is not None and counts(first.oscillating_pct) else None
 
 
-def detect(record: LoopRecord, limits: OscillationLimits) -> Oscillations:
-    """The oscillations of a loop; none for noise, drift, ramps, steps and constants."""
-    s = error_spectrum(record)
+def detect(record: LoopRecord, limits: OscillationLimits, whole: bool = False) -> Oscillations:
+    """The oscillations of a loop; none for noise, drift, ramps, steps and constants. In the `whole` error the
+    ringing after moves of the set point counts too."""
+    s = error_spectrum(record, whole)
     resolution = float(np.max(np.abs(record.error))) * 1e-9
     if s.n < 16 or s.variance <= resolution**2:
         return Oscillations(spectrum=s)
@@ -256,7 +258,8 @@ def detect(record: LoopRecord, limits: OscillationLimits) -> Oscillations:
         if o.period_s <= longest and not any(_is_harmonic_of(o, p) for p in kept):
             kept.append(o)
     each = (_sized_by_envelope(s, o, usable, limits) for o in kept[: LOOP.reported])
-    sized = sorted((r for r in each if _lasts(s, record, r[0], limits)), key=lambda r: -r[0].significance)
+    lasting = (r for r in each if whole or _lasts(s, record, r[0], limits))
+    sized = sorted(lasting, key=lambda r: -r[0].significance)
     if not sized:
         return Oscillations(spectrum=s, bands=b)
     first = sized[0]

@@ -7,6 +7,7 @@ folded. The sentences of signs stand in texts.toml, and here is which of them a 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -72,7 +73,7 @@ def _cause(found: Finding) -> str:
     if found.cause is Cause.VALVE:
         return f"{cycle}: {valve_text(found)}"
     if found.cause is Cause.TUNING:
-        return f"{cycle}: too tight for its process; {_strongest(found, 1, SignKind.AMPLIFICATION)}"
+        return f"{cycle}: too tight for its process; {_strongest(found, 1, SignKind.RINGING, SignKind.AMPLIFICATION)}"
     if found.cause is Cause.LOAD:
         return f"{cycle}: driven from outside; {_strongest(found, 1, *OF_LOAD)}"
     if found.cause is Cause.UNDECIDED:
@@ -199,6 +200,10 @@ SAYS: Mapping[SignKind, Callable[..., Chosen]] = {
     SignKind.HARMONIC: lambda third: ("harmonic", 100 * third),
     SignKind.WAVE_LEFT: lambda left: ("wave_left" if left else "no_wave_left", 100 * left),
     SignKind.REGULARITY: _regularity,
+    SignKind.RINGING: lambda ms, period_s: (
+        ("ringing_unstable",) if math.isinf(ms) else ("ringing", duration(period_s), ms)
+    ),
+    SignKind.SMOOTH_LOAD: lambda nat: ("smooth_load", nat),
     SignKind.LIMITS: lambda share: ("at_limits" if 100 * share >= 1 else "off_limits", 100 * share),
     SignKind.DEAD_TIME: lambda period_s, dead_s: (
         ("long_period",) if period_s > 50 * dead_s else ("dead_times", period_s / dead_s)

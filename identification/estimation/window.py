@@ -67,6 +67,7 @@ class Window:
     fine: bool = False
     decoded: bool = False
     first: int = 0
+    sp: Floats | None = None
 
     @cached_property
     def extra(self) -> Floats:

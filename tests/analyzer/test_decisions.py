@@ -48,9 +48,9 @@ def test_the_words_are_the_contracts(kind):
     assert {f"{word}" for word in kind} == set(CONTRACT[kind].split("|"))
 
 
-@pytest.mark.parametrize(("share", "expected"), [(None, False), (49.999, False), (50.0, True), (100.0, True)])
-def test_a_loop_counts_as_oscillating_from_half_of_the_time_on(share, expected):
-    """The contract's limit of 50 % belongs to the loops that oscillate; an unknown share is none."""
+@pytest.mark.parametrize(("share", "expected"), [(None, False), (19.999, False), (20.0, True), (100.0, True)])
+def test_a_loop_counts_as_oscillating_from_a_fifth_of_the_time_on(share, expected):
+    """The contract's limit of 20 % belongs to the loops that oscillate; an unknown share is none."""
     assert counts(share) is expected
 
 

@@ -12,8 +12,8 @@ from analyzer.words.reason import in_short, reason
     ("share", "said"),
     [
         (0.0, "does not oscillate"),
-        (26.3, "cycles every 18.1 min, for 26 % of the time"),
-        (49.9, "cycles every 18.1 min, for 50 % of the time"),
+        (6.3, "cycles every 18.1 min, for 6 % of the time"),
+        (19.9, "cycles every 18.1 min, for 20 % of the time"),
         (80.0, "cycles every 18.1 min: driven from outside; the cycle keeps its size and changes its rhythm"),
     ],
 )
@@ -21,7 +21,7 @@ def test_a_loop_that_cycles_for_a_part_of_the_night_is_not_said_to_be_calm(share
     """A cycle of too little time to count is told with its share; only a loop without one does not oscillate."""
     signs = (Sign(Cause.LOAD, 1.0, SignKind.REGULARITY, (1.5, 0.2)),)
     swing = Swing(1.0, share, 1086.0 if share else None, 1.0)
-    cause = Cause.LOAD if share >= 50 else Cause.NONE
+    cause = Cause.LOAD if share >= 20 else Cause.NONE
     assert reason(Finding("L", "2026-03-02", Status.OK, swing=swing, cause=cause, signs=signs)) == said
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 
 from analyzer.loop.decisions import Cause, Finding, Lack, Need, Needs, Sign, SignKind, Status, Swing
 from analyzer.plantwide.structure import Tie
@@ -68,6 +69,8 @@ BOTH_WAYS = {
     SignKind.HARMONIC: ((0.1,),),
     SignKind.WAVE_LEFT: ((0.0,), (0.2,)),
     SignKind.REGULARITY: ((1.5, 0.9), (1.5, 0.1), (2.9, 0.9), (2.9, 0.1)),
+    SignKind.RINGING: ((math.inf, 90.0), (5.0, 90.0)),
+    SignKind.SMOOTH_LOAD: ((2.0,),),
     SignKind.LIMITS: ((0.0,), (0.2,)),
     SignKind.DEAD_TIME: ((300.0, 0.0), (300.0, 100.0)),
     SignKind.CALM_EVIDENCE: ((9.0,),),

@@ -17,6 +17,7 @@ from tuning.frequency_response import (
     loop_response,
     maximum_sensitivity,
     process_response,
+    resonance_s,
     stable_gains,
 )
 
@@ -109,3 +110,10 @@ def test_grid_ends_at_the_scan():
     """No frequency beyond half the scan's is looked at."""
     loop = Loop(Fopdt(1, 10, 0), Pid(1, 10, scan_s=2.0))
     assert frequencies(loop)[-1] <= math.pi / 2.0 + 1e-9
+
+
+def test_a_loop_near_its_limit_amplifies_most_at_its_ultimate_period():
+    """An integrator with dead time under P control near its limit of stability rings at four dead times
+    (Ziegler, Nichols 1942): phase -90 degrees of the integrator and -90 of the dead time."""
+    loop = Loop(Integrator(0.01, 30.0), Pid(0.95 * 0.5 * math.pi / (0.01 * 30.0), math.inf, scan_s=0.0))
+    assert resonance_s(loop) == pytest.approx(120.0, rel=0.03)

@@ -1,0 +1,87 @@
+"""Whether the identified loop, simulated at its present settings, does what was recorded.
+
+Settings are sought on a simulation. Where it does not reproduce the record it says nothing about other settings: a
+derivative, a filter or a limit that the model lacks has turned promised gains into losses.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from analyzer.config import AdviceLimits
+from analyzer.loop.identified import recorded_error
+from identification.estimation.window import Fit, Stems, stem_of
+from identification.models import Loop
+from identification.record import Floats, LoopRecord
+from identification.signals.correlation import lag_sums
+from identification.simulation.closed_loop import scan_step
+from tuning.forecast import in_digits, loop_in_digits, run, settled
+
+NEARLY = 0.8
+"""Share of the autocorrelation's highest peak from which an earlier one is that of the period: multiples are
+as high."""
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """What a simulation of the present settings has over what was recorded [-]: period, average absolute
+    error, travel of OP and of the stem; a period of 0 where the simulation does not cycle."""
+
+    period: float
+    error: float
+    op_travel: float
+    stem_travel: float
+
+    def worst(self, limits: AdviceLimits) -> tuple[str, float] | None:
+        """The figure that is farthest beyond its limit, and its ratio; None where all agree."""
+        allowed = {
+            "period": (self.period, limits.agree_period),
+            "average absolute error": (self.error, limits.agree_error),
+            "OP travel": (self.op_travel, limits.agree_travel),
+            "stem travel": (self.stem_travel, limits.agree_stem),
+        }
+        beyond = {n: abs(math.log(max(x, 1e-9))) / math.log(most) for n, (x, most) in allowed.items()}
+        name = max(beyond, key=lambda n: beyond[n])
+        return None if beyond[name] <= 1.0 else (name, allowed[name][0])
+
+
+def agreement(loop: Loop, fit: Fit, load: Floats, period_s: float) -> Agreement:
+    """The loop with its present settings under a load on its scan [% PV], shape (n,), beside the record of a
+    fit, which cycles at a period [s]. Travel of both is that of their samples at the longer of both intervals."""
+    sim, window = settled(run(loop_in_digits(loop), in_digits(load))), fit.window
+    dt_s, scan_s = window.dt_s / window.factor, scan_step(loop)
+    last = min(window.op.size, math.ceil(len(sim) * scan_s / dt_s))
+    stem = stem_of(Stems(*(window.op,) * 3, window.op, np.empty(0), 1), fit.valve)
+    if window.position is not None:
+        stem = window.position
+    every = max(round(dt_s / scan_s), 1)
+    recorded = [_travel(x[-last:], dt_s) for x in (window.op, stem)]
+    simulated = [_travel(x[::every], every * scan_s) for x in (sim.op, sim.stem)]
+    op, moved = (s / max(r, 1e-9) for s, r in zip(simulated, recorded, strict=True))
+    error = float(np.mean(np.abs(sim.error))) / max(recorded_error(fit, loop.controller), 1e-9)
+    return Agreement(_period_s(sim) / period_s, error, op, moved)
+
+
+def _travel(x: Floats, dt_s: float) -> float:
+    """Travel of a signal [its unit / s]."""
+    return float(np.abs(np.diff(x)).sum()) / max((x.size - 1) * dt_s, 1e-9)
+
+
+def _period_s(r: LoopRecord) -> float:
+    """Period of the autocorrelation's first peak that is nearly its highest beyond its first zero [s], 0 where it has
+    none."""
+    x = r.error - r.error.mean()
+    if len(r) < 8 or not np.any(x):
+        return 0.0
+    sums = lag_sums(x, x.size // 2)
+    below = np.flatnonzero(sums < 0)
+    if not below.size:
+        return 0.0
+    rest = sums[below[0] :]
+    first = int(np.argmax(rest >= NEARLY * rest.max()))
+    back = np.flatnonzero(rest[first:] < 0.5 * rest[first])
+    end = first + int(back[0]) if back.size else rest.size
+    return float((below[0] + first + int(np.argmax(rest[first:end]))) * r.dt_s)

@@ -1,0 +1,114 @@
+"""Does the loop itself ring? The same record explained three ways, each a model with its likelihood.
+
+Tuning: the identified process with the controller's law has little damping and rings at the observed period under a
+smooth load. Load: a periodic load drives a loop. Valve: the stem behind OP sticks or has play. See
+identification/estimation/smooth_load.py.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from analyzer.config import CauseLimits
+from identification.estimation.smooth_load import SmoothFit, fit_line, fit_smooth, resonant_starts
+from identification.estimation.window import Fit
+from identification.models import Loop, Pid
+from tuning.frequency_response import controller_response, maximum_sensitivity, resonance_s
+
+
+@dataclass(frozen=True, slots=True)
+class Ringing:
+    """What a smooth load leaves to the loop.
+
+    smooth, the process under a smooth load; lined, under one with a line; ms, maximum sensitivity of the loop under
+    the smooth load [-], inf where it is unstable, and period_s, at which it rings [s]; cycle_s, the observed
+    period [s]; line_nat and valve_nat, gain in log likelihood of a line in the load, and of a valve's fault,
+    over the smooth load [nat].
+    """
+
+    smooth: SmoothFit
+    lined: SmoothFit
+    ms: float
+    period_s: float
+    cycle_s: float
+    line_nat: float
+    valve_nat: float
+
+    def is_tight(self, evidence: float, bounded: bool, limits: CauseLimits) -> bool:
+        """Whether the loop itself makes the cycle: it rings at the observed period, and neither a line of the
+        load nor a fault of the valve is needed.
+
+        evidence, for that fault under a free noise model [nat]; bounded, whether the cycle keeps its size
+        though no limit of OP holds it: noise through a resonance does not (Rice 1945).
+        """
+        faulty = min(evidence, self.valve_nat) >= limits.evidence
+        return self.rings(limits) and not (bounded or faulty or self.has_line(limits))
+
+    def has_line(self, limits: CauseLimits) -> bool:
+        """Whether the load has a line that keeps its phase."""
+        line = self.lined.line
+        kept = line is not None and line.kept >= limits.line_kept
+        return kept and self.line_nat >= self.line_needed(limits)
+
+    def line_needed(self, limits: CauseLimits) -> float:
+        """Gain that a line has to bring [nat]: for three constants by Schwarz's criterion (1978), and a floor."""
+        return limits.line_floor + 1.5 * math.log(self.smooth.count)
+
+    def rings(self, limits: CauseLimits) -> bool:
+        """Whether the loop is little damped at the observed period."""
+        return self.ms >= limits.ringing_ms and same_period(self.period_s, self.cycle_s, limits)
+
+
+def same_period(predicted_s: float, seen_s: float, limits: CauseLimits) -> bool:
+    """Whether the period of a model is that of a cycle."""
+    return abs(math.log(predicted_s / seen_s)) <= math.log(limits.ringing_period)
+
+
+def calm_resonance(linear: Fit, controller: Pid | None, scale_s: float) -> tuple[float, float]:
+    """Maximum sensitivity [-] of the identified loop of a record without a cycle, and the period [s] of its peak; 1
+    without settings, or where they act the wrong way."""
+    if controller is None or controller.kp == 0.0:
+        return 1.0, scale_s
+    window, dead_s = linear.window, max(linear.dead_time_s, 0.0)
+    begins = [(linear.time_constant_s, dead_s), *((f * scale_s, 0.05 * scale_s) for f in (0.05, 0.5, 3.0))]
+    smooth = fit_smooth(window, scale_s, [(b, None) for b in begins])
+    if controller.kp * smooth.process.gain <= 0.0:
+        return 1.0, scale_s
+    loop = Loop(smooth.process, controller)
+    return maximum_sensitivity(loop), resonance_s(loop)
+
+
+def ringing_of(
+    linear: Fit, valves: tuple[Fit, ...], controller: Pid | None, period_s: float
+) -> Ringing | None:
+    """What a smooth load leaves to a loop that cycles at a period [s]; None where no settings are known, or the loop
+    does not act on PV.
+
+    linear, the night's fit behind an ideal valve; valves, those behind faulty ones that explain PV better.
+    """
+    window = linear.window
+    if controller is None or controller.kp == 0.0 or not math.isfinite(period_s):
+        return None
+    law = complex(controller_response(controller, np.array([2.0 * math.pi / period_s]))[0])
+    begins = [(x.time_constant_s, max(x.dead_time_s, 0.0)) for x in (linear, *valves)]
+    begins += [(share * period_s, 0.05 * period_s) for share in (0.3, 2.0)]
+    plain = [(begin, None) for begin in begins]
+    smooth = fit_smooth(window, period_s, [*resonant_starts(window, period_s, law), *plain])
+    away = fit_smooth(window, period_s, plain)
+    lined = fit_line(window, period_s, (smooth, away), begins)
+    faulty = [fit_smooth(window, period_s, plain, x.valve, smooth) for x in valves]
+    best = max((f.log_likelihood for f in faulty), default=-math.inf)
+    loop = Loop(smooth.process, controller)
+    right_way = controller.kp * smooth.process.gain > 0.0
+    return Ringing(
+        smooth,
+        lined,
+        maximum_sensitivity(loop) if right_way else 1.0,
+        resonance_s(loop),
+        period_s,
+        lined.log_likelihood - smooth.log_likelihood,
+        best - smooth.log_likelihood,
+    )

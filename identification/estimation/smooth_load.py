@@ -1,0 +1,296 @@
+"""What resonates: the loop, its load, or neither. A process is fitted under a load that is smooth, has a line,
+or both.
+
+Direct identification with a free noise model cannot tell a loop that rings from a load that does: the noise model
+takes over the resonance and the process gain goes to zero. Physics restricts the noise. A load that enters before the
+process and wanders is smooth: its noise model has real poles, one of them the process's own, and real zeros. Only a
+periodic load has a pair of complex poles. Under a smooth load the loop itself must make the resonance, and gain, time
+constant and dead time follow from it (prediction errors, Ljung 1999, ch. 13: consistent in closed loop where
+the noise model can hold the truth).
+
+The model of a record is y = K x + c + H w with x the response of a unit lag with dead time to the stem and
+H = (1 - z1 q)(1 - z2 q) / ((1 - p q)(1 - s q)) (1 - 2 v cos(a) q + v^2 q^2) / (1 - 2 r cos(a) q + r^2 q^2), q
+one block back, p the pole of the lag, s of the load's corner, r and v > 0 where the load has a line of angle a.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from identification.estimation.descent import Descent, down, nats
+from identification.estimation.search import Dynamics
+from identification.estimation.window import Fit, Window, stem_of
+from identification.limits import FIT, SMOOTH
+from identification.models import Fopdt
+from identification.record import Floats, Mask
+from identification.simulation.lag import Lag, stepped, unit_lag
+from identification.simulation.valve import IDEAL, StemLaw
+
+LOAD, LINE = 5, 8
+"""Constants of a model: log time constant [s], dead time [blocks], log corner time [s], inverse hyperbolic
+tangents of both zeros; and of a line log frequency over that sought for, log of the periods that it keeps its
+phase for, and log of how far it stands out."""
+STEPS = np.array([0.01, 0.02, 0.02, 0.02, 0.02, 0.001, 0.02, 0.02])
+"""Steps of the constants over which derivatives are taken."""
+LONGEST = np.array([1.0, 4.0, 1.5, 1.0, 1.0, 0.05, 1.5, 1.5])
+"""Longest steps of a descent in each constant: the least squares are no bowl."""
+CORNERS, ZEROS = (1.0, 10.0, 100.0), ((0.0, 0.2), (0.4, 0.7), (1.0, 1.5))
+"""Starts of the load: its corner time [periods] and its zeros, never alike, for then they would not be told apart."""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A periodic load: its period [s], and the periods for which it keeps its phase."""
+
+    period_s: float
+    kept: float
+
+
+@dataclass(frozen=True, slots=True)
+class SmoothFit:
+    """A process with its load.
+
+    process, its dead time in the record's own samples; log_likelihood [nat] up to a constant, over `count` blocks;
+    theta, the constants as in LOAD and LINE; law, the valve's; line, None where the load has none.
+    """
+
+    process: Fopdt
+    log_likelihood: float
+    count: int
+    sigma2: float
+    theta: Floats
+    law: StemLaw
+    line: Line | None
+
+
+class _Case(NamedTuple):
+    """What all points of a descent share: PV and stem in blocks, less their means; blocks judged; interval
+    [s]; ranges of the constants, shape (2, m); period sought for [s]."""
+
+    y: Floats
+    stem: Floats
+    at: NDArray[np.int64]
+    dt_s: float
+    ranges: Floats
+    period_s: float
+
+
+class _Point(NamedTuple):
+    """One point of a descent: constants, innovations judged, gain, and their mean square."""
+
+    theta: Floats
+    e: Floats
+    gain: float
+    loss: float
+
+
+Noise = tuple[float, float, float, float, float]
+"""Sums and products of the load's poles and zeros: -(p + s), p s, -(z1 + z2), z1 z2; and 1 where there is a line."""
+Pair = tuple[float, float, float, float]
+"""Coefficients of a line: of 1/q and 1/q^2 in the poles, and in the zeros."""
+
+
+@njit(cache=True)
+def _whitened(y: Floats, stem: Floats, lag: Lag, noise: Noise, pair: Pair) -> tuple[Floats, Floats]:
+    """PV and the unit response to the stem, both without their load, shape (n,) each."""
+    n = y.size
+    yw, xw = np.zeros(n), np.zeros(n)
+    a1, a2, b1, b2, lined = noise
+    r1, r2, v1, v2 = pair
+    x0, x1, x2 = 0.0, 0.0, 0.0
+    m1, m2, k1, k2 = 0.0, 0.0, 0.0, 0.0
+    y1, y2 = y[0], y[0]
+    for k in range(n):
+        xm = x0 + a1 * x1 + a2 * x2 - b1 * k1 - b2 * k2
+        ym = y[k] + a1 * y1 + a2 * y2 - b1 * m1 - b2 * m2
+        y2, y1, x2, x1 = y1, y[k], x1, x0
+        m2, m1, k2, k1 = m1, ym, k1, xm
+        yw[k], xw[k] = ym, xm
+        x0 = stepped(x0, lag, stem[max(k - lag.delay, 0)], stem[max(k - lag.delay - 1, 0)])
+    if lined > 0.0:
+        y1, y2, x1, x2, m1, m2, k1, k2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(n):
+            ym = yw[k] + r1 * y1 + r2 * y2 - v1 * m1 - v2 * m2
+            xm = xw[k] + r1 * x1 + r2 * x2 - v1 * k1 - v2 * k2
+            y2, y1, x2, x1 = y1, yw[k], x1, xw[k]
+            m2, m1, k2, k1 = m1, ym, k1, xm
+            yw[k], xw[k] = ym, xm
+    return yw, xw
+
+
+def _noise(theta: Floats, pole: float, case: _Case) -> tuple[Noise, Pair]:
+    """The load of some constants as the kernel takes it."""
+    slow = math.exp(-case.dt_s / math.exp(theta[2]))
+    z1, z2 = math.tanh(theta[3]), math.tanh(theta[4])
+    noise = -(pole + slow), pole * slow, -(z1 + z2), z1 * z2, float(theta.size > LOAD)
+    if theta.size == LOAD:
+        return noise, (0.0, 0.0, 0.0, 0.0)
+    angle = 2.0 * math.pi * case.dt_s / case.period_s * math.exp(theta[5])
+    rate = case.dt_s / (case.period_s * math.exp(theta[6]))
+    r, v = math.exp(-rate), math.exp(-rate * (1.0 + math.exp(theta[7])))
+    turn = 2.0 * math.cos(angle)
+    return noise, (-turn * r, r * r, -turn * v, v * v)
+
+
+def _point(case: _Case, theta: Floats, gain: float | None = None) -> _Point:
+    """The innovations of some constants, gain and offset solved for, or the gain as it is given."""
+    lag = unit_lag(math.exp(theta[0]), theta[1] * case.dt_s, case.dt_s)
+    yw, xw = (w[case.at] for w in _whitened(case.y, case.stem, lag, *_noise(theta, lag.pole, case)))
+    x, y = xw - xw.mean(), yw - yw.mean()
+    k = float(x @ y) / max(float(x @ x), 1e-300) if gain is None else gain
+    e = y - k * x
+    return _Point(theta, e, k, float(e @ e) / e.size)
+
+
+def _slopes(case: _Case, p: _Point) -> Floats:
+    """Derivatives of the innovations by the constants, shape (m, n)."""
+    rows = []
+    for i in range(p.theta.size):
+        moved = p.theta.copy()
+        step = STEPS[i] if moved[i] + STEPS[i] <= case.ranges[1, i] else -STEPS[i]
+        moved[i] += step
+        rows.append((_point(case, moved).e - p.e) / step)
+    return np.array(rows)
+
+
+def _curved(case: _Case, p: _Point, taken: int) -> tuple[bool, Floats, Floats]:
+    rows = _slopes(case, p)
+    return True, rows @ rows.T, -rows @ p.e
+
+
+def _stepped(case: _Case, p: _Point, step: Floats) -> _Point:
+    longest = LONGEST[: step.size]
+    short = step / max(float(np.max(np.abs(step) / longest)), 1.0)
+    return _point(case, np.clip(p.theta + short, case.ranges[0], case.ranges[1]))
+
+
+def _judged(usable: Mask) -> NDArray[np.int64]:
+    """Blocks that are judged: usable, with as many usable ones before as the noise model needs to forget a hole."""
+    out = ~usable
+    for k in range(1, SMOOTH.forgets + 1):
+        out[k:] |= ~usable[:-k]
+    out[: 2 * SMOOTH.forgets] = True
+    return np.flatnonzero(~out)
+
+
+def _case(window: Window, law: StemLaw, period_s: float, lined: bool) -> _Case:
+    stem = stem_of(window.stems_in_blocks, law)
+    (most_t, most_dead), dt_s = window.bounds, window.dt_s
+    periods = window.duration_s / period_s
+    low = [math.log(0.1 * dt_s), 0.0, math.log(0.5 * dt_s), -1.5, -1.5]
+    high = [math.log(most_t), most_dead / dt_s, math.log(1e3 * window.duration_s), 3.0, 3.0]
+    if lined:
+        away = math.log(SMOOTH.line_away)
+        low += [-away, math.log(SMOOTH.line_kept), -1.0]
+        high += [away, math.log(10.0 * periods), 8.0]
+    ranges = np.array([low, high])
+    return _Case(window.centred, stem, _judged(window.usable), dt_s, ranges, period_s)
+
+
+def _descended(case: _Case, starts: Sequence[Floats]) -> _Point:
+    """The likeliest of what some starts come to: all go a few steps, the best of them to the end."""
+
+    def went(begun: _Point, steps: int) -> _Point:
+        rule = Descent(steps, 2 * steps, case.at.size, SMOOTH.settled, 10.0, 5.0, steps)
+        return down(case, begun, _curved, _stepped, rule)
+
+    begun = (_point(case, np.clip(s, case.ranges[0], case.ranges[1])) for s in starts)
+    near = sorted((went(p, SMOOTH.first_steps) for p in begun), key=lambda p: p.loss)
+    return min((went(p, SMOOTH.steps) for p in near[: SMOOTH.followed]), key=lambda p: p.loss)
+
+
+def _fit(window: Window, law: StemLaw, case: _Case, p: _Point) -> SmoothFit:
+    line = None
+    if p.theta.size > LOAD:
+        line = Line(case.period_s / math.exp(p.theta[5]), math.exp(p.theta[6]))
+    dead_s = float(p.theta[1]) * case.dt_s + window.half_block_s
+    process = Fopdt(p.gain, math.exp(p.theta[0]), dead_s)
+    loss = max(p.loss, 1e-14)
+    return SmoothFit(process, -nats(p.e.size, loss, 1.0), p.e.size, loss, p.theta, law, line)
+
+
+def resonant_starts(window: Window, period_s: float, law_response: complex) -> list[tuple[Dynamics, float]]:
+    """Time constant and dead time [s] of lags with which the controller would ring at a period [s], and their gains.
+
+    law_response : the controller's response there [% OP / % PV]. The loop is at a phase of -180 degrees with the gain
+    margin SMOOTH.margin; none where no dead time makes it so.
+    """
+    omega, found = 2.0 * math.pi / period_s, []
+    sign = 1.0 if law_response.real >= 0.0 else -1.0
+    phase = float(np.angle(sign * law_response))
+    for t in SMOOTH.lags * np.array(period_s):
+        dead_s = (math.pi - math.atan(omega * t) + phase) / omega - window.half_block_s
+        if 0.0 <= dead_s <= window.bounds[1] and t <= window.bounds[0]:
+            gain = sign * math.hypot(1.0, omega * t) / (abs(law_response) * SMOOTH.margin)
+            found.append(((float(t), dead_s), gain))
+    return found
+
+
+def fit_smooth(
+    window: Window,
+    period_s: float,
+    starts: Sequence[tuple[Dynamics, float | None]],
+    law: StemLaw = IDEAL,
+    like: SmoothFit | None = None,
+) -> SmoothFit:
+    """The process under a smooth load, behind a valve.
+
+    starts : time constant and dead time [s] from which the search begins, with the gain there where it is
+    known; like : a fit whose load is a start too. Raises ValueError without a start.
+    """
+    case = _case(window, law, period_s, False)
+    loads = [like.theta[2:LOAD]] if like is not None else []
+    loads += [np.array([math.log(c * period_s), *z]) for c in CORNERS for z in ZEROS]
+    firsts = []
+    for (t, dead_s), gain in starts:
+        heads = [np.array([math.log(t), dead_s / case.dt_s, *load]) for load in loads]
+        firsts.append(
+            min((_point(case, np.clip(h, *case.ranges), gain) for h in heads), key=lambda p: p.loss)
+        )
+    return _fit(window, law, case, _descended(case, [p.theta for p in firsts]))
+
+
+def fit_line(
+    window: Window,
+    period_s: float,
+    near: Sequence[SmoothFit],
+    begins: Sequence[Dynamics] = (),
+    law: StemLaw = IDEAL,
+) -> SmoothFit:
+    """The process under a load that has a line near a period [s] beside its smooth part, behind a valve.
+
+    near : fits under smooth loads from which the search begins, and whose loads are starts; begins : time
+    constants and dead times [s] from which it begins too: behind a line a smooth load leaves a process that is
+    far from the true one.
+    """
+    case = _case(window, law, period_s, True)
+    lines = [np.array([0.0, math.log(kept), 2.0]) for kept in SMOOTH.line_starts]
+    heads = [fit.theta[:2] for fit in near] + [np.array([math.log(t), d / case.dt_s]) for t, d in begins]
+    loads = [fit.theta[2:LOAD] for fit in (*near, *(near[-1] for _ in begins))]
+    starts = [np.concatenate((h, load, line)) for h, load in zip(heads, loads, strict=True) for line in lines]
+    return _fit(window, law, case, _descended(case, starts))
+
+
+def as_fit(found: SmoothFit, window: Window) -> Fit:
+    """The same as a fit of the night, whose noise model has single lags: as many as leave the load's to
+    SMOOTH.cut."""
+    dt_s, p = window.dt_s, found.process
+    pole, slow = math.exp(-dt_s / p.time_constant_s), math.exp(-dt_s / math.exp(found.theta[2]))
+    z1, z2 = math.tanh(found.theta[3]), math.tanh(found.theta[4])
+    longest = max(abs(z1), abs(z2), 1e-3)
+    order = min(max(math.ceil(math.log(SMOOTH.cut) / math.log(longest)), FIT.ar_order), SMOOTH.most_lags)
+    given, memory = np.zeros(order + 1), np.zeros(order + 1)
+    given[:3] = 1.0, -(pole + slow), pole * slow
+    for k in range(order + 1):
+        before = (z1 + z2) * (memory[k - 1] if k else 0.0) - z1 * z2 * (memory[k - 2] if k > 1 else 0.0)
+        memory[k] = given[k] + before
+    dead_s = p.dead_time_s - window.half_block_s
+    known = found.law, found.sigma2, found.count, -memory[1:], np.zeros(4), window
+    return Fit(p.gain, p.time_constant_s, dead_s, *known)
