@@ -177,8 +177,8 @@ def controller(spec: LoopSpec, pv_span: float | None) -> Pid | None:
         ti_s, td_s = abs(kp) * ti_s, td_s / abs(kp)
     elif spec.form is Form.SERIES and td_s != 0 and math.isfinite(ti_s):
         kp, ti_s, td_s = kp * (1 + td_s / ti_s), ti_s + td_s, ti_s * td_s / (ti_s + td_s)
-    scan = {} if spec.scan_s is None else {"scan_s": spec.scan_s}
-    return Pid(kp * unit_ratio(spec, pv_span), ti_s, td_s, **scan)
+    pid = Pid(kp * unit_ratio(spec, pv_span), ti_s, td_s)
+    return pid if spec.scan_s is None else replace(pid, scan_s=spec.scan_s)
 
 
 def as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> tuple[float, float]:
