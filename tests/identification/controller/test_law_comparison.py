@@ -78,7 +78,7 @@ def test_the_gap_is_found_and_the_square_named():
     "stated", [replace(TRUE, ti_s=80.0 / 60.0), replace(TRUE, ti_s=60.0 / 80.0), Pid(50.0, 80.0)]
 )
 def test_units_mistaken_do_not_agree(stated, every):
-    """Minutes or repeats taken for seconds, and a band for a gain, do not agree; found is what is, within a quarter."""
+    """Minutes or repeats taken for seconds, and a band for a gain, do not agree; the true law is found."""
     seen = compared(recorded(lambda e: e, every), stated)
     assert not seen.agree
     assert seen.found.kp == pytest.approx(2.0, rel=0.25)
