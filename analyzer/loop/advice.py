@@ -117,7 +117,8 @@ def _or_repair(verdict: Verdict, other: Advice) -> Advice:
 
 def _lacking(needs: Needs) -> Advice:
     """The advice to get more data, or a test where no data tell, with what is lacking."""
-    action = Action.UNDECIDED if needs.lack is Lack.MANUAL_TEST else Action.NEEDS_DATA
+    others = {Lack.MANUAL_TEST: Action.UNDECIDED, Lack.SWITCHES: Action.NONE}
+    action = others.get(needs.lack, Action.NEEDS_DATA) if needs.lack is not None else Action.NEEDS_DATA
     return Advice(action, str(needs), lack=needs.lack)
 
 
