@@ -121,7 +121,7 @@ def _simplest(seen: Seen, gains: Floats, record_s: float, stated: Pid) -> tuple[
         (np.stack((p + whole * d, i)), none),  # kp and ti
         (np.eye(3), none),
     ]
-    enough = LAW.as_well * seen.left_over_all(seen.free)
+    enough = LAW.as_well * seen.left_over_all(seen.free) + 1e-6  # of an exact law rounding alone is left
     for along, held in trials:
         law = best_gains(seen.moves.values(), seen.weight, along, held)
         pid = _settings(law, record_s, stated)
