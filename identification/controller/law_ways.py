@@ -144,7 +144,9 @@ class Look:
         if not weight.any():
             return None
         free = best_gains(found.values(), weight, np.eye(3), np.zeros(3))
-        if free[2] * free[0] < 0.0:  # no controller has such a derivative: it mends a filter that is not the true one
+        if (
+            free[2] * free[0] < 0.0
+        ):  # no controller has such a derivative: it mends a filter that is not the true one
             free = best_gains(found.values(), weight, np.eye(3)[:2], np.zeros(3))
         return Seen(found, weight, free, shape)
 
