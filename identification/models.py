@@ -6,6 +6,7 @@ Signs: P and I act on e = SP - PV; kp > 0 means that OP falls when PV rises.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -94,12 +95,25 @@ class Form(StrEnum):
     PARALLEL = "parallel"
 
 
+class ErrorForm(StrEnum):
+    """What of the error a controller acts on."""
+
+    LINEAR = "linear"
+    SQUARED = "squared"
+    """e abs(e) / 100: the gain grows with the error, and is kp at an error of 100 %."""
+
+
 @dataclass(frozen=True, slots=True)
 class Pid:
-    """A PID controller in percent of spans and seconds, ideal form.
+    """A PID controller in percent of spans and seconds, ideal form, as simulation/pi.py steps it.
 
-    kp [% OP / % PV] (negative: direct acting), ti_s [s] (inf: no integral), td_s [s], scan_s [s] the
-    period at which it computes (0: continuous), op_lo and op_hi [% OP] its output limits.
+    kp [% OP / % PV] (negative: direct acting; 0: integral alone, whose ti_s is then % PV s per % OP, negative where
+    it is direct acting), ti_s [s] (inf or 0: no integral), td_s [s], scan_s [s] the period at which it computes
+    (0: continuous), op_lo and op_hi [% OP] its output limits. td_filter : N of the derivative's filter, whose time
+    constant is Td / N (0 or inf: none). pv_filter_s : time constant of the filter of PV before the law [s]. gap :
+    size of the error [% PV] inside of which the gain is gap_gain times the gain outside [-]; the law has no jump at
+    its edge. error_form : as above. op_rate : most that OP moves [% OP/s] (inf or 0: no limit). sp_weight and
+    td_sp_weight : what gain and derivative take of the set point's moves [-].
     """
 
     kp: float
@@ -108,6 +122,24 @@ class Pid:
     scan_s: float = 1.0
     op_lo: float = 0.0
     op_hi: float = 100.0
+    td_filter: float = 8.0
+    pv_filter_s: float = 0.0
+    gap: float = 0.0
+    gap_gain: float = 0.0
+    error_form: ErrorForm = ErrorForm.LINEAR
+    op_rate: float = math.inf
+    sp_weight: float = 1.0
+    td_sp_weight: float = 0.0
+
+    @property
+    def ki(self) -> float:
+        """Integral gain [% OP / (% PV s)], 0 where the integral is off."""
+        return (self.kp or 1.0) / self.ti_s if self.ti_s and math.isfinite(self.ti_s) else 0.0
+
+    @property
+    def slope_filter_s(self) -> float:
+        """Time constant of the derivative's filter [s], 0 for none."""
+        return self.td_s / self.td_filter if self.td_filter else 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from identification.models import Fopdt, Integrator, Loop, Pid, Process
 from identification.record import Floats, Mask
 from identification.simulation.closed_loop import scan_step
 from identification.simulation.lag import discretize
+from identification.simulation.pi import kept
 from tuning.describing import Complexes
 
 LOWEST = 1e-6
@@ -50,14 +51,12 @@ def process_response(process: Process, scan_s: float, omega: Floats) -> Complexe
 
 
 def controller_response(controller: Pid, omega: Floats) -> Complexes:
-    """C [% OP / % PV] at omega [rad/s], shape (m,): the velocity form with backward Euler at its scan, or the ideal
-    PID, continuous, where scan_s is 0."""
-    kp, h = controller.kp, controller.scan_s
-    if h > 0:
-        step = 1.0 - np.exp(-1j * omega * h)
-        return kp * (1.0 + _rate(controller) * h / step + controller.td_s / h * step)
-    s = 1j * omega
-    return np.asarray(kp * (1.0 + _rate(controller) / s + controller.td_s * s), np.complex128)
+    """C [% OP / % PV] at omega [rad/s], shape (m,), with its filters and without a gap: the velocity form with
+    backward Euler at its scan, or the PID with a filtered derivative, continuous, where scan_s is 0."""
+    c, h = controller, controller.scan_s
+    s = (1.0 - np.exp(-1j * omega * h)) / h if h > 0 else 1j * omega
+    slope = c.td_s * s / (1.0 + c.slope_filter_s * s)
+    return np.asarray(c.kp * (1.0 + _rate(c) / s + slope) / (1.0 + c.pv_filter_s * s), np.complex128)
 
 
 def loop_response(loop: Loop, omega: Floats) -> Complexes:
@@ -67,9 +66,9 @@ def loop_response(loop: Loop, omega: Floats) -> Complexes:
 
 
 def slowest_s(loop: Loop) -> float:
-    """The slowest time of the loop [s]: time constant, finite integral time, dead time and scan."""
-    ti = integral_s(loop.controller)
-    times = [loop.process.dead_time_s, loop.controller.scan_s, ti if math.isfinite(ti) else 0.0]
+    """The slowest time of the loop [s]: time constant, finite integral time, filter of PV, dead time and scan."""
+    c, ti = loop.controller, integral_s(loop.controller)
+    times = [loop.process.dead_time_s, c.scan_s, c.pv_filter_s, ti if math.isfinite(ti) else 0.0]
     if isinstance(loop.process, Fopdt):
         times.append(loop.process.time_constant_s)
     return max(times)
@@ -96,19 +95,28 @@ def frequencies(loop: Loop, points: int = POINTS, lowest: float = LOWEST) -> Flo
 
 Scanned = tuple[float, float, float, int]
 """Pole, now, before and delay of a process on its scan."""
+Acting = tuple[float, float, float, float]
+"""Of a controller on its scan: gains of integral and derivative over its gain, and what the filters of slope and of
+PV keep of their last value [-]."""
+
+
+def _acting(c: Pid, h: float) -> Acting:
+    """A controller's law at a scan of `h` [s]."""
+    slope_s = c.slope_filter_s
+    return _rate(c) * h, c.td_s / (slope_s + h), kept(slope_s, h), kept(c.pv_filter_s, h)
 
 
 @njit(cache=True)
-def _half_turns(process: Scanned, kp: float, law: tuple[float, float], low: float, points: int) -> int:
+def _half_turns(process: Scanned, kp: float, law: Acting, low: float, points: int) -> int:
     """Half turns about 0 that the characteristic polynomial in 1/z makes along the upper unit circle, from one real
     value to another: how often it crosses the imaginary axis to the left, less how often to the right.
 
-    Its points are `points` even ones and as many in even ratios from `low` [rad] on. The law is the scan over the
-    integral time, and the derivative time over the scan. A controller without integral leaves a factor 1 - 1/z on the
-    circle, which is taken out.
+    Its points are `points` even ones and as many in even ratios from `low` [rad] on. A controller without integral
+    leaves a factor 1 - 1/z on the circle, which is taken out.
     """
     pole, now, before, delay = process
-    rate, td = law
+    rate, td, slope_keep, pv_keep = law
+    kp *= 1.0 - pv_keep
     turns, i, j, last = 0, 0, 0, complex(0.0, 0.0)
     apart, ratio = math.pi / (points - 1), math.exp(math.log(math.pi / low) / (points - 1))
     turn, turn_late = _backwards(apart), _backwards(apart * (delay + 1))
@@ -121,10 +129,11 @@ def _half_turns(process: Scanned, kp: float, law: tuple[float, float], low: floa
             w, late = _backwards(spread), _backwards(spread * (delay + 1))
             spread, j = spread * ratio, j + 1
         step, late = 1.0 - w, (now + before * w) * late
+        own, slope = (1.0 - pole * w) * (1.0 - slope_keep * w) * (1.0 - pv_keep * w), 1.0 - slope_keep * w
         if rate == 0.0:
-            value = 1.0 - pole * w + kp * (1.0 + td * step) * late
+            value = own + kp * (slope + td * step) * late
         else:
-            value = step * (1.0 - pole * w) + kp * (step + rate + td * step * step) * late
+            value = step * own + kp * ((step + rate) * slope + td * step * step) * late
         if i + j > 1 and (value.real < 0.0) != (last.real < 0.0):
             turns += 1 if last.real * value.imag > last.imag * value.real else -1
         last = value
@@ -145,7 +154,7 @@ def stable_gains(loop: Loop, kp: Floats) -> Mask:
     """
     h = max(scan_step(loop), loop.process.dead_time_s / MOST_DELAY)
     d, c = discretize(loop.process, h), loop.controller
-    process, law = (d.pole, d.now, d.before, d.delay), (_rate(c) * h, c.td_s / h)
+    process, law = (d.pole, d.now, d.before, d.delay), _acting(c, h)
     low, points = 1e-3 * h / max(slowest_s(loop), h), CIRCLE + 8 * d.delay
     return np.array([_half_turns(process, float(k), law, low, points) == 0 for k in np.asarray(kp)])
 
@@ -164,7 +173,7 @@ def maximum_sensitivity(loop: Loop) -> float:
     if c.scan_s <= 0:
         return float(np.max(1.0 / np.abs(1.0 + loop_response(loop, omega))))
     d = discretize(loop.process, c.scan_s)
-    process, law = (d.pole, d.now, d.before, d.delay), (_rate(c) * c.scan_s, c.td_s / c.scan_s)
+    process, law = (d.pole, d.now, d.before, d.delay), _acting(c, c.scan_s)
     return 1.0 / float(_least_distance(process, c.kp, law, omega * c.scan_s))
 
 
@@ -177,13 +186,14 @@ def resonance_s(loop: Loop) -> float:
 
 
 @njit(cache=True)
-def _least_distance(process: Scanned, kp: float, law: tuple[float, float], angles: Floats) -> float:
+def _least_distance(process: Scanned, kp: float, law: Acting, angles: Floats) -> float:
     """Least distance of the sampled loop's response to -1 over some angles [rad] of z, shape (m,)."""
     pole, now, before, delay = process
-    rate, td = law
+    rate, td, slope_keep, pv_keep = law
+    kp *= 1.0 - pv_keep
     least = math.inf
     for k in range(angles.size):
         w, late = _backwards(angles[k]), _backwards(angles[k] * (delay + 1))
-        step, g = 1.0 - w, (now + before * w) * late / (1.0 - pole * w)
-        least = min(least, abs(1.0 + g * kp * (1.0 + rate / step + td * step)))
+        step, g = 1.0 - w, (now + before * w) * late / ((1.0 - pole * w) * (1.0 - pv_keep * w))
+        least = min(least, abs(1.0 + g * kp * (1.0 + rate / step + td * step / (1.0 - slope_keep * w))))
     return least

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from analyzer.loop.decisions import Action, Cause, Finding, Lane, Status
+from analyzer.loop.decisions import Action, Cause, Finding, Lack, Lane, Status
 from analyzer.words.units import duration
 
 if TYPE_CHECKING:
@@ -43,6 +43,16 @@ class Rule:
         return found.number(self.figure) > float(getattr(limits, self.limit or self.figure))
 
 
+def _rests(found: Finding, limits: LaneLimits) -> bool:
+    """Whether OP rests at a limit; an OP that switches is at one all the time."""
+    return found.lack is not Lack.SWITCHES and found.number("at_limits_pct") > limits.at_limits_pct
+
+
+def _offset(found: Finding) -> bool:
+    """Whether a lasting error is what the controller leaves: of gain alone, or one that switches."""
+    return found.known.get("ti") == 0.0 or found.lack is Lack.SWITCHES
+
+
 def _at_limit(found: Finding) -> str:
     mean = found.known.get("op_mean_pct")
     side = "" if not isinstance(mean, float) else " lower" if mean < 50 else " upper"
@@ -61,6 +71,8 @@ def _side(found: Finding) -> str:
 
 def _lasting(found: Finding) -> str:
     text = f"PV stays {found.number('lasting_error_pct'):.3g} % of span {_side(found)} SP"
+    if _offset(found):
+        return f"{text}, as a controller without integral action leaves it"
     odd = "though the loop is in automatic and OP off its limits; do tags and ranges belong together?"
     return text if Lane.AT_LIMIT in found.lanes else f"{text} {odd}"
 
@@ -96,7 +108,7 @@ HIDE_SLOW = frozenset({Lane.OSCILLATION, Lane.AT_LIMIT, Lane.FROZEN})
 RULES = (
     Rule(Lane.OSCILLATION, "oscillation_significance", judged=lambda f, limits: f.oscillates),
     Rule(Lane.MANUAL, "manual_pct", lambda f: f"in manual for {f.number('manual_pct'):.0f} % of the time"),
-    Rule(Lane.AT_LIMIT, "at_limits_pct", _at_limit),
+    Rule(Lane.AT_LIMIT, "at_limits_pct", _at_limit, judged=_rests),
     Rule(Lane.LASTING_ERROR, "lasting_error_pct", _lasting, of_measurement=True),
     Rule(Lane.FROZEN, "frozen_pct", _frozen, of_measurement=True),
     Rule(Lane.SLUGGISH, "error_memory_ti", _sluggish, judged=_slow, hidden_by=HIDE_SLOW),
@@ -129,7 +141,8 @@ def action_of(found: Finding) -> Action | None:
         action = Action.NEEDS_DATA
     if action in NOTHING_SURER and found.status is not Status.FAILED:
         asks = [r.lane for r in RULES if r.of_measurement and r.lane in lanes]
-        if asks and not (asks == [Lane.LASTING_ERROR] and Lane.AT_LIMIT in lanes):
+        explained = Lane.AT_LIMIT in lanes or _offset(found)
+        if asks and not (asks == [Lane.LASTING_ERROR] and explained):
             return Action.CHECK_MEASUREMENT
     return Action.UNDECIDED if action is Action.NONE and {Lane.AT_LIMIT, Lane.WINDUP} & set(lanes) else action
 

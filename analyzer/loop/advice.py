@@ -14,6 +14,7 @@ from analyzer.loop.fitness import too_thin
 from analyzer.loop.identified import cautious, load_of, recorded_error, tuned, uncertain
 from analyzer.loop.oscillation import counting
 from analyzer.loop.settings_side_by_side import Comparison, compared
+from analyzer.loops.slips import slip
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import sentences
@@ -117,7 +118,8 @@ def _or_repair(verdict: Verdict, other: Advice) -> Advice:
 
 def _lacking(needs: Needs) -> Advice:
     """The advice to get more data, or a test where no data tell, with what is lacking."""
-    action = Action.UNDECIDED if needs.lack is Lack.MANUAL_TEST else Action.NEEDS_DATA
+    others = {Lack.MANUAL_TEST: Action.UNDECIDED, Lack.SWITCHES: Action.NONE}
+    action = others.get(needs.lack, Action.NEEDS_DATA) if needs.lack is not None else Action.NEEDS_DATA
     return Advice(action, str(needs), lack=needs.lack)
 
 
@@ -132,7 +134,9 @@ def withheld(
         return Advice(Action.NONE, SAID["just_changed"])
     if found.settings is not None and controller is not None:
         listed, followed = (of_controller(pid, spec, pv_span) for pid in (controller, found.settings))
-        return Advice(Action.CHECK_SETTINGS, SAID["differ"].format(listed, followed))
+        return Advice(
+            Action.CHECK_SETTINGS, SAID["differ"].format(listed, followed) + _slip(found, spec, pv_span)
+        )
     if found.needs is not None:
         return _lacking(found.needs)
     if verdict.cause in (Cause.NONE, Cause.LOAD):
@@ -149,6 +153,13 @@ def withheld(
     return _unsupported(found, controller, config)
 
 
+def _slip(found: Assessment, spec: LoopSpec, pv_span: float) -> str:
+    """Which unit or form makes the stated figures those recorded, '' where none does."""
+    changed = {} if found.settings is None else slip(spec, found.settings, pv_span)
+    written = " and ".join(f"{column} {value}" for column, value in changed.items())
+    return SAID["slip"].format(written) if changed else ""
+
+
 def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> Advice | None:
     """What a loop that oscillates for its valve or its tuning lacks for new settings; None where nothing."""
     if found.for_settings is not None and found.verdict.cause is Cause.VALVE:
@@ -157,6 +168,8 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
         return _lacking(found.for_settings)
     if controller is None:
         return _or_repair(found.verdict, Advice(Action.CHECK_SETTINGS, SAID["not_stated"]))
+    if controller.kp == 0.0:
+        return _or_repair(found.verdict, Advice(Action.NONE, SAID["integral_alone"]))
     if found.judged_h < config.advice.least_h:
         return _lacking(Needs(Lack.LONGER, Need.HOURS, (config.advice.least_h, found.judged_h)))
     return _too_thin(found, controller, config)

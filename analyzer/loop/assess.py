@@ -218,7 +218,7 @@ def _judge_stretch(prepared: Prepared, stretch: Stretch, config: Config, kind: s
         scale = time_scale(part.record, counting(found), stated)
         settings = differing(part.record, stated, scale, config.settings)
     found, verdict = convicted(part, found, settings or stated, config, kind)
-    if _hours_in(part.record) < config.advice.least_h or too_thin(record.dt_s, stated, config):
+    if _hours_in(part.record) < config.advice.least_h or too_thin(record.dt_s, settings or stated, config):
         verdict = as_hint(verdict, config.advice.hint_pct)
     return _Judged(part, found if whole else of_all, found, verdict, settings)
 
@@ -274,7 +274,7 @@ def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: C
         waves=waves_of(record.tag, judged.of_all, end_s, config.plant),
         trend=thinned(record, FINE_BUCKETS if counting(found) else BUCKETS, close),
         notes=prepared.notes,
-        needs=hidden(judged.part.record, found, stretch.controller, config),
+        needs=hidden(judged.part.record, found, judged.settings or stretch.controller, config),
         close_s=None if close is None else (_at(record, close[0]), _at(record, close[1])),
         for_settings=unfit_for_settings(prepared, config),
         judged_h=_hours_in(judged.part.record),

@@ -108,9 +108,10 @@ def needed(m: Measured, limits: CauseLimits, oscillating: bool) -> float:
 
 
 def speaks(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
-    """Whether PV speaks for a fault of the valve: enough evidence, and a process that goes the controller's way."""
+    """Whether PV speaks for a fault of the valve: enough evidence, a process that goes the controller's way, and a
+    width that OP has crossed."""
     wrong_way = m.controller is not None and m.controller.kp * m.play.gain < 0
-    return m.evidence >= needed(m, limits, oscillating) and not wrong_way
+    return m.evidence >= needed(m, limits, oscillating) and not wrong_way and m.size <= limits.widest
 
 
 def agrees(m: Measured, limits: CauseLimits) -> bool:

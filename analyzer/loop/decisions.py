@@ -113,6 +113,7 @@ class Lack(StrEnum):
     MOVING_OP = "moving OP"
     OP_RANGE = "OP's range"
     OP_OFF_LIMITS = "OP off its limits"
+    SWITCHES = "OP of more than two values"
     UNCOMPRESSED = "uncompressed trends"
     UNBROKEN = "unbroken samples"
     FASTER = "faster samples"
@@ -141,6 +142,7 @@ class Need(StrEnum):
     UNCOMPRESSED = auto()
     ARCHIVED = auto()
     OFF_LIMITS = auto()
+    SWITCHES = auto()
     MODEL = auto()
     OF_A_CYCLE = auto()
     UNFOLDED = auto()

@@ -9,6 +9,7 @@ from analyzer.loop.assessments import at_limits_share
 from analyzer.loop.decisions import Lack, Need, Needs
 from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared, op_range
+from identification.controller.switching import switching
 from identification.limits import RecorderLimits
 from identification.mismatch.recording import least_jump
 from identification.models import Pid
@@ -25,6 +26,9 @@ def unfit_for_cause(prepared: Prepared, oscillation: Oscillation | None, config:
         return Needs(Lack.OP, Need.OP)
     if float(np.ptp(record.op)) == 0.0:
         return Needs(Lack.MOVING_OP, Need.MOVING_OP)
+    two = switching(record.op, record.usable)
+    if two is not None:
+        return Needs(Lack.SWITCHES, Need.SWITCHES, (two.low, two.high, two.switches))
     jumps = pv_that_jumps(record, config.explain.recorder)
     return jumps or compressed(prepared, oscillation, q) or at_limits(record, q)
 

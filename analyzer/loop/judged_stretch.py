@@ -24,7 +24,7 @@ from analyzer.loops.changes import TuningChange, settings_before
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller as stated_controller
 from identification.controller.check import runs
-from identification.controller.pid_regression import LawsCompared, compare_laws
+from identification.controller.law_comparison import LawsCompared, compare_laws
 from identification.models import Pid
 from identification.record import LoopRecord, Mask
 
@@ -120,21 +120,51 @@ def differing(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsL
     """
     if record.mask("compressed").mean() > limits.straight_share:
         return None
-    if stated.ti_s < limits.judged_ti_samples * record.dt_s:
-        return None
     for part in (record.span(len(record) // 2, len(record)), record):
         seen = compare_laws(part, scale_s, stated)
-        if seen is not None and seen.found == stated:
+        if seen is None:
+            continue
+        if seen.agree:
             return None
-        if seen is not None and _plainly(seen, stated, record.dt_s, limits):
+        if _plainly(seen, stated, record.dt_s, limits):
             return seen.found
+        form = _of_another_form(part, stated, scale_s, limits)
+        if form is not None:
+            return form
     return None
+
+
+def _of_another_form(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits) -> Pid | None:
+    """The controller whose settings were stated in another form, series for ideal or the reverse, where the record
+    obeys it; the stated one is known not to be it."""
+    for other in other_forms(stated):
+        if _factor(other.kp, stated.kp) >= limits.factor_of_form:
+            seen = compare_laws(record, scale_s, other)
+            if seen is not None and seen.agree:
+                return other
+    return None
+
+
+def other_forms(c: Pid) -> tuple[Pid, ...]:
+    """What a controller with a derivative is where the settings of its series form were read as ideal ones, and where
+    those of its ideal form were read as series; the latter where there are such settings."""
+    if c.td_s == 0.0 or not c.ki or c.kp == 0.0:
+        return ()
+    ratio = c.td_s / c.ti_s
+    out = [replace(c, kp=c.kp * (1 + ratio), ti_s=c.ti_s + c.td_s, td_s=c.td_s / (1 + ratio))]
+    if ratio < 0.25:
+        share = 0.5 * (1 + math.sqrt(1 - 4 * ratio))
+        out.append(replace(c, kp=c.kp * share, ti_s=c.ti_s * share, td_s=c.td_s / share))
+    return tuple(out)
 
 
 def _plainly(seen: LawsCompared, stated: Pid, dt_s: float, limits: SettingsLimits) -> bool:
     """Whether the stated law is another than the one found, and explains plainly less: noise that the recorder adds
     to PV leaves the true law 1/explained times what it leaves the best."""
     if seen.explained < limits.explained or seen.explained - seen.explained_stated < limits.gain:
+        return False
+    unseen = limits.judged_ti_samples * dt_s
+    if seen.found.ti_s < unseen or (stated.ti_s < unseen and seen.explained < limits.explained_unseen):
         return False
     apart = _apart(seen.found, stated, dt_s, limits.filtered)
     return seen.left * seen.explained >= limits.left and apart >= limits.factor

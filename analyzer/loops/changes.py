@@ -21,7 +21,22 @@ from identification.errors import InputError
 
 TIMES = ("ti_old", "ti_new")
 COLUMNS = ("loop", "time", "kp_old", "ti_old", "kp_new", "ti_new", "who")
-SETTINGS = ("kp", "ti", "td", "form", "gain_unit", "ti_unit", "scan_s")
+SETTINGS = (
+    *(
+        "kp",
+        "ti",
+        "td",
+        "form",
+        "gain_unit",
+        "ti_unit",
+        "scan_s",
+        "gap",
+        "gap_gain",
+        "error_form",
+        "pv_filter_s",
+    ),
+    *("op_rate", "op_lo_limit", "op_hi_limit", "sp_weight", "td_filter"),
+)
 """What a dated row of loops.csv changes; tags, ranges and texts are those of the last row."""
 
 

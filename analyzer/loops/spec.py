@@ -18,7 +18,7 @@ from analyzer.history.plant_clock import UTC_NAME
 from analyzer.history.stamps import parse_time
 from analyzer.limits import HISTORY
 from identification.errors import InputError
-from identification.models import Form
+from identification.models import ErrorForm, Form
 
 STATED: dict[str, Any] = tomllib.loads(Path(__file__).with_name("loops.toml").read_text(encoding="utf-8"))
 """What tags end in, what columns may hold and other systems call them, and what is assumed where a row is silent."""
@@ -50,7 +50,8 @@ class LoopSpec:
     whose PV it keeps a ratio, `split_of` the controller of whose split range it is a half, `override_with` the one
     with which it shares a valve by a select; `beside` is the output of one of the latter two. `feedforward` is a loop
     or tag that acts on OP beside the error, `feed` its tag where the export has it. `kp`, `ti`, `td` are as stated,
-    in `gain_unit`, `ti_unit` and `form`; `pv_lo` and `pv_hi` in the PV's own unit, `op_lo` and `op_hi` in the OP's.
+    in `gain_unit`, `ti_unit` and `form`; `pv_lo`, `pv_hi` and `gap` in the PV's own unit, `op_lo`, `op_hi`, the
+    limits of OP and of its rate (a second) in the OP's. `kp` is 0 where the integral acts alone.
     `extra` holds columns of the plant's own, `stated` the names of the columns that the row fills. `valid_from_s` is
     when the row's settings came into force [s since 1970-01-01 UTC], None where it does not say; `earlier` holds the
     loop's rows before it, the oldest first.
@@ -82,6 +83,15 @@ class LoopSpec:
     gain_unit: str = "percent"
     ti_unit: str = "s"
     scan_s: float | None = None
+    gap: float = 0.0
+    gap_gain: float = 0.0
+    error_form: ErrorForm = ErrorForm.LINEAR
+    pv_filter_s: float = 0.0
+    op_rate: float | None = None
+    op_lo_limit: float | None = None
+    op_hi_limit: float | None = None
+    sp_weight: float = 1.0
+    td_filter: float | None = None
     importance: float | None = None
     extra: Mapping[str, str] = field(default_factory=dict)
     stated: frozenset[str] = frozenset()
@@ -204,7 +214,13 @@ def _spec(where: str, cells: Mapping[str, str], zone: str, day_first: bool | Non
         raise InputError(f"{where}: no loop name", "a name in column 'loop'", "name the loop")
     given: dict[str, Any] = {name: filled[name] for name in (*CELLS["texts"], *ROLES) if name in filled}
     numbers = {name: _number_in_bounds(where, name, filled[name]) for name in NUMBERS if name in filled}
-    given |= {name: value for name, value in numbers.items() if value or name not in CELLS["off_is_empty"]}
+    off = [name for name in CELLS["off_is_empty"] if not (name == "kp" and numbers.get("ti"))]
+    given |= {name: value for name, value in numbers.items() if value or name not in off}
+    if given.get("ti", 0.0) < 0.0 and given.get("kp") != 0.0:
+        seen = f"{where}, column 'ti': {given['ti']:g}"
+        raise InputError(
+            seen, "a number, not below 0 where kp, whose sign says how it acts, is not 0", "correct the cell"
+        )
     given |= {name: _choice(where, name, filled[name]) for name in CHOICES if name in filled}
     if VALID_FROM in filled:
         place = f"{where}, column '{VALID_FROM}'"
@@ -221,6 +237,8 @@ def _spec(where: str, cells: Mapping[str, str], zone: str, day_first: bool | Non
 
 
 def _number_in_bounds(where: str, name: str, cell: str) -> float:
+    if name == "ti" and cell.lower() in CELLS["no_integral"]:
+        return 0.0
     try:
         number = float(cell if "." in cell else cell.replace(",", "."))
     except ValueError:
@@ -238,7 +256,8 @@ def _choice(where: str, name: str, cell: str) -> str:
     if cell.lower() not in CHOICES[name]:
         seen = f"{where}, column '{name}': '{cell}'"
         raise InputError(seen, f"one of {', '.join(CHOICES[name])}", "correct the cell or empty it")
-    return Form(cell.lower()) if name == "form" else cell.lower()
+    kinds = {"form": Form, "error_form": ErrorForm}
+    return kinds[name](cell.lower()) if name in kinds else cell.lower()
 
 
 def spec_of(specs: Sequence[LoopSpec], loop: str) -> LoopSpec:

@@ -154,7 +154,8 @@ def controller(spec: LoopSpec, pv_span: float | None) -> Pid | None:
     series    Kp (1 + 1/(Ti s)) (1 + Td s) e
     parallel  Kp e + 1/Ti int e dt + Td de/dt, the latter two with the sign of Kp and in the units of Kp
     A band is 100/Kp in percent. An integral time of 0 means that there is no integral action. Derivative time
-    is in the unit of the integral time, in minutes where that is repeats/min.
+    is in the unit of the integral time, in minutes where that is repeats/min. A kp of 0 with an integral time is the
+    law 1/Ti int e dt, negative where OP rises with PV.
 
     Parameters
     ----------
@@ -167,18 +168,39 @@ def controller(spec: LoopSpec, pv_span: float | None) -> Pid | None:
     InputError
         The gain is in engineering units and there is no span.
     """
-    if spec.kp is None or spec.ti is None or spec.kp == 0:
+    if spec.kp is None or spec.ti is None or (spec.kp == 0 and not spec.ti):
         return None
-    kp = 100 / spec.kp if spec.gain_unit == "band" else spec.kp
+    kp = 100 / spec.kp if spec.gain_unit == "band" and spec.kp else spec.kp
     repeats = spec.ti_unit == "repeats/min"
     ti_s = math.inf if spec.ti == 0 else 60 / spec.ti if repeats else spec.ti * _unit_s(spec)
     td_s = (spec.td or 0.0) * _unit_s(spec)
+    if kp == 0.0:
+        return _with_extras(Pid(0.0, ti_s / unit_ratio(spec, pv_span)), spec, pv_span)
     if spec.form is Form.PARALLEL:
         ti_s, td_s = abs(kp) * ti_s, td_s / abs(kp)
     elif spec.form is Form.SERIES and td_s != 0 and math.isfinite(ti_s):
         kp, ti_s, td_s = kp * (1 + td_s / ti_s), ti_s + td_s, ti_s * td_s / (ti_s + td_s)
-    scan = {} if spec.scan_s is None else {"scan_s": spec.scan_s}
-    return Pid(kp * unit_ratio(spec, pv_span), ti_s, td_s, **scan)
+    return _with_extras(Pid(kp * unit_ratio(spec, pv_span), ti_s, td_s), spec, pv_span)
+
+
+def _with_extras(pid: Pid, spec: LoopSpec, pv_span: float | None) -> Pid:
+    """The controller with what else its row states, in percent and seconds."""
+    op_span = spec.op_hi - spec.op_lo
+    limits = ((spec.op_lo_limit, pid.op_lo), (spec.op_hi_limit, pid.op_hi))
+    low, high = (other if own is None else 100.0 * (own - spec.op_lo) / op_span for own, other in limits)
+    return replace(
+        pid,
+        scan_s=pid.scan_s if spec.scan_s is None else spec.scan_s,
+        op_lo=low,
+        op_hi=high,
+        td_filter=pid.td_filter if spec.td_filter is None else spec.td_filter,
+        pv_filter_s=spec.pv_filter_s,
+        gap=100.0 * spec.gap / (pv_span or 100.0),
+        gap_gain=spec.gap_gain,
+        error_form=spec.error_form,
+        op_rate=math.inf if spec.op_rate is None else 100.0 * spec.op_rate / op_span,
+        sp_weight=spec.sp_weight,
+    )
 
 
 def as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> tuple[float, float]:
@@ -187,6 +209,9 @@ def as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> tuple[float, f
     The inverse of `controller`. No integral action is stated as 0. The series form knows no Ti < 4 Td; there
     it gets the nearest, both its times alike.
     """
+    if pid.kp == 0.0:
+        alone_s = pid.ti_s * unit_ratio(spec, pv_span)
+        return 0.0, 60 / alone_s if spec.ti_unit == "repeats/min" else alone_s / _unit_s(spec)
     gain = pid.kp / unit_ratio(spec, pv_span)
     share = _series_share(pid, spec)
     ti_s = pid.ti_s / abs(gain) if spec.form is Form.PARALLEL else pid.ti_s * share

@@ -9,8 +9,9 @@ from analyzer.history.plant_clock import stamp
 from analyzer.loop.assess import hidden, unassessable
 from analyzer.loop.decisions import Needs
 from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
-from analyzer.loop.judged_stretch import controller_of
-from analyzer.loop.oscillation import detect
+from analyzer.loop.judged_stretch import controller_of, differing
+from analyzer.loop.measure import time_scale
+from analyzer.loop.oscillation import counting, detect
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec
@@ -33,12 +34,21 @@ def _fit_for(lacking: Needs | None, spec: LoopSpec, prepared: Prepared, config: 
     if lacking is not None:
         return f"fit for nothing: {lacking}"
     stated = controller_of(spec, prepared) if prepared.op_scaled else None
-    unseen = hidden(prepared.record, detect(prepared.record, config.oscillation), stated, config)
+    found = detect(prepared.record, config.oscillation)
+    unseen = hidden(prepared.record, found, stated, config)
+    if unseen is not None and stated is not None:
+        scale = time_scale(prepared.record, counting(found), stated)
+        recorded = differing(prepared.record, stated, scale, config.settings)
+        unseen = unseen if recorded is None else hidden(prepared.record, found, recorded, config)
+        stated = recorded or stated
     if unseen is not None:
         return f"fit for its figures alone: {unseen}"
     unfit = unfit_for_cause(prepared, None, config)
     if unfit is not None:
         return f"fit for oscillation and assessments; not for the cause: {unfit}"
+    if (spec.kp is None) != (spec.ti is None):
+        named, other = ("ti", "kp") if spec.kp is None else ("kp", "ti")
+        return f"fit for all but new settings: loops.csv states {named} and no {other}: add it (ti 0: no integral)"
     unset = unfit_for_settings(prepared, config) or too_thin(prepared.record.dt_s, stated, config)
     return "fit for all questions" if unset is None else f"fit for all but new settings: {unset}"
 

@@ -19,6 +19,7 @@ from analyzer.words.units import duration, gain_unit
 from identification.models import Integrator, Pid
 from identification.simulation.closed_loop import scan_step
 from identification.simulation.lag import discretize
+from identification.simulation.pi import per_scan
 from identification.simulation.valve import law_of
 from reports import pages as parts
 from reports.texts import slug
@@ -233,12 +234,22 @@ def model(c: Comparison, spec: LoopSpec, unit: str) -> str:
     loop, h = c.loop, scan_step(c.loop)
     d, pid = discretize(loop.process, h), c.loop.controller
     breakaway, sliding, tolerance = law_of(loop.valve)
+    law = per_scan(pid, h)
     alike = [t for t in c.tried if t.controller.td_s == pid.td_s]  # the sliders move Kp and Ti alone
     found: dict[str, Any] = {
         "process": {"pole": d.pole, "now": d.now, "before": d.before, "delay": d.delay},
         "valve": {"breakaway": breakaway, "sliding": sliding, "tolerance": _finite(tolerance)},
         "scan_s": h,
         "td_s": pid.td_s,
+        "controller": {
+            "slope": law.kd / law.kp,
+            "slope_keep": law.slope_keep,
+            "pv_keep": law.pv_keep,
+            "gap": law.gap,
+            "gap_gain": law.gap_gain,
+            "squared": law.squared > 0.0,
+            "most": _finite(law.most),
+        },
         "op_lo": pid.op_lo,
         "op_hi": pid.op_hi,
         "op_start": 0.5 * (pid.op_lo + pid.op_hi),

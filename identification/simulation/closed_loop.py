@@ -38,15 +38,13 @@ def _closed(
 ) -> tuple[Floats, Floats, Floats]:
     n = sp.size
     pv, op, stem = np.empty(n), np.empty(n), np.empty(n)
-    y, u = 0.0, op0
+    y = 0.0
     moved, rest = (op0, 0.0, op0), op0
-    y1 = y2 = sp[0] + load[0]
-    e1 = sp[0] - y1
+    seen = (op0, sp[0], sp[0] + load[0], 0.0)
     for k in range(n):
         pv[k] = sp[0] + y + load[k]
-        e = sp[k] - pv[k]
-        u = next_op(u, law, e, e1, pv[k] - 2 * y1 + y2)
-        e1, y2, y1 = e, y1, pv[k]
+        seen = next_op(seen, law, sp[k], pv[k])
+        u = seen[0]
         op[k] = u
         moved = stem_step(moved, u, valve)
         stem[k] = moved[0] if valve.breakaway > 0 else u
@@ -105,7 +103,8 @@ def _closed_model(
     start: tuple[float, float],
 ) -> tuple[Floats, Floats]:
     dt_s, middle, level, head = frame
-    op, e1 = start
+    op, pv0 = start
+    seen = (op, sp[0], pv0, 0.0)
     n = sp.size
     pv, out, flow, free = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     flow[0] = flow_step(op, m.copy(), c, friction, dt_s, middle)
@@ -113,9 +112,8 @@ def _closed_model(
     for k in range(n):
         x = (1.0 - c[SHARE]) * vessel[0] + c[SHARE] * vessel[1]
         pv[k] = min(max(level + x, c[CLIP_LO]), c[CLIP_HI])
-        e = sp[k] - pv[k]
-        op = next_op(op, law, e, e1, 0.0)
-        e1 = e
+        seen = next_op(seen, law, sp[k], pv[k])
+        op = seen[0]
         out[k] = op
         flow[k] = flow_step(op, m, c, friction, dt_s, middle)
         vessel = vessel_span((k, k + 1), vessel, (flow, load, gain), c, dt_s, middle, head, free)
@@ -138,9 +136,9 @@ def closed_model(
             "an effect that acts on whole trends: run it open loop"
         )
     op0 = float(inputs.op[0])
-    e0 = float(sp[0]) - (inputs.level + float(c[Slot.START]))
-    law = (kp, kp / ti_samples, 0.0, 0.0, 100.0)
+    pv0 = inputs.level + float(c[Slot.START])
+    law = Law(kp, kp / ti_samples)
     own = counted_from_level(inputs, c)
     frame = (inputs.dt_s, inputs.middle, inputs.level, outflow_head(inputs, c))
     gain, load = gain_over_record(inputs, c), load_over_record(inputs, c)
-    return _closed_model(sp, load, gain, own, law, friction_of(c), memory(op0), frame, (op0, e0))
+    return _closed_model(sp, load, gain, own, law, friction_of(c), memory(op0), frame, (op0, pv0))

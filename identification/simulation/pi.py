@@ -1,35 +1,94 @@
-"""The PI(D) law, once: the velocity form with backward-Euler integration and derivative on PV.
+"""The PID law, once: the velocity form with backward-Euler integration and a filtered derivative.
 
-OP(k) = OP(k-1) + kp (e(k) - e(k-1)) + ki e(k) - kd (PV(k) - 2 PV(k-1) + PV(k-2)), held within its limits, which is
-its anti-windup; ki = kp dt/Ti, kd = kp Td/dt. e = SP - PV, so kp > 0 means that OP falls when PV rises.
+PV passes a lag of pv_filter_s first. With e = SP - PV, dSP the move of SP, and s(e) what of the error counts (all of
+it; less inside the gap; e abs(e) / 100), OP moves at each scan by
+
+    kp (s(e(k)) - s(e(k-1) + (1 - sp_weight) dSP)) + ki s(e(k)) + D(k) - D(k-1)
+    D(k) = a D(k-1) - kp Td / (Tf + dt) (PV(k) - PV(k-1) - td_sp_weight dSP),  Tf = Td / N,  a = Tf / (Tf + dt)
+
+at the most by op_rate dt, and is held within its limits, which is its anti-windup; ki = kp dt/Ti. kp > 0 means that
+OP falls when PV rises. The derivative with its filter is that of Astrom, Hagglund (2006), in backward differences.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from identification.models import Pid
+from identification.models import ErrorForm, Pid
 from identification.record import Floats
 
-Law = tuple[float, float, float, float, float]
-"""kp, ki, kd and the limits of OP [% OP], per scan."""
+
+class Law(NamedTuple):
+    """The constants of a law per scan: gains, what the filters keep of their last value [-], the shape of the error,
+    limits of OP [% OP] and most that it moves [% OP]."""
+
+    kp: float
+    ki: float
+    kd: float = 0.0
+    slope_keep: float = 0.0
+    pv_keep: float = 0.0
+    gap: float = 0.0
+    gap_gain: float = 0.0
+    squared: float = 0.0
+    op_lo: float = 0.0
+    op_hi: float = 100.0
+    most: float = math.inf
+    sp_weight: float = 1.0
+    td_sp_weight: float = 0.0
+
+
+Memory = tuple[float, float, float, float]
+"""OP, SP, PV behind its filter, and derivative part, of the scan before [%]."""
+
+
+def kept(lag_s: float, scan_s: float) -> float:
+    """Share of its last value that a lag keeps from scan to scan, in backward differences [-]."""
+    return lag_s / (lag_s + scan_s)
 
 
 def per_scan(c: Pid, scan_s: float) -> Law:
     """The law's constants at a scan interval [s]."""
-    ki = c.kp * scan_s / c.ti_s if c.ti_s > 0 and math.isfinite(c.ti_s) else 0.0
-    return c.kp, ki, c.kp * c.td_s / scan_s, c.op_lo, c.op_hi
+    return Law(
+        c.kp,
+        c.ki * scan_s,
+        c.kp * c.td_s / (c.slope_filter_s + scan_s),
+        kept(c.slope_filter_s, scan_s),
+        kept(c.pv_filter_s, scan_s),
+        c.gap,
+        c.gap_gain,
+        float(c.error_form is ErrorForm.SQUARED),
+        c.op_lo,
+        c.op_hi,
+        c.op_rate * scan_s if c.op_rate > 0 else math.inf,
+        c.sp_weight,
+        c.td_sp_weight,
+    )
 
 
 @njit(cache=True)
-def next_op(op: float, law: Law, e: float, e1: float, bend: float) -> float:
-    """OP after one scan, of the OP before; bend : second difference of PV."""
-    kp, ki, kd, low, high = law
-    op += kp * (e - e1) + ki * e - kd * bend
-    return min(max(op, low), high)
+def acting_error(e: float, law: Law) -> float:
+    """What of an error [% PV] the law acts on."""
+    if law.gap > 0.0:
+        inside = min(max(e, -law.gap), law.gap)
+        e += (law.gap_gain - 1.0) * inside
+    return e * abs(e) / 100.0 if law.squared > 0.0 else e
+
+
+@njit(cache=True)
+def next_op(before: Memory, law: Law, sp: float, pv: float) -> Memory:
+    """Memory after one scan, whose first value is OP."""
+    op, sp1, y1, d1 = before
+    y = law.pv_keep * y1 + (1.0 - law.pv_keep) * pv
+    moved = sp - sp1
+    e = acting_error(sp - y, law)
+    d = law.slope_keep * d1 - law.kd * (y - y1 - law.td_sp_weight * moved)
+    move = law.kp * (e - acting_error(sp - law.sp_weight * moved - y1, law)) + law.ki * e + d - d1
+    op = min(max(op + min(max(move, -law.most), law.most), law.op_lo), law.op_hi)
+    return op, sp, y, d
 
 
 def due_moves(e: Floats, kp: float, ti: float) -> Floats:
@@ -44,11 +103,10 @@ def gapped(e: Floats, kp: float, ki: float, width: float, catches_up: bool) -> F
     catches_up : whether the proportional part, on leaving the gap, answers for what e did within.
     """
     out = np.empty_like(e)
-    law = (kp, ki, 0.0, -np.inf, np.inf)
     u, last = 0.0, e[0]
     for k in range(e.size):
         if abs(e[k]) >= width:
-            u = next_op(u, law, e[k], last, 0.0)
+            u += kp * (e[k] - last) + ki * e[k]
             last = e[k]
         elif not catches_up:
             last = e[k]

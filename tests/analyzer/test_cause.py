@@ -10,7 +10,6 @@ import pytest
 
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.cause import Verdict, dead_valve, judge
-from analyzer.loop.decisions import Lack
 from analyzer.loop.quality import prepare
 from analyzer.plantwide.night import followers_of, trace
 from analyzer.words.reason import sign_text

@@ -55,15 +55,22 @@
 
   function simulate(model, load, kp, tiS) {
     const all = driven(model, load, kp, tiS), d = all.load, n = d.length, p = model.process, h = model.scan_s;
-    const ki = isFinite(tiS) && tiS > 0 ? kp * h / tiS : 0, kd = kp * model.td_s / h;
+    const ki = isFinite(tiS) && tiS > 0 ? kp * h / tiS : 0, c = model.controller;
+    const most = c.most === null ? Infinity : c.most;
+    const acting = function (error) {
+      const e = c.gap > 0 ? error + (c.gap_gain - 1) * Math.min(Math.max(error, -c.gap), c.gap) : error;
+      return c.squared ? e * Math.abs(e) / 100 : e;
+    };
     const error = new Float64Array(n), op = new Float64Array(n), stem = new Float64Array(n);
     const stemAt = follower(model.valve, model.op_start);
-    let y = 0, u = model.op_start, e1 = -d[0], y1 = d[0], y2 = d[0];
+    let y = 0, u = model.op_start, y1 = d[0], slope = 0;
     for (let k = 0; k < n; k += 1) {
-      const pv = y + d[k], e = -pv;
-      u = Math.min(Math.max(u + (kp * (e - e1) + ki * e - kd * (pv - 2 * y1 + y2)), model.op_lo), model.op_hi);
-      e1 = e; y2 = y1; y1 = pv;
-      error[k] = e; op[k] = u; stem[k] = stemAt(u);
+      const pv = y + d[k], seen = c.pv_keep * y1 + (1 - c.pv_keep) * pv, e = acting(-seen), before = slope;
+      slope = c.slope_keep * slope - kp * c.slope * (seen - y1);
+      const move = kp * (e - acting(-y1)) + ki * e + slope - before;
+      u = Math.min(Math.max(u + Math.min(Math.max(move, -most), most), model.op_lo), model.op_hi);
+      y1 = seen;
+      error[k] = -pv; op[k] = u; stem[k] = stemAt(u);
       const late = k >= p.delay ? stem[k - p.delay] - model.op_start : 0;
       const later = k >= p.delay + 1 ? stem[k - p.delay - 1] - model.op_start : 0;
       y = p.pole * y + p.now * late + p.before * later;

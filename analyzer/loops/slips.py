@@ -1,0 +1,50 @@
+"""Which slip of the pen in loops.csv would make its settings those that a record shows: a unit, or a form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import product
+
+from analyzer.loops.spec import CHOICES, LoopSpec
+from analyzer.loops.tags import controller
+from identification.errors import InputError
+from identification.models import Form, Pid
+
+WITHIN = 1.3
+"""Factor within which settings count as those recorded; ours: the check of settings tells no less."""
+
+
+def _readings(spec: LoopSpec) -> Iterator[tuple[dict[str, str], LoopSpec]]:
+    """The row with another unit of time or of gain or another form, those that change least first."""
+    every = product(CHOICES["ti_unit"], CHOICES["gain_unit"], CHOICES["form"])
+    own = (spec.ti_unit, spec.gain_unit, str(spec.form))
+    for other in sorted(every, key=lambda x: sum(a != b for a, b in zip(x, own, strict=True))):
+        changed = {
+            name: b for name, a, b in zip(("ti_unit", "gain_unit", "form"), own, other, strict=True) if a != b
+        }
+        if changed and (spec.td or "form" not in changed or other[2] == Form.PARALLEL):
+            yield changed, replace(spec, ti_unit=other[0], gain_unit=other[1], form=Form(other[2]))
+
+
+def slip(spec: LoopSpec, found: Pid, pv_span: float | None) -> dict[str, str]:
+    """The columns and what to write into them, with which the stated figures are the settings found; empty for none.
+
+    found : in percent and seconds; pv_span : in the PV's own unit.
+    """
+    for changed, reading in _readings(spec):
+        try:
+            pid = controller(reading, pv_span)
+        except InputError:  # a gain in engineering units, and no range
+            continue
+        if pid is not None and _apart(pid.kp, found.kp) <= WITHIN and _apart(pid.ti_s, found.ti_s) <= WITHIN:
+            return changed
+    return {}
+
+
+def _apart(a: float, b: float) -> float:
+    """How many times one is the other, at least 1; inf where one is nothing or the signs differ."""
+    if a == b:
+        return 1.0
+    return max(a / b, b / a) if a * b > 0 and math.isfinite(a) and math.isfinite(b) else math.inf

@@ -1,0 +1,130 @@
+"""A stated law beside the one that the record shows: which of its settings are others, with all allowed that no list
+states."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import chain
+
+import numpy as np
+
+from identification.controller.law_ways import (
+    STRAIGHT,
+    Look,
+    Seen,
+    bent_shapes,
+    gains_of,
+    look,
+    rough_ways,
+    shape_of,
+    usual_ways,
+    with_shape,
+)
+from identification.controller.pid_regression import best_gains, blurred, explained, integral_time
+from identification.limits import LAW
+from identification.models import Pid
+from identification.record import Floats, LoopRecord
+
+
+@dataclass(frozen=True, slots=True)
+class LawsCompared:
+    """A law found beside a stated one, over the increments that tell most against the stated: the shares of OP's
+    variance that each explains there [-], and whether the stated one is that of the record."""
+
+    found: Pid
+    explained: float
+    explained_stated: float
+    agree: bool = False
+
+    @property
+    def left(self) -> float:
+        """What the stated law leaves over what the found one does [-]."""
+        return (1.0 - self.explained_stated) / max(1.0 - self.explained, 1e-9)
+
+
+def _ways(x: Look, longest_s: float, stated: Pid) -> Iterator[Seen]:
+    """All ways, the stated shape's first, then those of what no list states."""
+    own, gains = shape_of(stated), gains_of(stated)
+    yield from usual_ways(x, longest_s, stated, own)
+    if stated.scan_s < x.record.dt_s:
+        yield from rough_ways(x, own)
+    if own == STRAIGHT:
+        for shape in bent_shapes(x, gains):
+            yield from chain(usual_ways(x, 0.0, replace(stated, td_s=0.0), shape), rough_ways(x, shape))
+    else:
+        yield from usual_ways(x, longest_s, stated, STRAIGHT)
+
+
+def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompared | None:
+    """A stated law, and the one that the record shows, which differs in as few settings as explain OP.
+
+    period_s : period, or other time scale on which the loop moves [s]. None where the record tells none; the
+    stated law, with the shape of error that the record shows, where that does.
+    """
+    gains, x = gains_of(stated), look(record, period_s, stated)
+    best, given = None, None
+    for seen in _ways(x, LAW.longest_filter * period_s, stated):
+        if seen.does(gains):
+            return LawsCompared(with_shape(stated, seen.shape), 1.0, 1.0, True)
+        if best is None or seen.poorness(seen.free) < best.poorness(best.free) - LAW.worth:
+            best = seen
+        if given is None or seen.poorness(gains) < given.poorness(gains):
+            given = seen
+        if _settled(best, given, gains):
+            break
+    if best is None or given is None:
+        return None
+    found = _simplest(best, gains, record.duration_s, with_shape(stated, best.shape))
+    return None if found is None else _most_apart(best, given, gains, *found)
+
+
+def _settled(best: Seen, given: Seen, gains: Floats) -> bool:
+    """Whether another law gives all of OP and the stated one far from it, so that no further way changes that."""
+    left = best.left_over_all(best.free)
+    return left < LAW.small and given.left_over_all(gains) > max(10.0 * left, LAW.gives)
+
+
+def _most_apart(best: Seen, given: Seen, gains: Floats, pid: Pid, law: Floats) -> LawsCompared | None:
+    """The law found beside the stated one, over the increments that tell them apart."""
+    stated = {k: explained(m, gains) + blurred(m, gains) for k, m in given.moves.items()}
+    laws = [
+        LawsCompared(pid, explained(m, law), stated[k])
+        for (k, m), weight in zip(best.moves.items(), best.weight, strict=True)
+        if weight > 0 and k in stated
+    ]
+    return max(laws, key=lambda x: x.left * x.explained, default=None)
+
+
+def _settings(gains: Floats, record_s: float, stated: Pid) -> Pid | None:
+    """The settings that gains make; None where no controller has them."""
+    kp, ki, kd = (float(g) for g in gains)
+    if kp == 0:
+        return replace(stated, kp=0.0, ti_s=1.0 / ki, td_s=0.0) if ki else None
+    if kd / kp < -1e-9:
+        return None
+    ti_s = integral_time(kp, ki, record_s)
+    integral_runs_back = ki / kp < 0 and abs(ki / kp) * record_s > 1.0 / LAW.longest_integral
+    return None if integral_runs_back else replace(stated, kp=kp, ti_s=ti_s, td_s=max(kd / kp, 0.0))
+
+
+def _simplest(seen: Seen, gains: Floats, record_s: float, stated: Pid) -> tuple[Pid, Floats] | None:
+    """The law with the fewest settings that are not the stated ones, and its gains."""
+    p, i, d = np.eye(3)
+    none = np.zeros(3)
+    whole = gains / gains[0] if gains[0] else i
+    trials = [
+        (d[None], gains * (p + i)),  # td alone
+        (whole[None], none),  # kp alone
+        (i[None], gains * (p + d)),  # ti alone
+        (i[None], none),  # integral alone
+        (np.stack((p + whole * d, i)), none),  # kp and ti
+        (np.eye(3), none),
+    ]
+    enough = LAW.as_well * seen.left_over_all(seen.free) + 1e-6  # of an exact law rounding alone is left
+    for along, held in trials:
+        law = best_gains(seen.moves.values(), seen.weight, along, held)
+        pid = _settings(law, record_s, stated)
+        if pid is not None and seen.left_over_all(law) <= enough:
+            return pid, law
+    return None

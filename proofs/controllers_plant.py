@@ -1,0 +1,193 @@
+"""Three days of loops under controllers as plants have them, simulated with no code of the package.
+
+Fourteen controllers, in position form with an integral that stops or tracks at a limit, before a lag with dead time
+under a load that walks and steps; the valve is healthy or has play, the set point rests or steps. Recorded at every
+second or at every tenth.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+from numba import njit
+
+FORMS = (
+    "PI",
+    "ideal PID",
+    "series PID",
+    "parallel PID",
+    "P only",
+    "integral only",
+    "gap",
+    "error squared",
+    "PV filter",
+    "slow scan",
+    "limit of OP's rate",
+    "limit of OP",
+    "set point weight",
+    "fast PI",
+)
+SCENES = ("healthy", "worn", "set point moves")
+SCAN_S, DAY_S = 1.0, 86_400
+
+
+@dataclass(frozen=True, slots=True)
+class Controlled:
+    """One loop: SP, PV and OP at every second, its row of loops.csv stated truly, and what a list may leave out."""
+
+    form: str
+    scene: str
+    sp: np.ndarray
+    pv: np.ndarray
+    op: np.ndarray
+    row: dict[str, object]
+    extras: dict[str, object] = field(default_factory=dict)
+    ideal: tuple[float, float, float] = (0.0, math.inf, 0.0)
+    """Kp [%/%], Ti and Td [s] of the ideal form."""
+
+    def trends(self, tag: str, every: int) -> pd.DataFrame:
+        """The recording of one sample every so many seconds."""
+        time = pd.Timestamp("2026-03-02", tz="UTC") + pd.to_timedelta(
+            np.arange(0, self.sp.size, every), unit="s"
+        )
+        columns = {"SP": np.round(self.sp, 3), "PV": np.round(self.pv, 3), "OP": np.round(self.op, 3)}
+        return pd.DataFrame({"timestamp": time, **{f"{tag}.{k}": v[::every] for k, v in columns.items()}})
+
+
+@njit(cache=True)
+def _run(sp, load, noise, plant, gains, extras, limits, out):  # type: ignore[no-untyped-def]
+    """Fill PV and OP, shape (2, n), scan by scan of one second."""
+    gain, lag, dead, play = plant
+    kp, ki, kd, slope_lag = gains
+    filter_s, gap, squared, weight, hold = extras
+    low, high, rate, tracks = limits
+    n, late = sp.size, int(dead)
+    op = integral = stem = 50.0
+    y, seen, last, slope = sp[0], sp[0], sp[0], 0.0
+    integral -= kp * (weight - 1.0) * sp[0]
+    for k in range(n):
+        behind = out[2, k - late] if k >= late else 50.0
+        y += (50.0 + gain * (behind - 50.0) + load[k] - y) / lag
+        pv = y + noise[k]
+        seen += (pv - seen) / (1.0 + filter_s)
+        if k % int(hold) == 0:
+            h = hold
+            e = sp[k] - seen
+            if gap > 0.0:
+                e = 0.0 if abs(e) < gap else e - math.copysign(gap, e)
+            if squared > 0.0:
+                e = e * abs(e) / 100.0
+            slope += (-(seen - last) / h - slope) * h / (slope_lag + h)
+            last = seen
+            proportional = kp * (e + (weight - 1.0) * sp[k])
+            trial = integral + ki * e * h
+            wanted = proportional + trial + kd * slope
+            held = min(max(wanted, low, op - rate * h), high, op + rate * h)
+            if wanted == held or ki == 0.0:
+                integral = trial
+            elif tracks > 0.0:
+                integral = trial + held - wanted
+            op = held
+        stem = min(max(stem, op - play / 2), op + play / 2)
+        out[0, k], out[1, k], out[2, k] = pv, op, stem
+
+
+def _walk(rng: np.random.Generator, n: int, size: float, memory_s: float) -> np.ndarray:
+    """A load that wanders about 0 and now and then steps [% PV]."""
+    pole = math.exp(-1.0 / memory_s)
+    drive = rng.standard_normal(n) * size * math.sqrt(1 - pole * pole)
+    walk = np.empty(n)
+    _lag(drive, pole, walk)
+    at = np.sort(rng.choice(n, max(n // 20_000, 1), replace=False))
+    steps = np.zeros(n)
+    steps[at] = rng.normal(0, size, at.size)
+    fades = np.empty(n)
+    _lag(steps, math.exp(-1.0 / (10 * memory_s)), fades)
+    return walk + fades
+
+
+@njit(cache=True)
+def _lag(drive, pole, out):  # type: ignore[no-untyped-def]
+    x = 0.0
+    for k in range(drive.size):
+        x = pole * x + drive[k]
+        out[k] = x
+
+
+def controlled(form: str, scene: str, seed: int, days: float = 3.0) -> Controlled:
+    """One loop of a form in a scene."""
+    rng = np.random.default_rng([seed, FORMS.index(form), SCENES.index(scene)])
+    n = int(days * DAY_S)
+    gain, lag, dead = rng.uniform(0.7, 2.0), 10 ** rng.uniform(1.7, 2.7), 10 ** rng.uniform(0.7, 1.5)
+    aim = dead * rng.uniform(1.2, 3.0)
+    kp = min(lag / (gain * (aim + dead)), 12.0)
+    ti = min(lag, 4 * (aim + dead)) * rng.uniform(0.8, 1.3)
+    td = dead * rng.uniform(0.3, 1.0) if "PID" in form else 0.0
+    kp, ti, td = float(f"{kp:.3g}"), float(f"{ti:.3g}"), float(f"{td:.3g}")
+    if form == "fast PI":
+        lag, dead = rng.uniform(3.0, 10.0), 1.0
+        kp, ti = round(rng.uniform(0.2, 0.6) / gain, 2), round(lag * rng.uniform(0.5, 1.2), 1)
+    noise = rng.standard_normal(n) * rng.choice([0.01, 0.02, 0.04])
+    load = _walk(rng, n, rng.uniform(0.5, 2.0), lag * rng.uniform(1, 4))
+    sp = np.full(n, 50.0)
+    if scene == "set point moves":
+        sp = 50.0 + np.repeat(rng.uniform(-4, 4, math.ceil(n / 7200)), 7200)[:n]
+        sp[:7200] = 50.0
+    row: dict[str, object] = {"kp": kp, "ti": ti, "td": td, "form": "ideal"}
+    ideal, kd, ki, extra = (kp, ti, td), kp * td, kp / ti, {}
+    filter_s, gap, squared, weight, hold = 0.0, 0.0, 0.0, 1.0, 1.0
+    low, high, rate = 0.0, 100.0, math.inf
+    narrow = rng.choice([4.0, 8.0, 10.0])
+    if "PID" in form:
+        extra = {"td_filter": narrow}
+    if form == "series PID":
+        ideal = (kp * (1 + td / ti), ti + td, ti * td / (ti + td))
+        row["form"], kp, ki, kd = "series", ideal[0], kp / ti, kp * td
+    elif form == "parallel PID":
+        row |= {"form": "parallel", "ti": ti / kp, "td": kp * td}
+    elif form == "P only":
+        ki, row["ti"], ideal = 0.0, 0.0, (kp, math.inf, 0.0)
+    elif form == "integral only":
+        ki = 0.5 / (gain * (lag + dead) * rng.uniform(1.0, 2.0))
+        row |= {"kp": 0.0, "ti": 1.0 / ki}
+        kp, ideal = 0.0, (0.0, 1.0 / ki, 0.0)
+    elif form == "gap":
+        gap = round(rng.uniform(0.1, 0.5), 2)
+        extra = {"gap": gap}
+    elif form == "error squared":
+        squared, kp = 1.0, float(f"{kp * rng.uniform(15, 60):.3g}")
+        ki, ideal, extra = kp / ti, (kp, ti, 0.0), {"error_form": "squared"}
+        row["kp"] = kp
+    elif form == "PV filter":
+        filter_s = round(dead * rng.uniform(0.2, 1.0), 1)
+        extra = {"pv_filter_s": filter_s}
+    elif form == "slow scan":
+        hold = float(rng.choice([2, 5]))
+    elif form == "limit of OP's rate":
+        rate = round(rng.uniform(0.05, 0.5), 2)
+        extra = {"op_rate": rate}
+    elif form == "limit of OP":
+        high = round(50 + rng.uniform(0.3, 2.0) * load.std() / gain, 1)
+        extra = {"op_hi_limit": high}
+    elif form == "set point weight":
+        weight = round(rng.uniform(0.0, 0.6), 1)
+        extra = {"sp_weight": weight}
+    row["scan_s"] = SCAN_S * hold
+    play = rng.uniform(0.5, 2.5) if scene == "worn" else 0.0
+    out = np.empty((3, n))
+    tracks = float(rng.random() < 0.5)
+    _run(
+        sp,
+        load,
+        noise,
+        (gain, lag, round(dead), play),
+        (kp, ki, kd, float(td / narrow)),
+        (filter_s, gap, squared, weight, hold),
+        (low, high, rate, tracks),
+        out,
+    )
+    row |= {"pv_lo": 0, "pv_hi": 100, "type": "temperature"}
+    return Controlled(form, scene, sp, out[0], out[1], row, extra, ideal)

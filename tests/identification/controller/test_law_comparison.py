@@ -1,0 +1,104 @@
+"""A stated law beside that of a record, for controllers with what no list states, made without the package's law."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.controller.law_comparison import LawsCompared, compare_laws
+from identification.controller.law_ways import fastest
+from identification.models import ErrorForm, Pid
+from identification.record import LoopRecord
+
+N = 6000
+TRUE = Pid(2.0, 80.0)
+
+
+def recorded(
+    acting, every: int = 1, rate: float = np.inf, kp: float = 2.0, weight: float = 1.0
+) -> LoopRecord:
+    """A lag of 60 s, dead time 8 s, under a load that walks, closed by a PI; `acting` is what of e counts."""
+    rng = np.random.default_rng(6)
+    load = np.cumsum(rng.standard_normal(N)) * 0.2
+    load -= np.linspace(0.0, load[-1], N)
+    sp = 50.0 + np.repeat([0.0, 2.0, -1.0, 1.0], N // 4) * (weight < 1.0)
+    pv, op, y, integral, u = np.empty(N), np.empty(N), 0.0, 0.0, 50.0
+    for k in range(N):
+        y += (0.8 * ((op[k - 8] if k >= 8 else 50.0) - 50.0 + load[k]) - y) / 60.0
+        pv[k] = 50.0 + y + 0.01 * rng.standard_normal()
+        e = acting(sp[k] - pv[k])
+        integral += kp * e / 80.0
+        wanted = 50.0 + kp * (e + (weight - 1.0) * (sp[k] - 50.0)) + integral
+        held = min(max(wanted, u - rate), u + rate)
+        integral += held - wanted
+        op[k] = u = held
+    at = slice(0, None, every)
+    return LoopRecord("L", 0.0, float(every), sp[at], pv[at], op[at], np.zeros(sp[at].size, dtype=bool))
+
+
+def gapped(e: float) -> float:
+    """An error without what is inside of 0.4 %."""
+    return np.sign(e) * max(abs(e) - 0.4, 0.0)
+
+
+def compared(record: LoopRecord, stated: Pid) -> LawsCompared:
+    """What is found on the loop's own time scale."""
+    found = compare_laws(record, 320.0, stated)
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("every", [1, 10])
+@pytest.mark.parametrize(
+    ("acting", "more"),
+    [
+        (gapped, {}),
+        (lambda e: e * abs(e) / 100, {"kp": 150.0}),
+        (lambda e: e, {"weight": 0.4}),
+        (lambda e: e, {"rate": 0.05}),
+    ],
+    ids=["gap", "squared", "weight", "rate"],
+)
+def test_true_settings_agree_whatever_no_list_states(acting, more, every):
+    """Gain and integral time stated as they are agree with the record; what else the law has is not stated."""
+    assert compared(recorded(acting, every, **more), replace(TRUE, kp=more.get("kp", 2.0))).agree
+
+
+def test_the_gap_is_found_and_the_square_named():
+    """The gap is found within a tenth, and a squared error by its name."""
+    assert compared(recorded(gapped), TRUE).found.gap == pytest.approx(0.4, rel=0.1)
+    squared = compared(recorded(lambda e: e * abs(e) / 100, kp=150.0), replace(TRUE, kp=150.0))
+    assert squared.found.error_form is ErrorForm.SQUARED
+
+
+@pytest.mark.parametrize("every", [1, 10])
+@pytest.mark.parametrize(
+    "stated", [replace(TRUE, ti_s=80.0 / 60.0), replace(TRUE, ti_s=60.0 / 80.0), Pid(50.0, 80.0)]
+)
+def test_units_mistaken_do_not_agree(stated, every):
+    """Minutes or repeats taken for seconds, and a band for a gain, do not agree; the true law is found."""
+    seen = compared(recorded(lambda e: e, every), stated)
+    assert not seen.agree
+    assert seen.found.kp == pytest.approx(2.0, rel=0.25)
+    assert seen.found.ti_s == pytest.approx(80.0, rel=0.25)
+
+
+def test_integral_alone_is_found_as_such():
+    """A controller of integral alone is found without a gain, with the time that OP takes for its error."""
+    rng = np.random.default_rng(3)
+    pv = 50.0 + np.convolve(rng.standard_normal(N), np.ones(60) / 60, mode="same")
+    op = 50.0 + np.cumsum(50.0 - pv) / 40.0
+    record = LoopRecord("L", 0.0, 1.0, np.full(N, 50.0), pv, op, np.zeros(N, dtype=bool))
+    assert compared(record, Pid(0.0, 40.0)).agree
+    found = compared(record, TRUE).found
+    assert (found.kp, found.ti_s) == pytest.approx((0.0, 40.0), rel=0.01)
+
+
+def test_a_rate_limit_is_seen_and_a_sine_has_none():
+    """Moves that pile up at the fastest are a limit of rate; those of a sine and of noise are not."""
+    t = np.arange(N)
+    assert not fastest(50 + 5 * np.sin(t / 50)).any()
+    assert not fastest(np.round(np.cumsum(np.random.default_rng(1).standard_normal(N)), 1)).any()
+    assert fastest(np.cumsum(np.clip(np.random.default_rng(1).standard_normal(N), -1, 1))).mean() > 0.3
