@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+import traceback
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -38,13 +39,15 @@ class OneLineErrors(click.Group):
                 if not sys.warnoptions:
                     warnings.simplefilter("ignore")  # a library's warning says nothing to an engineer
                 return super().invoke(ctx)
+        except (click.ClickException, click.Abort, click.exceptions.Exit):
+            raise
         except BrokenPipeError:
             sys.stderr.close()
         except Exception as error:
             line = what_went_wrong(error)
-            if line is None:
+            if line is None and sys.flags.dev_mode:
                 raise
-            click.echo(f"triage: {line}", err=True)
+            click.echo(f"triage: {line or unforeseen(error)}", err=True)
         sys.exit(NOTHING_DONE)
 
 
@@ -61,6 +64,14 @@ def what_went_wrong(error: Exception) -> str | None:
         said = one_line(f"{type(error).__name__}: {error}")
         return f"{said}; check URL, endpoint and credentials of the storage"
     return None
+
+
+def unforeseen(error: Exception) -> str:
+    """An error of the program itself as one line: what, where, and what to do."""
+    at = traceback.extract_tb(error.__traceback__)[-1]
+    where = f"{Path(at.filename).name}, line {at.lineno}"
+    said = one_line(f"{type(error).__name__}: {error}")
+    return f"an error of the program ({said}; {where}); report it; 'python -X dev' shows all of it"
 
 
 def what_failed(error: OSError) -> str:
@@ -176,6 +187,19 @@ def export_options(command: Command) -> Command:
     reads = [click.option(name, help=text, **KINDS.get(name, {})) for name, text in READING.items()]
     options: list[Any] = [*SPAN, *reads]
     return reduce(lambda found, option: option(found), reversed(options), collected)
+
+
+def age_told(night: str, zone: str) -> str:
+    """How old a night is, in a sentence; '' where it is one of these days."""
+    from datetime import date
+
+    from analyzer.history.plant_clock import date_of
+    from analyzer.limits import PAGES
+
+    days = (date.fromisoformat(date_of(time.time(), zone)) - date.fromisoformat(night)).days
+    if days <= PAGES.old_d:
+        return ""
+    return f"Night {night} is {days} days old: look whether the newest export was read."
 
 
 Report = Callable[[int, int], None]
