@@ -16,7 +16,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, cast
 from urllib.parse import unquote, urlsplit
 
-from identification.errors import InputError
+from identification.errors import InputError, NotNowError
 
 URL = re.compile(r"[a-z][a-z0-9+.-]+://", re.IGNORECASE)
 """How a URL begins; a drive letter is no scheme."""
@@ -52,6 +52,25 @@ def refused(error: Exception) -> bool:
     return type(error).__module__.split(".")[0] in LIBRARIES
 
 
+def is_passing(error: BaseException) -> bool:
+    """Whether an error says nothing of what a file holds: system or storage did not hand it out, or memory ended."""
+    if isinstance(error, IsADirectoryError | NotADirectoryError):
+        return False
+    if type(error) is OSError and error.errno is None:  # what Parquet finds wrong with a file
+        return False
+    return isinstance(error, MemoryError | OSError) or (isinstance(error, Exception) and refused(error))
+
+
+def not_now(path: Path, error: BaseException) -> NotNowError:
+    """What is said of a file that cannot be read at this time, and is not known to be damaged."""
+    why = " ".join(str(error).split())[:200] or type(error).__name__
+    said = "nothing says that it is damaged, and nothing was changed"
+    return NotNowError(
+        f"{path}: cannot be read now ({why}); {said}; make it readable, then give the same command again, a run "
+        "with --resume"
+    )
+
+
 def remove_tree(path: Path) -> None:
     """Delete a directory and all in it, as far as that can be done; nothing where there is none."""
     if not is_remote(path):
@@ -73,6 +92,18 @@ def content(path: Path) -> bytes:
     remote: Any = path
     remote.fs.invalidate_cache(remote.path)
     return bytes(remote.fs.cat_file(remote.path))
+
+
+def is_whole(path: Path) -> bool:
+    """Whether shared storage hands out all of an object: twice the same bytes, as many as it states."""
+    remote: Any = path
+    try:
+        held, again = content(path), content(path)
+        return held == again and len(held) == int(remote.fs.info(remote.path)["size"])
+    except Exception as error:
+        if not is_passing(error):
+            raise
+        return False
 
 
 def at_hand(paths: Sequence[Path], into: Path) -> tuple[list[Path], dict[Path, str]]:

@@ -36,7 +36,7 @@ from analyzer.plantwide.structure import Moves, moves_of, moves_table
 from analyzer.plantwide.wave import waves_table
 from analyzer.store.rows import hour_rows, piece_row
 from analyzer.store.store import Store
-from analyzer.store.table import rows_table, write_table
+from analyzer.store.table import naming, rows_table, write_table
 from analyzer.words import units as words
 from identification.errors import NotAssessedError, TriageError
 from reports.page_file import dumps
@@ -224,7 +224,7 @@ def lose(task: Task, reason: str) -> Done:
 
 
 def _write_pieces(task: Task, night: str, kept: Rows) -> None:
-    """The piece of the table of nights comes last: where it is, the chunk is whole."""
+    """The piece of the table of nights comes last, and names the others: where all are, the chunk is whole."""
     names = (pa.array([a.loop] * len(a.trend["time_s"])).dictionary_encode() for a in kept.found)
     trends = [pa.table({"loop": loop, **a.trend}) for loop, a in zip(names, kept.found, strict=True)]
     made = {
@@ -235,6 +235,7 @@ def _write_pieces(task: Task, night: str, kept: Rows) -> None:
         "compared": rows_table(kept.compared, SETTINGS),
         "nights": rows_table([piece_row(found) for found in kept.nights], NIGHTS),
     }
-    for name, table in made.items():
-        if table is not None and table.num_rows:
-            write_table(table, task.store.part(night, name, task.key))
+    filled = {name: table for name, table in made.items() if table is not None and table.num_rows}
+    filled["nights"] = naming(filled["nights"], filled)
+    for name, table in filled.items():
+        write_table(table, task.store.part(night, name, task.key))

@@ -25,8 +25,17 @@ from typing import Any
 import pyarrow as pa
 
 from analyzer.columns import BELIEVED, NIGHTS, RESTING
-from analyzer.places import answering, content, is_remote, remove_tree
-from analyzer.store.table import KEPT, read_stored, rows_of_loops, rows_table, stored_names, write_table
+from analyzer.places import answering, content, is_passing, is_remote, not_now, remove_tree
+from analyzer.store.table import (
+    KEPT,
+    DamagedError,
+    read_stored,
+    rows_of_loops,
+    rows_table,
+    stored_names,
+    tables_beside,
+    write_table,
+)
 from identification.errors import InputError
 from reports.whole_file import whole_file
 
@@ -36,6 +45,8 @@ declared."""
 VERSION_FILE = "store.json"
 """Name within the store."""
 MAKE_ONE = "run 'triage run EXPORT --store DIR' first"
+GO_ON = "go on with the same command and --resume"
+"""What to do about pieces of a night that are not whole."""
 
 
 def is_night(name: str) -> bool:
@@ -44,6 +55,18 @@ def is_night(name: str) -> bool:
         return name == date.fromisoformat(name).isoformat()
     except ValueError:
         return False
+
+
+def listed(folder: Path) -> list[Path]:
+    """What a folder holds, nothing where there is none. Raises NotNowError where it cannot be looked into."""
+    try:
+        return list(folder.iterdir())
+    except (FileNotFoundError, NotADirectoryError):
+        return []
+    except Exception as error:
+        if not is_passing(error):
+            raise
+        raise not_now(folder, error) from error
 
 
 class Store:
@@ -58,7 +81,7 @@ class Store:
 
     def files(self, table: str) -> list[Path]:
         """What a table has of nights; files of other names are nobody's nights."""
-        return sorted(p for p in (self.path / table).glob("*.parquet") if is_night(p.stem))
+        return sorted(p for p in listed(self.path / table) if p.suffix == ".parquet" and is_night(p.stem))
 
     def nights(self) -> list[str]:
         """Names of the nights that are complete, oldest first."""
@@ -139,12 +162,13 @@ class Store:
             write_table(rows, self.file(table, night))
 
     def set_aside_damaged(self, night: str) -> list[str]:
-        """Rename the tables of a night that cannot be read, so that it can be written anew; sentences on them."""
+        """Rename the damaged tables of a night, so that it can be written anew; sentences on them. Raises NotNowError
+        where one cannot be read at this time: what is not known to be damaged stays."""
         said = []
         for table in KEPT:
             try:
                 self.read_if_there(table.name, night)
-            except InputError as error:
+            except DamagedError as error:
                 path = self.file(table.name, night)
                 aside = path.with_name(f"{path.name}.{secrets.token_hex(4)}.damaged")
                 path.rename(aside)
@@ -184,24 +208,47 @@ class Store:
         return sorted(p.name for p in (self.path / "parts").glob("*") if p.is_dir())
 
     def read_parts(self, night: str, table: str, keys: Sequence[str]) -> pa.Table | None:
-        """The pieces of one table of a night that some chunks have written, None where there are none."""
+        """The pieces of one table of a night that some chunks have written, None where there are none. Raises
+        DamagedError where one of them is gone."""
         found = []
         for key in keys:
-            with contextlib.suppress(FileNotFoundError):
+            try:
                 found.append(read_stored(self.part(night, table, key)))
+            except FileNotFoundError:
+                self._require_unwritten(night, table, key)
+            except DamagedError as error:
+                raise DamagedError(error.seen, error.expected, GO_ON) from error
         return pa.concat_tables(found) if found else None
+
+    def _require_unwritten(self, night: str, table: str, key: str) -> None:
+        """Raise DamagedError where a chunk has written a piece that is not there."""
+        try:
+            written = table in tables_beside(self.part(night, "nights", key))
+        except FileNotFoundError:
+            written = True
+        if written:
+            raise self.gone(self.part(night, table, key))
+
+    def gone(self, piece: Path) -> DamagedError:
+        """What is said of a piece of a run that is no longer there, or never came."""
+        seen = f"{piece}: this piece of the night is gone"
+        expected = "a store that nobody else changes, and that all workers see"
+        return DamagedError(seen, expected, GO_ON)
 
     def drop_parts(self) -> None:
         """Forget all pieces, and the run that they are of."""
         remove_tree(self.path / "parts")
 
     def version(self) -> int:
-        """The version of its tables, 1 where it states none. Raises InputError where what states it is damaged."""
+        """The version of its tables, 1 where it states none. Raises InputError where what states it is damaged,
+        NotNowError where it cannot be read at this time."""
         path = self.path / VERSION_FILE
         try:
             with answering(self.path) if is_remote(self.path) else nullcontext():
                 return _stated_schema(path)
         except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+            if is_passing(error):
+                raise not_now(path, error) from error
             right, nights = json.dumps({"schema": SCHEMA}), self.nights()
             ends = " to ".join(dict.fromkeys((*nights[:1], *nights[-1:])))
             stand = f"the tables of {len(nights)} nights, {ends}, stand as they were"
@@ -224,8 +271,8 @@ class Store:
         """
         self.require_known()
         path, old, changed = self.path / VERSION_FILE, self.version() < SCHEMA, 0
-        for table in sorted((self.path / "nights").glob("*.parquet")) if old else ():
-            with contextlib.suppress(InputError):  # a damaged table stays for `store check` to name
+        for table in self.files("nights") if old else ():
+            with contextlib.suppress(DamagedError):  # a damaged table stays for `store check` to name
                 held = set(stored_names(table))
                 lacking = [c for c in NIGHTS if c.name not in held]
                 if lacking:
