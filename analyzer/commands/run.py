@@ -21,8 +21,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands.options import NOTHING_DONE, PLACE, SOME_LOST, bar, export_options, say, what_failed
-from identification.errors import InputError, TriageError
+from analyzer.commands.options import (
+    NOTHING_DONE,
+    PLACE,
+    SOME_LOST,
+    age_told,
+    bar,
+    export_options,
+    say,
+    unforeseen,
+    what_failed,
+    what_went_wrong,
+)
+from identification.errors import InputError
 from reports.texts import visible
 from reports.whole_file import is_full
 
@@ -142,6 +153,7 @@ def run(asked: Asked, store: Path, log_file: Path | None, explaining: bool, **ho
     export = " ".join(map(str, asked.export))
     log.say("begin", version=version("loop-triage"), store=store, export=export, jobs=how["jobs"])
     try:
+        asked = _for_all_workers(asked, store, how["scheduler"])
         with stoppable():
             outcome, loops = _run_night(asked, store, log, explaining, how)
     except StoppedError as stopped:
@@ -149,8 +161,8 @@ def run(asked: Asked, store: Path, log_file: Path | None, explaining: bool, **ho
         with suppress(OSError):  # the terminal may be gone
             say(f"triage: stopped by {stopped}; {_go_on(store)}", err=True)
         sys.exit(STOPPED + stopped.number)
-    except (TriageError, OSError) as error:
-        log.say("nothing done", error=error, status=NOTHING_DONE)
+    except Exception as error:
+        log.say("nothing done", error=what_went_wrong(error) or unforeseen(error), status=NOTHING_DONE)
         if isinstance(error, OSError) and is_full(error):
             raise InputError(what_failed(error), "room to write", f"make room; {_go_on(store)}") from error
         raise
@@ -158,6 +170,20 @@ def run(asked: Asked, store: Path, log_file: Path | None, explaining: bool, **ho
     status = lost if outcome.failed or lost == NOTHING_DONE else 0
     log.say("end", status=status, night=outcome.nights[-1].name, seconds=time.monotonic() - begun_s)
     sys.exit(status)
+
+
+def _for_all_workers(asked: Asked, store: Path, scheduler: str | None) -> Asked:
+    """What is asked, as workers elsewhere find it. Raises InputError where their store would be another."""
+    from analyzer.places import is_remote
+
+    if scheduler is None:
+        return asked
+    if not is_remote(store) and not store.is_absolute():
+        seen = f"--store {store} with --scheduler: each worker would write a store of its own"
+        raise InputError(
+            seen, "an absolute path, or a URL, that all machines share", f"say {store.resolve()}"
+        )
+    return replace(asked, export=tuple(p if is_remote(p) else p.absolute() for p in asked.export))
 
 
 def _go_on(store: Path) -> str:
@@ -209,6 +235,7 @@ def _assessed(plant: Plant, store: Store, how: Mapping[str, Any], log: RunLog) -
     several = f" ({len(nights)} nights from {nights[0].name})" if len(nights) > 1 else ""
     said = f"{done} of {loops} loops assessed{f', {failed} failed' if failed else ''}"
     click.echo(f"{said}, night {nights[-1].name}{several}, in {store.path}", err=True)
+    _say(list(filter(None, [age_told(nights[-1].name, plant.zone)])), log)
     return outcome
 
 
