@@ -100,15 +100,16 @@ def rank(
 @main.command()
 @options.export_options
 @options.of_loop("The loop to tune.")
-@click.option("--out", type=options.FILE, help="Directory for pictures, and a page to try settings on.")
+@click.option("--out", type=options.FOLDER, help="Directory for pictures, and a page to try settings on.")
 def tune(asked: Asked, tag: str, out: Path | None) -> None:
     """One loop: model, limit cycle predicted, new Kp and Ti with reasons, forecast, travel map.
 
     Example: triage tune export.parquet --loops loops.csv --loop LIC2107 --out pictures
     """
     from analyzer.loop.tune import proposal
+    from analyzer.night.asked import guarded
 
-    check_lines, pictures = proposal(asked.opened().last_night(tag), out is not None)
+    check_lines, pictures = proposal(guarded(asked).last_night(tag), out is not None)
     for line in check_lines:
         say(line)
     if out is not None:

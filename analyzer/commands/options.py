@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 import traceback
@@ -104,7 +105,21 @@ class Place(click.ParamType):
             self.fail(str(error), param, ctx)
 
 
-PLACE, FILE = Place(), click.Path(path_type=Path)
+class Folder(click.ParamType):
+    """A folder to write into that is no store, whose tables would be lost among pages."""
+
+    name = "path"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        path = Path(os.fspath(value))
+        if path.is_file():
+            raise InputError(f"--out {path}: a file", "a folder, or none yet", "give a folder")
+        if (path / "store.json").exists() or (path / "nights").is_dir():
+            raise InputError(f"--out {path}: a store", "a folder for pages alone", "give another folder")
+        return path
+
+
+PLACE, FILE, FOLDER = Place(), click.Path(path_type=Path), Folder()
 STORE = click.argument("store", type=PLACE)
 NIGHT = click.option("--night", help="Night to show, e.g. 2026-03-08. Default: the latest.")
 CONFIG = click.option(

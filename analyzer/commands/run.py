@@ -197,8 +197,9 @@ def _run_night(
     outcome and the number of loops."""
     from analyzer.night.asked import opened_apart
     from analyzer.store.lock import scratch
-    from analyzer.store.store import Store
+    from analyzer.store.store import Store, require_place
 
+    require_place(place)
     with scratch(place, how["resume"]) as copies:
         reading = {**asked.reading, "scratch": copies}
         plant, store = opened_apart(replace(asked, reading=reading)), Store(place)

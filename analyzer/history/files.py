@@ -24,6 +24,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any
 
+from analyzer.history.spans import require_dense
 from analyzer.limits import HISTORY
 from identification.errors import InputError
 
@@ -204,6 +205,7 @@ def unpacked(path: Path, place: Path) -> list[Path]:
     named = start.startswith(ZIP) and path.suffix.lower() in WORKBOOK_ENDINGS
     if start.startswith(OLD) or named or any(info.filename.startswith("xl/") for info in members):
         _check_size(path, sum(info.file_size for info in members), 0, place)
+        require_dense(path, members)
         return sheets_as_text(path, Path(tempfile.mkdtemp(prefix="workbook-", dir=place)))
     stream = next((STREAMS[magic] for magic in STREAMS if start.startswith(magic)), None)
     if stream is None and not start.startswith(ZIP):

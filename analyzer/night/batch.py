@@ -30,6 +30,7 @@ from analyzer.night.finish import finish_night, is_empty
 from analyzer.night.nights import Night, Plant, nights_of
 from analyzer.night.workers import Died, Executor, executor
 from analyzer.places import is_passing, not_now
+from analyzer.store.draft import drafted
 from analyzer.store.lock import locked
 from analyzer.store.store import GO_ON, Store
 from analyzer.store.table import OF_A_NIGHT, DamagedError
@@ -208,6 +209,7 @@ def run(
     with locked(store.path):
         store.upgrade()
         nights = nights_of(plant)
+        _require_one_clock(store, plant.zone, [night.name for night in nights] if replacing else [])
         said = [line for night in nights for line in store.set_aside_damaged(night.name)]
         keys, met = _begun(plant, store, nights, resume), Counter[str]()
         whole = store.read_parts(nights[-1].name, "nights", keys)
@@ -229,6 +231,15 @@ def run(
         return _outcome(plant, store, written, (*plant.export.file_notes, *met_told(met), *said, *more))
 
 
+def _require_one_clock(store: Store, zone: str, replaced: Sequence[str]) -> None:
+    """Raise InputError where the nights that stay in a store were cut by the clock of another time zone."""
+    stay = [night for night in store.nights() if night not in replaced]
+    kept = store.stated_zone(stay[-1:])
+    if kept is not None and kept != zone:
+        seen = f"--timezone {zone}: the nights of {store.path} are of {kept}"
+        raise InputError(seen, "one clock in one store", f"say --timezone {kept}, or give another --store")
+
+
 def _require_kept(store: Store, night: str, key: str) -> None:
     """Raise DamagedError where a chunk that is done has left no piece in this store."""
     piece = store.part(night, "nights", key)
@@ -247,8 +258,9 @@ def _finished(
     said = []
     if len(full) < len(nights):
         said.append(f"{len(nights) - len(full)} nights without a good sample of any loop are left out")
-    for night in full:
-        said += finish_night(store, night.name, order, plant.config, keys, replacing)
+    with drafted(store) as draft:
+        for night in full:
+            said += finish_night(draft, night.name, order, plant.config, keys, replacing)
     store.drop_parts()
     return full, said
 

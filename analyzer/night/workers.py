@@ -22,6 +22,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
+from pathlib import Path
 from typing import Any, Generic, NamedTuple, Self, TypeVar
 
 from analyzer.config import WorkerLimits
@@ -339,14 +340,29 @@ def _limit_memory(megabytes: float, machine_share: float) -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (limit, hard))
 
 
-def _machine_bytes() -> float:
-    """Memory of this machine, or of the container that it is [bytes]."""
-    own = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    try:
-        with open("/sys/fs/cgroup/memory.max", encoding="ascii") as limit:
-            return min(own, float(limit.read()))
-    except (OSError, ValueError):  # none, or "max"
-        return own
+def _machine_bytes(groups: Path = Path("/sys/fs/cgroup"), of: Path = Path("/proc/self/cgroup")) -> float:
+    """Memory of this machine, or what the control groups of this process, of either version, leave of it [bytes]."""
+    limits = [float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))]
+    for folder, name in _groups_of(groups, of):
+        for level in (folder, *folder.parents):
+            if level.is_relative_to(groups):
+                with contextlib.suppress(OSError, ValueError):  # none, or "max"
+                    limits.append(float((level / name).read_text(encoding="ascii")))
+    return min(limits)
+
+
+def _groups_of(groups: Path, of: Path) -> Iterator[tuple[Path, str]]:
+    """The folders of the control groups that limit memory, and the file of the limit there; a container sees its own
+    as the first of all."""
+    yield groups, "memory.max"
+    with contextlib.suppress(OSError):
+        for line in of.read_text(encoding="utf-8").splitlines():
+            kinds, _, path = line.partition(":")[2].partition(":")
+            if kinds in ("", "memory"):
+                old = "memory" in kinds
+                inside = groups / "memory" if old else groups
+                yield inside / path.lstrip("/"), "memory.limit_in_bytes" if old else "memory.max"
+                yield inside, "memory.limit_in_bytes" if old else "memory.max"
 
 
 def _held_bytes() -> int:

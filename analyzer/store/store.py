@@ -45,6 +45,8 @@ declared."""
 VERSION_FILE = "store.json"
 """Name within the store."""
 MAKE_ONE = "run 'triage run EXPORT --store DIR' first"
+OWN = frozenset({"parts", "run.lock", "run.owner.json", "notes.jsonl", "lost+found"})
+"""What a store may hold before it has a night or a version, beside names that begin with a point."""
 GO_ON = "go on with the same command and --resume"
 """What to do about pieces of a night that are not whole."""
 
@@ -69,6 +71,22 @@ def listed(folder: Path) -> list[Path]:
         raise not_now(folder, error) from error
 
 
+def is_store(path: Path) -> bool:
+    """Whether a folder is a store: it has a version, or nights of the time before there was one."""
+    return (path / VERSION_FILE).exists() or (path / "nights").is_dir()
+
+
+def require_place(path: Path) -> None:
+    """Raise InputError where a store cannot be made at a path: it is a file, or a folder of something else."""
+    if not is_remote(path) and path.exists() and not path.is_dir():
+        raise InputError(f"--store {path}: a file", "a folder for the results, or none yet", "give a folder")
+    others = sorted(p.name for p in listed(path) if p.name not in OWN and not p.name.startswith("."))
+    if others and not is_store(path):
+        more = f" and {len(others) - 3} more" if len(others) > 3 else ""
+        seen = f"--store {path}: a folder that holds {', '.join(others[:3])}{more} and is no store"
+        raise InputError(seen, "a store, an empty folder, or none yet", "give another folder")
+
+
 class Store:
     """A directory of results."""
 
@@ -89,11 +107,14 @@ class Store:
 
     def zone(self) -> str:
         """The plant's time zone as the latest night states it, UTC where none does."""
-        name = self.nights()[-1:]
-        if not name or "timezone" not in self.columns("nights", name[0]):
-            return "UTC"
-        stated = self.read("nights", name[0], ["timezone"]).column(0).to_pylist()
-        return next((z for z in stated if z), "UTC")
+        return self.stated_zone(self.nights()[-1:]) or "UTC"
+
+    def stated_zone(self, nights: Sequence[str]) -> str | None:
+        """The time zone that the first of some nights states, None where it states none."""
+        if not nights or "timezone" not in self.columns("nights", nights[0]):
+            return None
+        stated = self.read("nights", nights[0], ["timezone"]).column(0).to_pylist()
+        return next((z for z in stated if z), None)
 
     def require(self) -> str:
         """The latest night. Raises InputError where the path is no store, is one of a newer version, or holds no
@@ -187,7 +208,7 @@ class Store:
         newest = self.nights()[-1:]
         for path in self.files("compared"):
             if path.stem not in newest:
-                path.unlink(missing_ok=True)
+                self.write("compared", path.stem, None)
 
     @property
     def run_file(self) -> Path:
@@ -205,7 +226,7 @@ class Store:
 
     def begun(self) -> list[str]:
         """Nights that were begun and not finished."""
-        return sorted(p.name for p in (self.path / "parts").glob("*") if p.is_dir())
+        return sorted(p.name for p in (self.path / "parts").glob("*") if p.is_dir() and is_night(p.name))
 
     def read_parts(self, night: str, table: str, keys: Sequence[str]) -> pa.Table | None:
         """The pieces of one table of a night that some chunks have written, None where there are none. Raises
