@@ -12,6 +12,7 @@ import click
 from analyzer.commands import explain, options, report, run, store
 from analyzer.commands.options import say
 from analyzer.loop.decisions import Lane
+from reports.texts import visible
 
 if TYPE_CHECKING:
     from analyzer.night.asked import Asked
@@ -48,7 +49,7 @@ def check(asked: Asked) -> None:
     lost = 0
     for line, bad in check_lines(asked):
         lost += bad
-        say(line)
+        click.echo(visible(line))  # one line, whatever a tag holds
     sys.exit(options.SOME_LOST if lost else 0)
 
 

@@ -29,9 +29,14 @@ class ClusterLimits(Limits, section="cluster"):
     """How long a run waits for a cluster."""
 
 
+class StorageLimits(Limits, section="storage"):
+    """How long shared storage may fail."""
+
+
 class PageLimits(Limits, section="pages"):
     """How much pages tell."""
 
 
 HISTORY, WAVES, LOOP = HistoryLimits(), WaveLimits(), LoopLimits()
-EXPLAIN, STORE, PAGES, CLUSTER = ExplainingLimits(), StoreLimits(), PageLimits(), ClusterLimits()
+EXPLAIN, STORE, PAGES = ExplainingLimits(), StoreLimits(), PageLimits()
+CLUSTER, STORAGE = ClusterLimits(), StorageLimits()

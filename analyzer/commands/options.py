@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import reduce, wraps
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,8 +25,9 @@ if TYPE_CHECKING:
     from analyzer.store.store import Store
 
 Command = Callable[..., Any]
-SOME_LOST, NOTHING_DONE = 1, 2
-"""Exit status where some loops failed, and where nothing could be done."""
+SOME_LOST, NOTHING_DONE, AGAIN = 1, 2, 75
+"""Exit status where some loops failed, where nothing could be done, and where shared storage failed for so long that
+a run ended: the same command may succeed later (EX_TEMPFAIL of sysexits)."""
 MOST_SAID = 600
 """Characters of a line that says what is wrong."""
 
@@ -35,6 +37,9 @@ class OneLineErrors(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, TextIOWrapper):  # a code page that lacks a character gets its number
+                stream.reconfigure(errors="backslashreplace")
         try:
             with warnings.catch_warnings():
                 if not sys.warnoptions:

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from analyzer.commands.options import (
+    AGAIN,
     NOTHING_DONE,
     PLACE,
     SOME_LOST,
@@ -143,7 +144,8 @@ def run(asked: Asked, store: Path, log_file: Path | None, explaining: bool, **ho
     An export of several days is kept day by day; new settings are advised on for the last of them. A second export of
     a night adds its loops; of a loop that stands in both the fuller record is kept.
 
-    Exit status: 0 the night was written, 1 some loops failed, 2 nothing could be done.
+    Exit status: 0 the night was written, 1 some loops failed, 2 nothing could be done, 75 shared storage failed for
+    minutes: the same command with --resume may succeed later.
 
     Example: triage run export.parquet --loops loops.csv --store store --jobs 4
     """
@@ -162,7 +164,16 @@ def run(asked: Asked, store: Path, log_file: Path | None, explaining: bool, **ho
             say(f"triage: stopped by {stopped}; {_go_on(store)}", err=True)
         sys.exit(STOPPED + stopped.number)
     except Exception as error:
-        log.say("nothing done", error=what_went_wrong(error) or unforeseen(error), status=NOTHING_DONE)
+        said, again = (
+            what_went_wrong(error) or unforeseen(error),
+            _may_answer_again(error, (store, *asked.export)),
+        )
+        log.say("nothing done", error=said, status=AGAIN if again else NOTHING_DONE)
+        if again:
+            why = said.partition("; ")[0]
+            why = why if "://" in why else f"{store}: {why}"
+            say(f"triage: {why}; the storage failed for minutes: {_go_on(store)}", err=True)
+            sys.exit(AGAIN)
         if isinstance(error, OSError) and is_full(error):
             raise InputError(what_failed(error), "room to write", f"make room; {_go_on(store)}") from error
         raise
@@ -184,6 +195,13 @@ def _for_all_workers(asked: Asked, store: Path, scheduler: str | None) -> Asked:
             seen, "an absolute path, or a URL, that all machines share", f"say {store.resolve()}"
         )
     return replace(asked, export=tuple(p if is_remote(p) else p.absolute() for p in asked.export))
+
+
+def _may_answer_again(error: Exception, places: Sequence[Path]) -> bool:
+    """Whether a run ends because shared storage has failed for a while."""
+    from analyzer.places import is_outage, is_remote
+
+    return any(map(is_remote, places)) and is_outage(error)
 
 
 def _go_on(store: Path) -> str:

@@ -32,6 +32,7 @@ from analyzer.loops.changes import TuningChange, in_force, settings_from
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.nights import Night, Plant, cut
 from analyzer.pages import compared as settings_pages
+from analyzer.places import be_patient, each
 from analyzer.plantwide.structure import Moves, moves_of, moves_table
 from analyzer.plantwide.wave import waves_table
 from analyzer.store.rows import hour_rows, piece_row
@@ -198,6 +199,7 @@ def _samples_of(task: Task, spec: LoopSpec) -> dict[str, Series] | Lost:
 
 def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
     """Assess a chunk and write its pieces; `began` is told the number of each loop that is begun with."""
+    be_patient(task.store.path)
     kept, plant = {n.name: Rows() for n in task.nights}, task.plant
     for at, spec in enumerate(task.specs):
         began(at)
@@ -236,6 +238,7 @@ def _write_pieces(task: Task, night: str, kept: Rows) -> None:
         "nights": rows_table([piece_row(found) for found in kept.nights], NIGHTS),
     }
     filled = {name: table for name, table in made.items() if table is not None and table.num_rows}
-    filled["nights"] = naming(filled["nights"], filled)
-    for name, table in filled.items():
-        write_table(table, task.store.part(night, name, task.key))
+    last = naming(filled.pop("nights"), filled)
+    paths = [task.store.part(night, name, task.key) for name in filled]
+    each(lambda path, table: write_table(table, path), paths, filled.values())
+    write_table(last, task.store.part(night, "nights", task.key))

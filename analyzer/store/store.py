@@ -19,13 +19,14 @@ import secrets
 from collections.abc import Collection, Sequence
 from contextlib import nullcontext
 from datetime import date
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 
 from analyzer.columns import BELIEVED, NIGHTS, RESTING
-from analyzer.places import answering, content, is_passing, is_remote, not_now, remove_tree
+from analyzer.places import answering, content, each, is_passing, is_remote, not_now, remove_tree
 from analyzer.store.table import (
     KEPT,
     DamagedError,
@@ -231,15 +232,21 @@ class Store:
     def read_parts(self, night: str, table: str, keys: Sequence[str]) -> pa.Table | None:
         """The pieces of one table of a night that some chunks have written, None where there are none. Raises
         DamagedError where one of them is gone."""
-        found = []
-        for key in keys:
-            try:
-                found.append(read_stored(self.part(night, table, key)))
-            except FileNotFoundError:
-                self._require_unwritten(night, table, key)
-            except DamagedError as error:
-                raise DamagedError(error.seen, error.expected, GO_ON) from error
+        paths = [self.part(night, table, key) for key in keys]
+        found = [
+            piece for piece in each(partial(self._piece, night, table), paths, keys) if piece is not None
+        ]
         return pa.concat_tables(found) if found else None
+
+    def _piece(self, night: str, table: str, path: Path, key: str) -> pa.Table | None:
+        """One piece of one table, None where the chunk has written none."""
+        try:
+            return read_stored(path)
+        except FileNotFoundError:
+            self._require_unwritten(night, table, key)
+            return None
+        except DamagedError as error:
+            raise DamagedError(error.seen, error.expected, GO_ON) from error
 
     def _require_unwritten(self, night: str, table: str, key: str) -> None:
         """Raise DamagedError where a chunk has written a piece that is not there."""

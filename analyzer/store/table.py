@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -87,6 +87,11 @@ def rows_of_loops(table: pa.Table, loops: Sequence[str], others: bool = False) -
 
 def write_table(table: pa.Table, path: Path) -> None:
     """Write a table so that a reader sees all of it or nothing."""
+    if is_remote(path):  # from memory: nothing is left on this machine, however the process ends
+        remote, sink = cast(Any, path), pa.BufferOutputStream()
+        pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
+        remote.fs.pipe_file(remote.path, sink.getvalue().to_pybytes())
+        return
     with whole_file(path, kept=True) as temporary:
         pq.write_table(table, temporary, compression="zstd", write_page_checksum=True)
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from analyzer.config import WorkerLimits
-from analyzer.night import workers
+from analyzer.night import own_limits
 from analyzer.night.workers import Began, Died, Workers
 
 LIMITS = WorkerLimits(memory_mb=512.0, processor_s=600.0, wall_s=6000.0)
@@ -248,4 +248,4 @@ def test_the_limit_of_memory_is_that_of_its_own_group(tmp_path, line, limits, le
         (tmp_path / name).write_text(text + "\n")
     (tmp_path / "own").write_text(line + "\n")
     whole = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    assert workers._machine_bytes(tmp_path, tmp_path / "own") == (least or whole)
+    assert own_limits.machine_bytes(tmp_path, tmp_path / "own") == (least or whole)
