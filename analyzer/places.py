@@ -145,6 +145,14 @@ def each(function: Callable[..., T], paths: Sequence[Path], *beside: Iterable[An
         return list(pool.map(function, paths, *beside))
 
 
+def afresh(path: Path) -> Path:
+    """A path of which nothing is known from before: other processes write to shared storage, too."""
+    if is_remote(path):
+        remote: Any = path
+        remote.fs.invalidate_cache(remote.path)
+    return path
+
+
 def content(path: Path) -> bytes:
     """What a small file holds now.
 
@@ -153,8 +161,7 @@ def content(path: Path) -> bytes:
     """
     if not is_remote(path):
         return path.read_bytes()
-    remote: Any = path
-    remote.fs.invalidate_cache(remote.path)
+    remote: Any = afresh(path)
     return bytes(remote.fs.cat_file(remote.path))
 
 
@@ -238,8 +245,7 @@ def _copy(url: Path, local: Path) -> None:
 
 def _state(url: Any) -> tuple[object, ...]:
     """By what a state of an object is known."""
-    url.fs.invalidate_cache(url.path)
-    known = url.fs.info(url.path)
+    known = afresh(url).fs.info(url.path)  # type: ignore[attr-defined]
     return tuple(
         str(known.get(name)) for name in ("size", "ETag", "etag", "LastModified", "mtime", "generation")
     )

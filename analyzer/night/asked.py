@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from datetime import datetime
 from pathlib import Path
@@ -179,5 +180,9 @@ def find_out(asked: Asked, began: Callable[[int], None]) -> Plant:
     """What a worker finds out about an export, its span of time included."""
     _be_silent()
     plant = asked.opened()
-    plant.export.span()
+    for spec in plant.specs:
+        if spec.pv is not None:
+            plant.export.span(spec.pv)
+    with suppress(InputError):  # of files without a loop it is nobody's fault
+        plant.export.span()
     return plant

@@ -29,7 +29,7 @@ from analyzer.night.chunk import Done, Task
 from analyzer.night.finish import finish_night, is_empty
 from analyzer.night.nights import Night, Plant, nights_of
 from analyzer.night.workers import Died, Executor, executor
-from analyzer.places import is_passing, not_now
+from analyzer.places import afresh, is_passing, not_now
 from analyzer.store.draft import drafted
 from analyzer.store.lock import locked
 from analyzer.store.store import GO_ON, Store
@@ -243,7 +243,7 @@ def _require_one_clock(store: Store, zone: str, replaced: Sequence[str]) -> None
 def _require_kept(store: Store, night: str, key: str) -> None:
     """Raise DamagedError where a chunk that is done has left no piece in this store."""
     piece = store.part(night, "nights", key)
-    if not piece.exists():
+    if not afresh(piece).exists():
         raise store.gone(piece)
 
 

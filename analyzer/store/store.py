@@ -26,7 +26,7 @@ from typing import Any
 import pyarrow as pa
 
 from analyzer.columns import BELIEVED, NIGHTS, RESTING
-from analyzer.places import answering, content, each, is_passing, is_remote, not_now, remove_tree
+from analyzer.places import afresh, answering, content, each, is_passing, is_remote, not_now, remove_tree
 from analyzer.store.table import (
     KEPT,
     DamagedError,
@@ -63,7 +63,7 @@ def is_night(name: str) -> bool:
 def listed(folder: Path) -> list[Path]:
     """What a folder holds, nothing where there is none. Raises NotNowError where it cannot be looked into."""
     try:
-        return list(folder.iterdir())
+        return list(afresh(folder).iterdir())
     except (FileNotFoundError, NotADirectoryError):
         return []
     except Exception as error:
@@ -222,8 +222,8 @@ class Store:
 
     def whole_chunks(self, night: str) -> list[str]:
         """Keys of the chunks whose last piece, that of the table of nights, is there."""
-        pieces = (self.path / "parts" / night).glob("nights-*.parquet")
-        return sorted(p.stem.removeprefix("nights-") for p in pieces)
+        pieces = (p for p in listed(self.path / "parts" / night) if p.suffix == ".parquet")
+        return sorted(p.stem.removeprefix("nights-") for p in pieces if p.stem.startswith("nights-"))
 
     def begun(self) -> list[str]:
         """Nights that were begun and not finished."""

@@ -15,7 +15,7 @@ EXPORT=$(ls -t exports | head -n 1)
 set -- "exports/$EXPORT" --loops loops.csv --timezone "$ZONE" --store store --jobs "$JOBS" --log triage.log
 [ -f changes.csv ] && set -- "$@" --changes changes.csv
 
-LOGGED=$(wc -c <triage.log 2>/dev/null || echo 0)
+LOGGED=$(wc -c 2>/dev/null <triage.log || echo 0)
 $TRIAGE run "$@" 2>>triage.err
 STATUS=$?
 # killed, stopped by a signal, or a storage that failed for a while: what was done is kept, so one more try goes on
@@ -26,7 +26,7 @@ if [ "$STATUS" -gt 2 ]; then
 fi
 # a Python that cannot start ends with 1, too: it is a night only where the log of this night says so
 if [ "$STATUS" -eq 1 ]; then
-    [ "$(wc -c <triage.log 2>/dev/null || echo 0)" -ge "$LOGGED" ] || LOGGED=0
+    [ "$(wc -c 2>/dev/null <triage.log || echo 0)" -ge "$LOGGED" ] || LOGGED=0
     tail -c +$((LOGGED + 1)) triage.log 2>/dev/null | grep -q ' end status=1 ' || STATUS=70
 fi
 # pages are made whatever became of tonight: yesterday's night is still worth reading
