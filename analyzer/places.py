@@ -120,9 +120,10 @@ def is_outage(error: BaseException | None) -> bool:
 def not_now(path: Path, error: BaseException) -> NotNowError:
     """What is said of a file that cannot be read at this time, and is not known to be damaged."""
     why = " ".join(str(error).split())[:200] or type(error).__name__
+    do = "look at endpoint and credentials" if is_remote(path) else "make it readable"
     return NotNowError(
-        f"{path}: cannot be read now ({why}), and nothing was changed; make it readable, then give the same command "
-        "again, a run with --resume"
+        f"{path}: cannot be read now ({why}), and nothing was changed; {do}, then give the same command again, a run "
+        "with --resume"
     )
 
 

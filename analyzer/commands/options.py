@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.places import place, refused
+from analyzer.places import is_outage, place, refused
 from identification.errors import InputError, TriageError
 from reports.texts import visible, visible_lines
 from reports.whole_file import is_full
@@ -63,6 +63,10 @@ def what_went_wrong(error: Exception) -> str | None:
         return one_line(str(error))
     if isinstance(error, MemoryError):
         return "takes more memory than there is; give fewer loops, nights or files"
+    if isinstance(error, OSError) and error.filename is None and (error.errno is None or is_outage(error)):
+        return (
+            f"{one_line(str(error))}; check URL, endpoint and credentials of the storage, or try again later"
+        )
     if isinstance(error, OSError):
         remedy = "make room and say it again" if is_full(error) else "check path and permissions"
         return f"{one_line(what_failed(error))}; {remedy}"

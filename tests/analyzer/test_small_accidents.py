@@ -14,6 +14,7 @@ import pytest
 from click.testing import CliRunner
 
 from analyzer.cli import main
+from analyzer.commands.options import what_went_wrong
 from analyzer.night import workers
 from tests.reports.small_store import small_store
 
@@ -75,3 +76,14 @@ def test_folders_of_dead_servers_go(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         alive.listen()
         workers._forget_dead_servers(Path())
     assert sorted(p.name for p in tmp_path.iterdir()) == ["pymp-alive", "pymp-other"]
+
+
+@pytest.mark.parametrize(
+    "error", [PermissionError("The provided token has expired."), OSError(16, "Slow down")]
+)
+def test_what_storage_refuses_speaks_of_credentials(error: OSError) -> None:
+    """What a storage's library raises without a file's name is told with what to look at there."""
+    told = what_went_wrong(error)
+    assert told is not None
+    assert "credentials" in told
+    assert "try again" in told
