@@ -12,6 +12,7 @@ import uuid
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
+from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass, replace
 from datetime import UTC, datetime
 from itertools import product
@@ -234,7 +235,9 @@ def run(
 def _require_one_clock(store: Store, zone: str, replaced: Sequence[str]) -> None:
     """Raise InputError where the nights that stay in a store were cut by the clock of another time zone."""
     stay = [night for night in store.nights() if night not in replaced]
-    kept = store.stated_zone(stay[-1:])
+    kept = None
+    with suppress(DamagedError):  # set aside, or named by others
+        kept = store.stated_zone(stay[-1:])
     if kept is not None and kept != zone:
         seen = f"--timezone {zone}: the nights of {store.path} are of {kept}"
         raise InputError(seen, "one clock in one store", f"say --timezone {kept}, or give another --store")
