@@ -12,6 +12,7 @@ import click
 from analyzer.commands import explain, options, report, run, store
 from analyzer.commands.options import say
 from analyzer.loop.decisions import Lane
+from reports.texts import visible
 
 if TYPE_CHECKING:
     from analyzer.night.asked import Asked
@@ -48,7 +49,7 @@ def check(asked: Asked) -> None:
     lost = 0
     for line, bad in check_lines(asked):
         lost += bad
-        say(line)
+        click.echo(visible(line))  # one line, whatever a tag holds
     sys.exit(options.SOME_LOST if lost else 0)
 
 
@@ -100,15 +101,16 @@ def rank(
 @main.command()
 @options.export_options
 @options.of_loop("The loop to tune.")
-@click.option("--out", type=options.FILE, help="Directory for pictures, and a page to try settings on.")
+@click.option("--out", type=options.FOLDER, help="Directory for pictures, and a page to try settings on.")
 def tune(asked: Asked, tag: str, out: Path | None) -> None:
     """One loop: model, limit cycle predicted, new Kp and Ti with reasons, forecast, travel map.
 
     Example: triage tune export.parquet --loops loops.csv --loop LIC2107 --out pictures
     """
     from analyzer.loop.tune import proposal
+    from analyzer.night.asked import guarded
 
-    check_lines, pictures = proposal(asked.opened().last_night(tag), out is not None)
+    check_lines, pictures = proposal(guarded(asked).last_night(tag), out is not None)
     for line in check_lines:
         say(line)
     if out is not None:

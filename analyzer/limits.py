@@ -25,9 +25,18 @@ class StoreLimits(Limits, section="store"):
     """When another run is at work on a store, and when what it left is dead."""
 
 
+class ClusterLimits(Limits, section="cluster"):
+    """How long a run waits for a cluster."""
+
+
+class StorageLimits(Limits, section="storage"):
+    """How long shared storage may fail."""
+
+
 class PageLimits(Limits, section="pages"):
     """How much pages tell."""
 
 
 HISTORY, WAVES, LOOP = HistoryLimits(), WaveLimits(), LoopLimits()
 EXPLAIN, STORE, PAGES = ExplainingLimits(), StoreLimits(), PageLimits()
+CLUSTER, STORAGE = ClusterLimits(), StorageLimits()

@@ -7,22 +7,48 @@ from where the storage's own library looks for them, such as AWS_ENDPOINT_URL.
 from __future__ import annotations
 
 import atexit
+import errno
+import logging
 import re
 import secrets
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 from urllib.parse import unquote, urlsplit
 
-from identification.errors import InputError
+from analyzer.limits import STORAGE
+from identification.errors import InputError, NotNowError
 
 URL = re.compile(r"[a-z][a-z0-9+.-]+://", re.IGNORECASE)
 """How a URL begins; a drive letter is no scheme."""
 LIBRARIES = frozenset({"botocore", "aiobotocore", "aiohttp", "s3fs", "gcsfs", "adlfs", "azure", "google"})
 """Packages whose errors say what shared storage refuses."""
+OPTIONS: Mapping[str, dict[str, Any]] = {
+    scheme: {"config_kwargs": {"retries": {"max_attempts": 0}}} for scheme in ("s3", "s3a")
+}
+"""What kinds of storage are told: requests are made again here, and not by the library below as well."""
+PASSING = frozenset(
+    getattr(errno, name)
+    for name in ("EBUSY", "EIO", "EREMOTEIO", "EAGAIN", "EHOSTUNREACH", "ENETUNREACH", "EPIPE")
+    if hasattr(errno, name)
+)
+"""What the libraries of storage make of an answer such as 503."""
+UNREACHED = frozenset(
+    {"EndpointConnectionError", "ConnectTimeoutError", "ReadTimeoutError", "ConnectionClosedError"}
+    | {"ClientConnectorError", "ServerDisconnectedError", "ClientPayloadError", "FSTimeoutError"}
+)
+"""Errors of storage that did not answer, by name: its packages may not be installed."""
+AT_ONCE = 8
+"""Requests of shared storage at one time."""
+T = TypeVar("T")
 NEEDED = "pip install 'loop-triage[remote]', and for other storage than s3 the fsspec package of that storage"
+
+
+class OutageError(InputError):
+    """Shared storage did not answer, or was busy, for minutes: it may answer again."""
 
 
 def place(text: str) -> Path:
@@ -35,11 +61,25 @@ def place(text: str) -> Path:
     try:
         from upath import UPath
 
-        found = UPath(text)
+        found = UPath(text, **OPTIONS.get(urlsplit(text).scheme, {}))
         _ = found.fs
     except (ImportError, ValueError) as error:
         raise InputError(f"{text}: no storage of that kind here", "the extra 'remote'", NEEDED) from error
+    be_patient(cast(Path, found))
     return cast(Path, found)
+
+
+def be_patient(path: Path) -> None:
+    """Let this process ask shared storage again, with growing waits, where it fails for a while; nothing for a path
+    of this machine. A worker does so before it reads or writes."""
+    if not is_remote(path) or cast(Any, path).protocol not in ("s3", "s3a"):
+        return
+    import s3fs.core
+
+    s3fs.core.S3FileSystem.retries = STORAGE.tries
+    if hasattr(s3fs.core, "set_custom_error_handler"):
+        s3fs.core.set_custom_error_handler(is_outage)
+    logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # of requests in hand when a run ends
 
 
 def is_remote(path: Path) -> bool:
@@ -52,6 +92,41 @@ def refused(error: Exception) -> bool:
     return type(error).__module__.split(".")[0] in LIBRARIES
 
 
+def is_passing(error: BaseException) -> bool:
+    """Whether an error says nothing of what a file holds: system or storage did not hand it out, or memory ended."""
+    if isinstance(error, IsADirectoryError | NotADirectoryError):
+        return False
+    if type(error) is OSError and error.errno is None:  # what Parquet finds wrong with a file
+        return False
+    return isinstance(error, MemoryError | OSError) or (isinstance(error, Exception) and refused(error))
+
+
+def is_outage(error: BaseException | None) -> bool:
+    """Whether an error, or what caused it, is one of shared storage that may answer again: it is busy, broken down or
+    not to be reached. What it refuses, for want of a right or of an object, it will refuse again."""
+    if error is None or isinstance(error, PermissionError | FileNotFoundError | FileExistsError):
+        return False
+    if isinstance(error, OutageError) or type(error).__name__ in UNREACHED:
+        return True
+    if isinstance(error, OSError):
+        passing = isinstance(error, TimeoutError | ConnectionError) or error.errno in PASSING
+        return passing or is_outage(error.__cause__)
+    answer = getattr(error, "response", None)
+    if isinstance(answer, Mapping):
+        return int(answer.get("ResponseMetadata", {}).get("HTTPStatusCode", 0)) >= 500
+    return is_outage(error.__cause__)
+
+
+def not_now(path: Path, error: BaseException) -> NotNowError:
+    """What is said of a file that cannot be read at this time, and is not known to be damaged."""
+    why = " ".join(str(error).split())[:200] or type(error).__name__
+    do = "look at endpoint and credentials" if is_remote(path) else "make it readable"
+    return NotNowError(
+        f"{path}: cannot be read now ({why}), and nothing was changed; {do}, then give the same command again, a run "
+        "with --resume"
+    )
+
+
 def remove_tree(path: Path) -> None:
     """Delete a directory and all in it, as far as that can be done; nothing where there is none."""
     if not is_remote(path):
@@ -62,6 +137,23 @@ def remove_tree(path: Path) -> None:
         remote.fs.rm(remote.path, recursive=True)
 
 
+def each(function: Callable[..., T], paths: Sequence[Path], *beside: Iterable[Any]) -> list[T]:
+    """What a function gives for each of some paths, and what stands beside each; at once where they are of shared
+    storage, which answers many requests as fast as one. The first error is raised."""
+    if len(paths) < 2 or not is_remote(paths[0]):
+        return list(map(function, paths, *beside))
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        return list(pool.map(function, paths, *beside))
+
+
+def afresh(path: Path) -> Path:
+    """A path of which nothing is known from before: other processes write to shared storage, too."""
+    if is_remote(path):
+        remote: Any = path
+        remote.fs.invalidate_cache(remote.path)
+    return path
+
+
 def content(path: Path) -> bytes:
     """What a small file holds now.
 
@@ -70,9 +162,20 @@ def content(path: Path) -> bytes:
     """
     if not is_remote(path):
         return path.read_bytes()
-    remote: Any = path
-    remote.fs.invalidate_cache(remote.path)
+    remote: Any = afresh(path)
     return bytes(remote.fs.cat_file(remote.path))
+
+
+def is_whole(path: Path) -> bool:
+    """Whether shared storage hands out all of an object: twice the same bytes, as many as it states."""
+    remote: Any = path
+    try:
+        held, again = content(path), content(path)
+        return held == again and len(held) == int(remote.fs.info(remote.path)["size"])
+    except Exception as error:
+        if not is_passing(error):
+            raise
+        return False
 
 
 def at_hand(paths: Sequence[Path], into: Path) -> tuple[list[Path], dict[Path, str]]:
@@ -104,6 +207,8 @@ def answering(url: Path) -> Iterator[None]:
         if not (isinstance(error, OSError) or refused(error)):
             raise
         why = " ".join(str(error).split())[:200] or type(error).__name__
+        if is_outage(error):
+            raise OutageError(f"{url}: {why}", "a storage that answers", "try again later") from error
         wanted = "an object, a bucket and credentials that the storage knows"
         raise InputError(f"{url}: {why}", wanted, "check URL, endpoint and credentials") from error
 
@@ -124,15 +229,27 @@ def _files(path: Path, copied: Path) -> list[tuple[Path, Path]]:
 
 
 def _copy(url: Path, local: Path) -> None:
-    """One file, whole or not at all."""
+    """One file, whole or not at all, and of one state of the object."""
+    before = _state(url)
     local.parent.mkdir(parents=True, exist_ok=True)
     begun = local.with_name(f".{local.name}.{secrets.token_hex(8)}.tmp")
     try:
         with url.open("rb") as source, begun.open("xb") as target:
             shutil.copyfileobj(source, target, 1 << 22)
+        if _state(url) != before:
+            seen = f"{url}: was written to while it was read"
+            raise InputError(seen, "an export that stays as it is", "run it when the historian has finished")
         begun.replace(local)
     finally:
         begun.unlink(missing_ok=True)
+
+
+def _state(url: Any) -> tuple[object, ...]:
+    """By what a state of an object is known."""
+    known = afresh(url).fs.info(url.path)  # type: ignore[attr-defined]
+    return tuple(
+        str(known.get(name)) for name in ("size", "ETag", "etag", "LastModified", "mtime", "generation")
+    )
 
 
 def bring(path: Path, origins: Mapping[Path, str]) -> None:

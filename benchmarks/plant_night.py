@@ -10,7 +10,6 @@ plants of 100, 1,000 and 10,000 loops of 2 h at 5 s instead. Writes plant_night.
 from __future__ import annotations
 
 import csv
-import resource
 import subprocess
 import sys
 import tempfile
@@ -25,6 +24,7 @@ import pyarrow.parquet as pq
 
 from analyzer.loop.decisions import COUNTS_PCT
 from analyzer.store.store import Store
+from benchmarks import adopt, spent
 from benchmarks.night import FAULTY, HEALTHY
 from proofs.common import parser_of, publish
 from proofs.plant import Sketch, Trends, simulate, write_export
@@ -133,17 +133,18 @@ def night(plant: Plant, jobs: int) -> Night:
     before = floor(plant)
     with tempfile.TemporaryDirectory() as folder:
         store, start = Path(folder) / "store", time.perf_counter()
-        spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+        adopt()
+        earlier = spent()
         command = [sys.executable, "-m", "analyzer.cli", "run", *map(str, plant.exports)]
         command += ["--loops", str(plant.loops_csv), "--store", str(store), "--jobs", str(jobs)]
         done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
-        wall, now = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+        wall, now = time.perf_counter() - start, spent()
         if done.returncode:
             raise SystemExit(f"triage run ended with {done.returncode}: {done.stdout}")
         shares = Store(store).read("nights", Store(store).require(), ["oscillating_pct"])["oscillating_pct"]
         flagged = sum((share or 0.0) >= COUNTS_PCT for share in shares.to_pylist())
     floor_s = 0.5 * (before + floor(plant))
-    processor = now.ru_utime + now.ru_stime - spent.ru_utime - spent.ru_stime
+    processor = now.ru_utime + now.ru_stime - earlier.ru_utime - earlier.ru_stime
     return Night(plant.loops, processor, wall, now.ru_maxrss / 1024, floor_s, flagged)
 
 

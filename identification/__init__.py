@@ -1,30 +1,84 @@
 """What a loop is, how it behaves, how it is found from its trends. Imports none of the other packages."""
 
+import atexit
+import contextlib
 import hashlib
 import os
 import shutil
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 KERNELS = "NUMBA_CACHE_DIR"
 """Where numba keeps compiled kernels."""
 
 
-def _keep_kernels_by_source() -> None:
-    """Keep the compiled kernels of each state of these sources, and of their limits, apart.
+def _name_of_kernels() -> str:
+    """The folder of the kernels of this state of the sources and of their limits, which are kept apart.
 
     numba keeps a kernel until its own file changes, though another kernel that it calls may have changed or gone:
-    after an update in place every loop would fail, or be told by old code.
+    after an update in place every loop would fail, or be judged by old code.
     """
     here = Path(__file__).parent
     sources = [*sorted(here.rglob("*.py")), here / "limits.toml"]
     stats = [(str(p.relative_to(here)), p.stat()) for p in sources]
     stamps = [(name, s.st_mtime_ns, s.st_size) for name, s in stats]
-    kept = here / "__pycache__" / f"kernels-{hashlib.sha256(repr(stamps).encode()).hexdigest()[:12]}"
+    return f"kernels-{hashlib.sha256(repr(stamps).encode()).hexdigest()[:12]}"
+
+
+def _places() -> Iterator[Path]:
+    """Where kernels may be kept, the best first: as stated, beside the code, where a service or a user keeps what is
+    made again when it is lost."""
+    if stated := os.environ.get(KERNELS):
+        yield Path(stated).parent if Path(stated).name.startswith("kernels-") else Path(stated)
+    yield Path(__file__).parent / "__pycache__"
+    if service := os.environ.get("CACHE_DIRECTORY"):  # systemd
+        yield Path(service.split(":")[0])
+    with contextlib.suppress(RuntimeError):  # no home
+        yield Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "loop-triage"
+
+
+def _is_writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        return False
+    return True
+
+
+def _keep_kernels() -> None:
+    """Give numba a folder that can be written: without one, the import of a kernel is an error.
+
+    Beside the code or elsewhere; the last resort is a folder that goes with this process. What was compiled at
+    installation is copied there. Where no folder can be made, kernels are compiled and not kept.
+    """
+    name, beside = _name_of_kernels(), Path(__file__).parent / "__pycache__"
+    place = next(filter(_is_writable, _places()), None)
+    if place is None:
+        try:
+            place = Path(tempfile.mkdtemp(prefix="triage-kernels-"))
+        except OSError:
+            _keep_nothing()
+            return
+        atexit.register(shutil.rmtree, place, True)
+    kept = place / name
     os.environ[KERNELS] = str(kept)
-    if not kept.exists():
-        for old in kept.parent.glob("kernels-*"):
+    if kept.exists():
+        return
+    if place == beside:
+        for old in beside.glob("kernels-*"):
             shutil.rmtree(old, ignore_errors=True)
+    elif (beside / name).exists():
+        with contextlib.suppress(OSError, shutil.Error):
+            shutil.copytree(beside / name, kept)
 
 
-if KERNELS not in os.environ:
-    _keep_kernels_by_source()
+def _keep_nothing() -> None:
+    from numba.core.dispatcher import Dispatcher
+
+    os.environ.pop(KERNELS, None)
+    Dispatcher.enable_caching = lambda _: None  # type: ignore
+
+
+_keep_kernels()

@@ -26,5 +26,10 @@ class InputError(TriageError):
         return type(self), (self.seen, self.expected, self.remedy)
 
 
+class NotNowError(TriageError):
+    """A file or a storage cannot be read or written at this time, and nothing says that it is damaged: the same
+    command may succeed later."""
+
+
 class NotAssessedError(TriageError):
     """A question cannot be answered from this record; the text says what it needs and what it has."""

@@ -16,9 +16,9 @@ from analyzer.loop.decisions import CAUSES, Lane
 from analyzer.store import notes
 from analyzer.store.care import Problem
 from analyzer.store.store import Store
-from analyzer.store.table import rows_table
+from analyzer.store.table import DamagedError, rows_table
 from analyzer.words import belief as words
-from identification.errors import InputError
+from identification.errors import InputError, NotNowError
 
 Held = tuple[tuple[float | None, float | None], tuple[float, float]]
 """Settings in force, as loops.csv states them, and those that nights have told to type in instead."""
@@ -80,7 +80,7 @@ def unfounded(store: Store, config: Config) -> list[Problem]:
         return []
     try:
         followed = list(_followed_anew(store, config))
-    except InputError:
+    except (InputError, NotNowError):
         return []
     remedy = "'triage store beliefs' makes them anew"
     paths = [store.file("beliefs", night) for night, rows, _ in followed if not _same(store, night, rows)]
@@ -98,8 +98,10 @@ def _write_all(store: Store, followed: Iterator[Followed]) -> list[str]:
 def _same(store: Store, night: str, rows: Sequence[Row]) -> bool:
     try:
         held = store.read_if_there("beliefs", night)
-    except InputError:
+    except DamagedError:
         return False
+    except NotNowError:  # said of the table itself
+        return True
     kept = [] if held is None else held.to_pylist()
     return {r["loop"]: r for r in kept} == {r["loop"]: row_of(r, BELIEFS) for r in rows}
 

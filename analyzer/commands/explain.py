@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands.options import FILE, NOTHING_DONE, PLACE, export_options, formats, of_loop, say, trying
+from analyzer.commands.options import (
+    FILE,
+    FOLDER,
+    NOTHING_DONE,
+    PLACE,
+    export_options,
+    formats,
+    of_loop,
+    say,
+    trying,
+)
 from identification.errors import NotAssessedError
 
 if TYPE_CHECKING:
@@ -30,7 +40,11 @@ if TYPE_CHECKING:
 )
 @click.option("--save-model", type=FILE, help="Write the model found, for `simulate`.")
 @formats("text", "json", "html", "markdown", text="Output format; html is one file that needs no network.")
-@click.option("--out", type=FILE, help="Folder for the page and Markdown's pictures.")
+@click.option(
+    "--out",
+    type=FOLDER,
+    help="Folder for the page and Markdown's pictures. Default: HTML for a terminal goes here.",
+)
 def explain(
     asked: Asked,
     tag: str,
@@ -75,6 +89,8 @@ def _show(data: dict[str, Any], page: Callable[[], Page], form: str, out: Path |
     else:
         from reports import folder, html, markdown
 
+        if out is None and form == "html" and sys.stdout.isatty():
+            out = Path()  # nobody reads a thousand lines of HTML on a terminal
         if out is None:
             click.echo(html.render(page(), True) if form == "html" else markdown.render(page(), ""))
             return

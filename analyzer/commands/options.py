@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
+import traceback
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import reduce, wraps
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.places import place, refused
+from analyzer.places import is_outage, place, refused
 from identification.errors import InputError, TriageError
 from reports.texts import visible, visible_lines
 from reports.whole_file import is_full
@@ -22,8 +25,9 @@ if TYPE_CHECKING:
     from analyzer.store.store import Store
 
 Command = Callable[..., Any]
-SOME_LOST, NOTHING_DONE = 1, 2
-"""Exit status where some loops failed, and where nothing could be done."""
+SOME_LOST, NOTHING_DONE, AGAIN = 1, 2, 75
+"""Exit status where some loops failed, where nothing could be done, and where shared storage failed for so long that
+a run ended: the same command may succeed later (EX_TEMPFAIL of sysexits)."""
 MOST_SAID = 600
 """Characters of a line that says what is wrong."""
 
@@ -33,18 +37,23 @@ class OneLineErrors(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, TextIOWrapper):  # a code page that lacks a character gets its number
+                stream.reconfigure(errors="backslashreplace")
         try:
             with warnings.catch_warnings():
                 if not sys.warnoptions:
                     warnings.simplefilter("ignore")  # a library's warning says nothing to an engineer
                 return super().invoke(ctx)
+        except (click.ClickException, click.Abort, click.exceptions.Exit):
+            raise
         except BrokenPipeError:
             sys.stderr.close()
         except Exception as error:
             line = what_went_wrong(error)
-            if line is None:
+            if line is None and sys.flags.dev_mode:
                 raise
-            click.echo(f"triage: {line}", err=True)
+            click.echo(f"triage: {line or unforeseen(error)}", err=True)
         sys.exit(NOTHING_DONE)
 
 
@@ -54,6 +63,10 @@ def what_went_wrong(error: Exception) -> str | None:
         return one_line(str(error))
     if isinstance(error, MemoryError):
         return "takes more memory than there is; give fewer loops, nights or files"
+    if isinstance(error, OSError) and error.filename is None and (error.errno is None or is_outage(error)):
+        return (
+            f"{one_line(str(error))}; check URL, endpoint and credentials of the storage, or try again later"
+        )
     if isinstance(error, OSError):
         remedy = "make room and say it again" if is_full(error) else "check path and permissions"
         return f"{one_line(what_failed(error))}; {remedy}"
@@ -61,6 +74,14 @@ def what_went_wrong(error: Exception) -> str | None:
         said = one_line(f"{type(error).__name__}: {error}")
         return f"{said}; check URL, endpoint and credentials of the storage"
     return None
+
+
+def unforeseen(error: Exception) -> str:
+    """An error of the program itself as one line: what, where, and what to do."""
+    at = traceback.extract_tb(error.__traceback__)[-1]
+    where = f"{Path(at.filename).name}, line {at.lineno}"
+    said = one_line(f"{type(error).__name__}: {error}")
+    return f"an error of the program ({said}; {where}); report it; 'python -X dev' shows all of it"
 
 
 def what_failed(error: OSError) -> str:
@@ -93,7 +114,21 @@ class Place(click.ParamType):
             self.fail(str(error), param, ctx)
 
 
-PLACE, FILE = Place(), click.Path(path_type=Path)
+class Folder(click.ParamType):
+    """A folder to write into that is no store, whose tables would be lost among pages."""
+
+    name = "path"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        path = Path(os.fspath(value))
+        if path.is_file():
+            raise InputError(f"--out {path}: a file", "a folder, or none yet", "give a folder")
+        if (path / "store.json").exists() or (path / "nights").is_dir():
+            raise InputError(f"--out {path}: a store", "a folder for pages alone", "give another folder")
+        return path
+
+
+PLACE, FILE, FOLDER = Place(), click.Path(path_type=Path), Folder()
 STORE = click.argument("store", type=PLACE)
 NIGHT = click.option("--night", help="Night to show, e.g. 2026-03-08. Default: the latest.")
 CONFIG = click.option(
@@ -176,6 +211,19 @@ def export_options(command: Command) -> Command:
     reads = [click.option(name, help=text, **KINDS.get(name, {})) for name, text in READING.items()]
     options: list[Any] = [*SPAN, *reads]
     return reduce(lambda found, option: option(found), reversed(options), collected)
+
+
+def age_told(night: str, zone: str) -> str:
+    """How old a night is, in a sentence; '' where it is one of these days."""
+    from datetime import date
+
+    from analyzer.history.plant_clock import date_of
+    from analyzer.limits import PAGES
+
+    days = (date.fromisoformat(date_of(time.time(), zone)) - date.fromisoformat(night)).days
+    if days <= PAGES.old_d:
+        return ""
+    return f"Night {night} is {days} days old: look whether the newest export was read."
 
 
 Report = Callable[[int, int], None]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from analyzer.commands import options
-from analyzer.commands.options import FILE, SOME_LOST, Command, opened_store, say
+from analyzer.commands.options import FILE, FOLDER, SOME_LOST, Command, opened_store, say
 from identification.errors import InputError
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def into_folder(single_text: str) -> Callable[[Command], Command]:
     """--format, --single-file and --out: in which format pages are written, whether each is to stand by itself, and
     where."""
     single = click.option("--single-file", is_flag=True, help=single_text)
-    where = click.option("--out", required=True, type=FILE, help="Folder to write into.")
+    where = click.option("--out", required=True, type=FOLDER, help="Folder to write into.")
     return lambda command: options.formats("html", "markdown")(single(where(command)))
 
 

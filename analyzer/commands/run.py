@@ -21,8 +21,20 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands.options import NOTHING_DONE, PLACE, SOME_LOST, bar, export_options, say, what_failed
-from identification.errors import InputError, TriageError
+from analyzer.commands.options import (
+    AGAIN,
+    NOTHING_DONE,
+    PLACE,
+    SOME_LOST,
+    age_told,
+    bar,
+    export_options,
+    say,
+    unforeseen,
+    what_failed,
+    what_went_wrong,
+)
+from identification.errors import InputError
 from reports.texts import visible
 from reports.whole_file import is_full
 
@@ -132,7 +144,8 @@ def run(asked: Asked, store: Path, log_file: Path | None, explaining: bool, **ho
     An export of several days is kept day by day; new settings are advised on for the last of them. A second export of
     a night adds its loops; of a loop that stands in both the fuller record is kept.
 
-    Exit status: 0 the night was written, 1 some loops failed, 2 nothing could be done.
+    Exit status: 0 the night was written, 1 some loops failed, 2 nothing could be done, 75 shared storage failed for
+    minutes: the same command with --resume may succeed later.
 
     Example: triage run export.parquet --loops loops.csv --store store --jobs 4
     """
@@ -142,6 +155,7 @@ def run(asked: Asked, store: Path, log_file: Path | None, explaining: bool, **ho
     export = " ".join(map(str, asked.export))
     log.say("begin", version=version("loop-triage"), store=store, export=export, jobs=how["jobs"])
     try:
+        asked = _for_all_workers(asked, store, how["scheduler"])
         with stoppable():
             outcome, loops = _run_night(asked, store, log, explaining, how)
     except StoppedError as stopped:
@@ -149,8 +163,17 @@ def run(asked: Asked, store: Path, log_file: Path | None, explaining: bool, **ho
         with suppress(OSError):  # the terminal may be gone
             say(f"triage: stopped by {stopped}; {_go_on(store)}", err=True)
         sys.exit(STOPPED + stopped.number)
-    except (TriageError, OSError) as error:
-        log.say("nothing done", error=error, status=NOTHING_DONE)
+    except Exception as error:
+        said, again = (
+            what_went_wrong(error) or unforeseen(error),
+            _may_answer_again(error, (store, *asked.export)),
+        )
+        log.say("nothing done", error=said, status=AGAIN if again else NOTHING_DONE)
+        if again:
+            why = said.partition("; ")[0]
+            why = why if "://" in why else f"{store}: {why}"
+            say(f"triage: {why}; the storage failed for minutes: {_go_on(store)}", err=True)
+            sys.exit(AGAIN)
         if isinstance(error, OSError) and is_full(error):
             raise InputError(what_failed(error), "room to write", f"make room; {_go_on(store)}") from error
         raise
@@ -158,6 +181,27 @@ def run(asked: Asked, store: Path, log_file: Path | None, explaining: bool, **ho
     status = lost if outcome.failed or lost == NOTHING_DONE else 0
     log.say("end", status=status, night=outcome.nights[-1].name, seconds=time.monotonic() - begun_s)
     sys.exit(status)
+
+
+def _for_all_workers(asked: Asked, store: Path, scheduler: str | None) -> Asked:
+    """What is asked, as workers elsewhere find it. Raises InputError where their store would be another."""
+    from analyzer.places import is_remote
+
+    if scheduler is None:
+        return asked
+    if not is_remote(store) and not store.is_absolute():
+        seen = f"--store {store} with --scheduler: each worker would write a store of its own"
+        raise InputError(
+            seen, "an absolute path, or a URL, that all machines share", f"say {store.resolve()}"
+        )
+    return replace(asked, export=tuple(p if is_remote(p) else p.absolute() for p in asked.export))
+
+
+def _may_answer_again(error: Exception, places: Sequence[Path]) -> bool:
+    """Whether a run ends because shared storage has failed for a while."""
+    from analyzer.places import is_outage, is_remote
+
+    return any(map(is_remote, places)) and is_outage(error)
 
 
 def _go_on(store: Path) -> str:
@@ -171,8 +215,9 @@ def _run_night(
     outcome and the number of loops."""
     from analyzer.night.asked import opened_apart
     from analyzer.store.lock import scratch
-    from analyzer.store.store import Store
+    from analyzer.store.store import Store, require_place
 
+    require_place(place)
     with scratch(place, how["resume"]) as copies:
         reading = {**asked.reading, "scratch": copies}
         plant, store = opened_apart(replace(asked, reading=reading)), Store(place)
@@ -209,6 +254,7 @@ def _assessed(plant: Plant, store: Store, how: Mapping[str, Any], log: RunLog) -
     several = f" ({len(nights)} nights from {nights[0].name})" if len(nights) > 1 else ""
     said = f"{done} of {loops} loops assessed{f', {failed} failed' if failed else ''}"
     click.echo(f"{said}, night {nights[-1].name}{several}, in {store.path}", err=True)
+    _say(list(filter(None, [age_told(nights[-1].name, plant.zone)])), log)
     return outcome
 
 

@@ -9,7 +9,17 @@ from pathlib import Path
 
 import click
 
-from analyzer.commands.options import CONFIG, NIGHT, PLACE, SOME_LOST, STORE, formats, opened_store, say
+from analyzer.commands.options import (
+    CONFIG,
+    NIGHT,
+    PLACE,
+    SOME_LOST,
+    STORE,
+    age_told,
+    formats,
+    opened_store,
+    say,
+)
 from analyzer.store.notes import STATES
 from identification.errors import InputError
 
@@ -174,6 +184,8 @@ def summary(store: Path, night: str | None, form: str) -> None:
     from reports import html, markdown, plain
 
     kept = opened_store(store)
-    found = replace(summary_page(kept, night), made=made(kept), zone=kept.zone())
+    zone = kept.zone()
+    old = age_told(night or kept.nights()[-1], zone)
+    found = replace(summary_page(kept, night), made=made(kept), zone=zone, subtitle=old)
     draw = {"text": plain.render, "html": html.mail, "markdown": lambda p: markdown.render(p, "")}[form]
     click.echo(draw(found).rstrip("\n"))

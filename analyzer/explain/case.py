@@ -31,7 +31,7 @@ from analyzer.loop.sample_clock import onto_clock
 from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import controller
-from analyzer.night.asked import Asked
+from analyzer.night.asked import Asked, guarded
 from analyzer.night.nights import ALWAYS, Night, cut
 from identification.controller.check import StatedSettings
 from identification.errors import InputError, NotAssessedError
@@ -276,7 +276,7 @@ def loop_trends(asked: Asked, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...],
     InputError
         The export has no such loop, no PV of it, or no samples of PV in the span that is asked for.
     """
-    plant = asked.opened()
+    plant = guarded(asked)
     specs = plant.specs
     spec = spec_of(specs, tag)
     if spec.pv is None:

@@ -11,7 +11,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from difflib import get_close_matches
@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from analyzer.history.files import export_files, is_parquet, packed_beside, unpacked
+from analyzer.history.files import Mark, export_files, is_parquet, mark_of, packed_beside, unpacked
 from analyzer.history.layouts import Source, source_of, tag_column
 from analyzer.history.parquet import converted, open_parquet
 from analyzer.history.plant_clock import zone_of
@@ -50,6 +50,8 @@ class Export:
         Files of a folder that could not be read, each with the reason.
     origins : mapping of Path to str
         URLs of the files that were copied from shared storage.
+    marks : mapping of Path to Mark
+        What the files were known by when they were opened.
     """
 
     sources: tuple[Source, ...]
@@ -57,6 +59,7 @@ class Export:
     _homes: dict[str, tuple[int, ...]] = field(repr=False, compare=False)
     skipped: tuple[str, ...] = ()
     origins: Mapping[Path, str] = field(default_factory=dict, repr=False, compare=False)
+    marks: Mapping[Path, Mark] = field(default_factory=dict, repr=False, compare=False)
     _met: dict[str, Counter[str]] = field(default_factory=dict, repr=False, compare=False)
     _spans: dict[int, MainSpan] = field(default_factory=dict, repr=False, compare=False)
 
@@ -143,12 +146,22 @@ def open_export(paths: Sequence[Path], options: ReadOptions | None = None) -> Ex
     options = options or ReadOptions()
     _check_stated(options)
     paths, origins = at_hand(paths, options.place) if any(map(is_remote, paths)) else (paths, {})
+    marks = _marks(export_files(paths))
     opened, skipped = _readable_files(paths, options)
     sources = _agreed(opened)
     homes: dict[str, tuple[int, ...]] = {}
     for i, source in enumerate(sources):
         homes.update({tag: (*homes.get(tag, ()), i) for tag in source.tags})
-    return Export(sources, tuple(homes), homes, (*skipped, *packed_beside(paths)), origins)
+    return Export(sources, tuple(homes), homes, (*skipped, *packed_beside(paths)), origins, marks)
+
+
+def _marks(paths: Iterable[Path]) -> dict[Path, Mark]:
+    """What files are known by; one that cannot be read is told of where it is opened."""
+    marks = {}
+    for path in paths:
+        with suppress(OSError):
+            marks[path] = mark_of(path)
+    return marks
 
 
 def _check_stated(options: ReadOptions) -> None:
@@ -260,6 +273,11 @@ def _faults_told(path: Path) -> Iterator[None]:
     except NoStampError as error:
         expected = "stamps of our time that the time zone has"
         raise InputError(f"{path}: no readable time stamp", expected, "check dates and --timezone") from error
+    except KeyError as error:
+        seen = f"{path}: has no column {error} any more"
+        raise InputError(
+            seen, "an export that stays as it is", "run it when the historian has finished"
+        ) from error
     except (OSError, pa.ArrowException, UnicodeError, csv.Error) as error:
         why = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
         raise InputError(f"{path}: {why}", "a whole file", "export it again") from error

@@ -11,17 +11,20 @@ import bz2
 import codecs
 import csv
 import gzip
+import hashlib
 import lzma
 import re
 import shutil
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any
 
+from analyzer.history.spans import require_dense
 from analyzer.limits import HISTORY
 from identification.errors import InputError
 
@@ -94,6 +97,37 @@ def ends_of(path: Path) -> bytes:
         head = file.read(HISTORY.ends_bytes)
         file.seek(max(size - HISTORY.ends_bytes, 0))
         return str(size).encode() + head + file.read()
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """By what a file is known again: size, time of its last change [ns], and a digest of both ends."""
+
+    size: int
+    changed_ns: int
+    ends: bytes
+
+
+def mark_of(path: Path) -> Mark:
+    """What a file is known by now. Raises OSError where it cannot be read."""
+    stat = path.stat()
+    return Mark(stat.st_size, stat.st_mtime_ns, hashlib.blake2b(ends_of(path), digest_size=16).digest())
+
+
+class ChangedError(InputError):
+    """A file of an export was written to, or taken away, while it was read."""
+
+
+def require_unchanged(marks: Mapping[Path, Mark]) -> None:
+    """Raise ChangedError where a file is no longer what it was when it was opened."""
+    for path, mark in marks.items():
+        try:
+            same, seen = mark_of(path) == mark, f"{path}: was written to while it was read"
+        except OSError as error:
+            same, seen = False, f"{path}: was taken away while it was read ({error.strerror or error})"
+        if not same:
+            remedy = "nothing of it was kept; run it when the historian has finished"
+            raise ChangedError(seen, "an export that stays as it is until the run ends", remedy)
 
 
 def is_parquet(path: Path) -> bool:
@@ -171,6 +205,7 @@ def unpacked(path: Path, place: Path) -> list[Path]:
     named = start.startswith(ZIP) and path.suffix.lower() in WORKBOOK_ENDINGS
     if start.startswith(OLD) or named or any(info.filename.startswith("xl/") for info in members):
         _check_size(path, sum(info.file_size for info in members), 0, place)
+        require_dense(path, members)
         return sheets_as_text(path, Path(tempfile.mkdtemp(prefix="workbook-", dir=place)))
     stream = next((STREAMS[magic] for magic in STREAMS if start.startswith(magic)), None)
     if stream is None and not start.startswith(ZIP):

@@ -33,7 +33,7 @@ from pyarrow import csv
 
 from analyzer.history.files import ends_of
 from analyzer.history.sheet import Sheet, read_through, reading
-from analyzer.history.table import HEAD_ROWS, Table, check_once, one_array, trimmed
+from analyzer.history.table import HEAD_ROWS, Table, check_once, is_text, one_array, trimmed
 from analyzer.limits import HISTORY
 from identification.errors import InputError
 
@@ -44,6 +44,8 @@ BATCH_ROWS = 500_000
 """Rows of a Parquet file that are handed on at a time."""
 HELD_ROWS = 32_768
 """Rows of a file that are held before they are written: 64 files of 50 bytes a row hold 100 MB."""
+PROBED_GROUPS = 64
+"""Groups of rows, from all of a file, whose texts are looked at."""
 DONE = "done.json"
 """What a copy says of itself; written last."""
 NAMED = "converted-"
@@ -122,6 +124,7 @@ def open_parquet(path: Path) -> ParquetTable:
     try:
         with pq.ParquetFile(path) as file:
             schema, rows, long_text = file.schema_arrow, file.metadata.num_rows, _longest_text(file.metadata)
+            encoded = _encoded_bytes(file.metadata)
     except (pa.ArrowException, OSError) as error:
         why = str(error).splitlines()[0][:100] if str(error) else type(error).__name__
         seen = f"{path}: named as Parquet, but cannot be read as such ({why})"
@@ -129,19 +132,44 @@ def open_parquet(path: Path) -> ParquetTable:
         raise InputError(seen, "a whole Parquet file", remedy) from error
     check_once(path, schema.names)
     size = path.stat().st_size
-    if rows > HISTORY.many_rows and rows > HISTORY.rows_a_byte * size:
+    if rows > HISTORY.many_rows and rows > HISTORY.rows_a_byte * min(encoded, size):
         remedy = "export it again; a file that unpacks to so much more is not read"
         expected = f"at most {HISTORY.rows_a_byte:g} rows a byte"
-        raise InputError(f"{path}: {rows} rows in {size} bytes", expected, remedy)
+        raise InputError(f"{path}: {rows} rows in {min(encoded, size)} bytes", expected, remedy)
     if long_text > HISTORY.longest_text:
         expected = f"at most {HISTORY.longest_text:g} bytes for a tag, a stamp or a state"
         seen = f"{path}: texts of {long_text:.0f} bytes on average"
         raise InputError(seen, expected, "export numbers, tags and stamps alone")
     if size < HISTORY.probed_bytes:
         _check_pages(path)
+    _require_short_texts(path, schema)
     if rows == 0:
         raise InputError(f"{path}: Parquet without rows", "at least one sample", "export a period with data")
     return ParquetTable(path, tuple(schema.names), tuple(schema.types), rows=rows)
+
+
+def _encoded_bytes(footer: pq.FileMetaData) -> int:
+    """Size of all column chunks as the footer declares them, which padding between them adds nothing to [bytes]."""
+    groups = (footer.row_group(k) for k in range(footer.num_row_groups))
+    return sum(g.column(j).total_compressed_size for g in groups for j in range(footer.num_columns))
+
+
+def _require_short_texts(path: Path, schema: pa.Schema) -> None:
+    """Raise InputError where many rows share long texts through a dictionary: decoded they take gigabytes."""
+    names = [f.name for f in schema if is_text(f.type)]
+    with contextlib.suppress(pa.ArrowException, OSError), pq.ParquetFile(path, read_dictionary=names) as file:
+        footer = file.metadata
+        step = max(footer.num_row_groups // PROBED_GROUPS, 1)
+        for k in range(0, footer.num_row_groups if names else 0, step):
+            rows = footer.row_group(k).num_rows
+            batch = next(file.iter_batches(1, row_groups=[k], columns=names, use_threads=False), None)
+            for column in batch.columns if batch is not None else ():
+                held = column.dictionary if pa.types.is_dictionary(column.type) else column
+                longest = pc.max(pc.binary_length(held.cast(pa.large_string()))).as_py() or 0
+                if longest > HISTORY.longest_text and longest * rows > HISTORY.much_text:
+                    expected = f"at most {HISTORY.longest_text:g} bytes for a tag, a stamp or a state"
+                    seen = f"{path}: texts of {longest} bytes in a column of {rows} rows"
+                    raise InputError(seen, expected, "export numbers, tags and stamps alone")
 
 
 def _check_pages(path: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
-from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError, available_timezones
 
 from identification.errors import InputError
 
@@ -22,7 +22,9 @@ def zone_of(name: str | None) -> ZoneInfo:
     try:
         return ZoneInfo(name or UTC_NAME)
     except (ZoneInfoNotFoundError, ValueError, OSError) as error:
-        expected = "an IANA name such as Europe/Berlin"
+        wanted = str(name).strip().replace(" ", "_").lower()
+        near = sorted(z for z in available_timezones() if z.lower().rsplit("/", 1)[-1] == wanted)
+        expected = f"an IANA name such as {' or '.join(near[:3]) or 'Europe/Berlin'}"
         raise InputError(f"time zone '{name}'", expected, "correct the name of the time zone") from error
 
 

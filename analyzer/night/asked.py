@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, fields, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
+from weakref import finalize
 
 from analyzer.config import Config, WorkerLimits
-from analyzer.history.export import ReadOptions, open_export
+from analyzer.history.export import Export, ReadOptions, open_export
+from analyzer.history.files import own_scratch
 from analyzer.history.plant_clock import utc_seconds, zone_of
+from analyzer.history.series import Series
 from analyzer.loops.changes import TuningChange, read_changes
 from analyzer.loops.spec import LoopSpec, unknown_columns
 from analyzer.loops.tags import find_loops, match, read_loops
@@ -93,10 +98,71 @@ def opened_apart(asked: Asked) -> Plant:
         workers.submit(asked)
         (found,) = workers.results()
     if isinstance(found, Died):
-        seen = f"{asked.export[0]}: reading it ended without a result ({found.why})"
-        remedy = "export them again or in parts; 'triage check FILE' on each finds the one"
-        raise InputError(seen, "files that are whole and fit into memory", remedy)
+        raise _ended(asked.export[0], found.why)
     return found
+
+
+def _ended(path: Path, why: str) -> InputError:
+    seen = f"{path}: reading it ended without a result ({why})"
+    remedy = "export them again or in parts; 'triage check FILE' on each finds the one"
+    return InputError(seen, "files that are whole and fit into memory", remedy)
+
+
+def guarded(asked: Asked) -> Plant:
+    """The same, its samples read in a worker process too, whenever they are asked for; errors as of `opened_apart`,
+    also where samples are read."""
+    scratch = asked.reading.get("scratch") or own_scratch()  # gone with this process, however a worker ends
+    plant = opened_apart(replace(asked, reading={**asked.reading, "scratch": scratch}))
+    return replace(plant, export=Guarded.of(plant.export, asked.config.workers))
+
+
+class Guarded(Export):
+    """An export whose samples are read in a worker process with limits of memory and time."""
+
+    __slots__ = ("__weakref__", "_plain", "_told", "_worker")
+    _plain: Export
+    _told: list[Export]
+    _worker: Workers[Any, dict[str, Series]]
+
+    @classmethod
+    def of(cls, plain: Export, limits: WorkerLimits) -> Guarded:
+        """An export, read under limits; the worker ends with it."""
+        made = cls(**{f.name: getattr(plain, f.name) for f in fields(plain)})
+        worker = Workers(1, read_apart, limits)
+        for name, value in (("_plain", plain), ("_told", []), ("_worker", worker)):
+            object.__setattr__(made, name, value)
+        finalize(made, worker.__exit__)
+        return made
+
+    def read(self, tags: Sequence[str]) -> dict[str, Series]:
+        self._check_known(tags)
+        self._worker.submit((None if self._told else self._plain, tuple(tags)))
+        (found,) = self._worker.results()
+        if isinstance(found, Died):
+            self._told.clear()
+            raise _ended(self.sources[self._homes[tags[0]][0]].path, found.why)
+        self._told[:] = [self._plain]
+        self._met.update({tag: series.found for tag, series in found.items() if series.found})
+        return found
+
+
+_reading: list[Export] = []
+"""The export that a worker process reads."""
+
+
+def read_apart(given: tuple[Export | None, Sequence[str]], began: Callable[[int], None]) -> dict[str, Series]:
+    """What a worker reads of an export, which it is given once."""
+    _be_silent()
+    export, tags = given
+    if export is not None:
+        _reading[:] = [export]
+    return _reading[0].read(tags)
+
+
+def _be_silent() -> None:
+    """Let nothing of a library reach the terminal, such as the last words of a reader that aborts."""
+    with open(os.devnull, "wb") as nowhere:
+        os.dup2(nowhere.fileno(), 2)
 
 
 def _allowed(asked: Asked) -> WorkerLimits:
@@ -112,8 +178,11 @@ def _allowed(asked: Asked) -> WorkerLimits:
 
 def find_out(asked: Asked, began: Callable[[int], None]) -> Plant:
     """What a worker finds out about an export, its span of time included."""
+    _be_silent()
     plant = asked.opened()
     for spec in plant.specs:
         if spec.pv is not None:
             plant.export.span(spec.pv)
+    with suppress(InputError):  # of files without a loop it is nobody's fault
+        plant.export.span()
     return plant

@@ -12,6 +12,7 @@ import uuid
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
+from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass, replace
 from datetime import UTC, datetime
 from itertools import product
@@ -21,7 +22,7 @@ from typing import Any
 from analyzer.belief.nights import held_pairs
 from analyzer.config import Config
 from analyzer.history.export import met_told
-from analyzer.history.files import ends_of
+from analyzer.history.files import ChangedError, ends_of, require_unchanged
 from analyzer.loop.decisions import Status
 from analyzer.loops.tags import no_loops
 from analyzer.night import chunk
@@ -29,9 +30,11 @@ from analyzer.night.chunk import Done, Task
 from analyzer.night.finish import finish_night, is_empty
 from analyzer.night.nights import Night, Plant, nights_of
 from analyzer.night.workers import Died, Executor, executor
+from analyzer.places import afresh, is_passing, not_now
+from analyzer.store.draft import drafted
 from analyzer.store.lock import locked
-from analyzer.store.store import Store
-from analyzer.store.table import OF_A_NIGHT
+from analyzer.store.store import GO_ON, Store
+from analyzer.store.table import OF_A_NIGHT, DamagedError
 from identification.errors import InputError
 
 CHUNKS, FEWEST, MOST = 16, 4, 16
@@ -119,19 +122,23 @@ def in_one_order(value: object) -> bytes:
     return json.dumps(value, sort_keys=True, default=plain).encode()
 
 
-def require_same(path: Path, run: Identity) -> None:
-    """Raise InputError where the pieces at `path` are of another run; nothing where there are none."""
+def is_same(path: Path, run: Identity) -> bool:
+    """Whether the pieces that `path` speaks of are of this run; not where nothing says of which. Raises InputError
+    where they are of another."""
     try:
         stopped = json.loads(path.read_text(encoding="utf-8"))
         begun = f"{stopped['export']} ({stopped['loops']} loops, begun {stopped['begun']})"
         same = stopped["fingerprint"] == run["fingerprint"]
-    except (OSError, ValueError, TypeError, KeyError, RecursionError):
-        return
+    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+        if is_passing(error) and not isinstance(error, FileNotFoundError):
+            raise not_now(path, error) from error
+        return False
     if not same:
         seen = f"the run that was stopped read {begun}, this one reads {run['export']} ({run['loops']} loops)"
         expected = "--resume with the same EXPORT, --loops, --changes, --since, --until, --config and version"
         remedy = "give them again, or leave out --resume to give up what the stopped run had done"
         raise InputError(seen, expected, remedy)
+    return True
 
 
 def of_code() -> bytes:
@@ -160,8 +167,7 @@ def identity(plant: Plant) -> Identity:
 def _begun(plant: Plant, store: Store, nights: Sequence[Night], resume: bool) -> list[str]:
     """Keys of the chunks that a stopped run left whole; all else of it is forgotten."""
     mine = identity(plant)
-    if resume:
-        require_same(store.run_file, mine)
+    if resume and is_same(store.run_file, mine):
         keys = [key for key in store.whole_chunks(nights[-1].name) if _is_readable(store, nights, key)]
     else:
         store.drop_parts()
@@ -172,12 +178,12 @@ def _begun(plant: Plant, store: Store, nights: Sequence[Night], resume: bool) ->
 
 
 def _is_readable(store: Store, nights: Sequence[Night], key: str) -> bool:
-    """Whether a chunk's pieces can be read; a damaged one is not done, and is worked on again."""
+    """Whether a chunk's pieces are whole; one of which a piece is damaged or gone is worked on again."""
     try:
         for night, table in product(nights, OF_A_NIGHT):
             if table.in_pieces:
                 store.read_parts(night.name, table.name, [key])
-    except InputError:
+    except DamagedError:
         return False
     return True
 
@@ -204,19 +210,44 @@ def run(
     with locked(store.path):
         store.upgrade()
         nights = nights_of(plant)
+        _require_one_clock(store, plant.zone, [night.name for night in nights] if replacing else [])
         said = [line for night in nights for line in store.set_aside_damaged(night.name)]
         keys, met = _begun(plant, store, nights, resume), Counter[str]()
         whole = store.read_parts(nights[-1].name, "nights", keys)
         known = set() if whole is None else set(whole.column("loop").to_pylist())
         done, of = len(known), len(plant.specs)
         progress(done, of)
-        for result in _results(_tasks(plant, store, nights, known), jobs, plant.config, scheduler):
-            keys.append(result.key)
-            done += result.loops
-            met.update(result.met)
-            progress(done, of)
+        try:
+            for result in _results(_tasks(plant, store, nights, known), jobs, plant.config, scheduler):
+                _require_kept(store, nights[-1].name, result.key)
+                keys.append(result.key)
+                done += result.loops
+                met.update(result.met)
+                progress(done, of)
+            require_unchanged(plant.export.marks)
+        except ChangedError:  # some pieces may be of another export
+            store.drop_parts()
+            raise
         written, more = _finished(plant, store, nights, keys, replacing)
         return _outcome(plant, store, written, (*plant.export.file_notes, *met_told(met), *said, *more))
+
+
+def _require_one_clock(store: Store, zone: str, replaced: Sequence[str]) -> None:
+    """Raise InputError where the nights that stay in a store were cut by the clock of another time zone."""
+    stay = [night for night in store.nights() if night not in replaced]
+    kept = None
+    with suppress(DamagedError):  # set aside, or named by others
+        kept = store.stated_zone(stay[-1:])
+    if kept is not None and kept != zone:
+        seen = f"--timezone {zone}: the nights of {store.path} are of {kept}"
+        raise InputError(seen, "one clock in one store", f"say --timezone {kept}, or give another --store")
+
+
+def _require_kept(store: Store, night: str, key: str) -> None:
+    """Raise DamagedError where a chunk that is done has left no piece in this store."""
+    piece = store.part(night, "nights", key)
+    if not afresh(piece).exists():
+        raise store.gone(piece)
 
 
 def _finished(
@@ -224,19 +255,41 @@ def _finished(
 ) -> tuple[list[Night], list[str]]:
     """The nights put together, those without a sample left out unless they are all there is."""
     order = [s.loop for s in plant.specs]
+    for night in nights:
+        _require_all(store, night.name, keys, order)
     full = [night for night in nights if not is_empty(store, night.name, keys)] or list(nights[-1:])
     said = []
     if len(full) < len(nights):
         said.append(f"{len(nights) - len(full)} nights without a good sample of any loop are left out")
-    for night in full:
-        said += finish_night(store, night.name, order, plant.config, keys, replacing)
+    with drafted(store) as draft:
+        for night in full:
+            said += finish_night(draft, night.name, order, plant.config, keys, replacing)
     store.drop_parts()
     return full, said
+
+
+def _require_all(store: Store, night: str, keys: Sequence[str], order: Sequence[str]) -> None:
+    """Raise DamagedError where the pieces of a night do not hold every loop of the run."""
+    table = store.read_parts(night, "nights", keys)
+    missing = set(order) - set([] if table is None else table.column("loop").to_pylist())
+    if missing:
+        seen = f"{store.path}: the pieces of night {night} hold {len(order) - len(missing)} of {len(order)} loops"
+        raise DamagedError(seen, "all of them", GO_ON)
+
+
+def _require_in(store: Store, night: str, wanted: AbstractSet[str]) -> None:
+    """Raise DamagedError where the finished table of a night lacks a loop of the run."""
+    lacking = wanted - set(store.read("nights", night, ["loop"]).column(0).to_pylist())
+    if lacking:
+        seen = f"{store.file('nights', night)}: lacks {len(lacking)} of the {len(wanted)} loops of this run"
+        raise DamagedError(seen, "a store that nobody else changes", "run it again")
 
 
 def _outcome(plant: Plant, store: Store, nights: Sequence[Night], notes: Sequence[str]) -> Outcome:
     """The outcome as the last night's table has it, for the loops of this run."""
     wanted = {s.loop for s in plant.specs}
+    for night in nights:
+        _require_in(store, night.name, wanted)
     rows = store.read("nights", nights[-1].name, ["loop", "status", "reason"]).to_pylist()
     lost = [r for r in rows if r["loop"] in wanted and r["status"] != Status.OK]
     unassessed = tuple((r["loop"], r["reason"]) for r in lost if r["status"] == Status.NOT_ASSESSED)

@@ -16,7 +16,7 @@ from analyzer.loop.quality import Prepared, prepare
 from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import no_loops
-from analyzer.night.asked import Asked
+from analyzer.night.asked import Asked, guarded
 from analyzer.night.nights import Plant
 from identification.errors import TriageError
 
@@ -79,7 +79,7 @@ def _changes_counted(changes: Sequence[TuningChange], specs: Sequence[LoopSpec])
 def check_lines(asked: Asked) -> Iterator[tuple[str, bool]]:
     """All lines on an export, each with whether a loop of it cannot be assessed. Raises InputError where it cannot be
     used; once the lines on it are told, where it has no loops."""
-    plant = asked.opened()
+    plant = guarded(asked)
     export, specs, notes = plant.export, plant.specs, plant.notes
     first, last = export.span()
     span = f"{stamp(first, asked.zone)} to {stamp(last, asked.zone)} {asked.zone}"

@@ -32,11 +32,12 @@ from analyzer.loops.changes import TuningChange, in_force, settings_from
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.nights import Night, Plant, cut
 from analyzer.pages import compared as settings_pages
+from analyzer.places import be_patient, each
 from analyzer.plantwide.structure import Moves, moves_of, moves_table
 from analyzer.plantwide.wave import waves_table
 from analyzer.store.rows import hour_rows, piece_row
 from analyzer.store.store import Store
-from analyzer.store.table import rows_table, write_table
+from analyzer.store.table import naming, rows_table, write_table
 from analyzer.words import units as words
 from identification.errors import NotAssessedError, TriageError
 from reports.page_file import dumps
@@ -198,6 +199,7 @@ def _samples_of(task: Task, spec: LoopSpec) -> dict[str, Series] | Lost:
 
 def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
     """Assess a chunk and write its pieces; `began` is told the number of each loop that is begun with."""
+    be_patient(task.store.path)
     kept, plant = {n.name: Rows() for n in task.nights}, task.plant
     for at, spec in enumerate(task.specs):
         began(at)
@@ -224,7 +226,7 @@ def lose(task: Task, reason: str) -> Done:
 
 
 def _write_pieces(task: Task, night: str, kept: Rows) -> None:
-    """The piece of the table of nights comes last: where it is, the chunk is whole."""
+    """The piece of the table of nights comes last, and names the others: where all are, the chunk is whole."""
     names = (pa.array([a.loop] * len(a.trend["time_s"])).dictionary_encode() for a in kept.found)
     trends = [pa.table({"loop": loop, **a.trend}) for loop, a in zip(names, kept.found, strict=True)]
     made = {
@@ -235,6 +237,8 @@ def _write_pieces(task: Task, night: str, kept: Rows) -> None:
         "compared": rows_table(kept.compared, SETTINGS),
         "nights": rows_table([piece_row(found) for found in kept.nights], NIGHTS),
     }
-    for name, table in made.items():
-        if table is not None and table.num_rows:
-            write_table(table, task.store.part(night, name, task.key))
+    filled = {name: table for name, table in made.items() if table is not None and table.num_rows}
+    last = naming(filled.pop("nights"), filled)
+    paths = [task.store.part(night, name, task.key) for name in filled]
+    each(lambda path, table: write_table(table, path), paths, filled.values())
+    write_table(last, task.store.part(night, "nights", task.key))

@@ -7,65 +7,100 @@ ends several workers comes back as `Died`.
 from __future__ import annotations
 
 import logging
+import sys
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from queue import Empty, SimpleQueue
 from typing import Any, Self
 
+from analyzer.limits import CLUSTER
 from analyzer.night.workers import Died, Executor, R, T
 from identification.errors import InputError
 
-CONNECT = "10s"
-"""How long a scheduler may take to answer."""
+GO_ON = (
+    "what is done is kept in the store: start the scheduler and workers, then the same command with --resume"
+)
 WHY = "ended several workers of the cluster"
 
 
 class Cluster(Executor[T, R]):
-    """The workers of a scheduler at an address, tcp://HOST:PORT. Raises InputError where Dask is not installed, no
-    scheduler answers there, or it died before all was done."""
+    """The workers of a scheduler at an address, tcp://HOST:PORT; a line on stderr says when none has answered for a
+    while. Raises InputError where Dask is not installed, no scheduler answers there, it died before all was done, or
+    there have been no workers for too long."""
 
     def __init__(self, address: str, function: Callable[[T], R]) -> None:
         super().__init__(function)
         self._address = address
         self._tasks: dict[Any, T] = {}
-        self._coming: Any = None
+        self._coming: SimpleQueue[Any] = SimpleQueue()
 
     def __enter__(self) -> Self:
         try:
-            from distributed import Client, as_completed
+            from distributed import Client
         except ImportError as error:
             seen = f"--scheduler {self._address}: no Dask here"
             raise InputError(seen, "the extra 'cluster'", "pip install 'loop-triage[cluster]'") from error
         try:
-            self._client: Any = Client(self._address, timeout=CONNECT, set_as_default=False)
+            asked = {"timeout": CLUSTER.answer_s, "set_as_default": False}
+            self._client: Any = Client(self._address, **asked)
         except (OSError, ValueError, TimeoutError) as error:
             seen = f"--scheduler {self._address}: no scheduler answers"
             expected = "the address that 'dask scheduler' prints"
             raise InputError(seen, expected, "start it, or correct it") from error
         # what ends the run is told in one line below
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
-        self._coming = as_completed([], loop=self._client.loop)
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._client.close()
+        with suppress(Exception):  # a scheduler that hangs is not waited for
+            self._client.close(timeout=CLUSTER.answer_s)
 
     def submit(self, task: T, alone: bool = False) -> None:
         with self._told():
             future = self._client.submit(self._function, task, pure=False)
             self._tasks[future] = task
-            self._coming.add(future)
+            future.add_done_callback(self._coming.put)
 
     def results(self) -> Iterator[R | Died[T]]:
         from distributed import KilledWorker
 
         with self._told():
-            for future in self._coming:
+            while self._tasks:
+                future = self._next()
                 task = self._tasks.pop(future)
                 try:
                     yield future.result()
                 except KilledWorker:
                     yield Died(task, None, WHY, again=False)
+
+    def _next(self) -> Any:
+        """The next task that is done. Raises InputError where nobody has worked on any for too long."""
+        idle_s = time.monotonic()
+        said = ""
+        while True:
+            try:
+                return self._coming.get(timeout=CLUSTER.quiet_s)
+            except Empty:
+                seen = self._who_works()
+            if seen and seen != said:
+                most = CLUSTER.given_up_s / 60.0
+                print(f"triage: --scheduler {self._address}: {seen}; waiting {most:.0f} min", file=sys.stderr)
+            elif not seen:
+                idle_s = time.monotonic()
+            said = seen
+            if time.monotonic() - idle_s > CLUSTER.given_up_s:
+                raise InputError(f"--scheduler {self._address}: {seen}", "workers that answer", GO_ON)
+
+    def _who_works(self) -> str:
+        """What keeps the cluster from work; '' where it has workers."""
+        try:
+            asked = {"callback_timeout": CLUSTER.answer_s}
+            workers = self._client.sync(self._client.scheduler.ncores, **asked)
+        except (TimeoutError, OSError, ValueError):
+            return "the scheduler does not answer"
+        return "" if workers else "no workers, 'dask worker' starts one"
 
     @contextmanager
     def _told(self) -> Iterator[None]:
@@ -75,8 +110,8 @@ class Cluster(Executor[T, R]):
         try:
             yield
         except (CancelledError, CommClosedError) as error:
-            raise InputError(
+            seen, expected = (
                 f"--scheduler {self._address}: lost in mid-run",
                 "a scheduler that lives until the run ends",
-                "what is done is kept in the store: start the scheduler again, then the same command with --resume",
-            ) from error
+            )
+            raise InputError(seen, expected, GO_ON) from error

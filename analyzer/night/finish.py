@@ -12,7 +12,7 @@ from typing import Any
 import pyarrow as pa
 
 from analyzer.belief.nights import settle
-from analyzer.columns import GROUPS, NIGHTS, Column, Row, names
+from analyzer.columns import GROUPS, NIGHTS, Column, Row
 from analyzer.config import Config, NightLimits
 from analyzer.lanes.lanes import in_lanes
 from analyzer.loop.decisions import Status
@@ -91,7 +91,8 @@ def finish_night(
 
 def _rows_held(store: Store, table: str, night: str, columns: Sequence[Column]) -> list[dict[str, Any]]:
     """The rows that the store has of a night, none where it has no such table."""
-    return store.own_rows(table, night, names(columns)) if store.file(table, night).exists() else []
+    held = store.read_if_there(table, night)
+    return [] if held is None else [{c.name: row.get(c.name) for c in columns} for row in held.to_pylist()]
 
 
 def _joined_table(before: pa.Table | None, piece: pa.Table | None, mine: Sequence[str]) -> pa.Table | None:

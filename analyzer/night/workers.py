@@ -12,8 +12,11 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
+import shutil
 import signal
+import socket
 import sys
+import tempfile
 import threading
 import time
 import warnings
@@ -22,9 +25,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
+from pathlib import Path
 from typing import Any, Generic, NamedTuple, Self, TypeVar
 
 from analyzer.config import WorkerLimits
+from analyzer.night.own_limits import limit_memory, limit_processor
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -34,9 +39,10 @@ PRELOADED = "analyzer.night.chunk"
 """What workers need, imported once for all of them."""
 POLL_S = 0.5
 """How often the clocks of the items in hand are looked at [s]."""
-MEGABYTE = 2**20
 OUT_OF_TIME = -int(getattr(signal, "SIGXCPU", 24))
 """Exit status of a worker that used up its processor time."""
+NEW_S = 60.0
+"""Age under which a server may not listen yet [s]."""
 SERVER_GONE = 255
 """Exit status of workers whose server is gone, which alone knows their own (multiprocessing.popen_forkserver)."""
 
@@ -198,6 +204,7 @@ def _process(pipe: Connection, *given: Any) -> Any:
         with contextlib.suppress(OSError, EOFError):  # no room for its socket, or it died while it began
             forked = multiprocessing.get_context("forkserver")
             forked.set_forkserver_preload([PRELOADED])
+            _forget_dead_servers(Path(tempfile.gettempdir()))
             with _undisturbed():
                 forkserver.ensure_running()
             process: Any = forked.Process(**asked)
@@ -206,6 +213,33 @@ def _process(pipe: Connection, *given: Any) -> Any:
     process = multiprocessing.get_context("spawn").Process(**asked)
     process.start()
     return process
+
+
+def _forget_dead_servers(folder: Path) -> None:
+    """Remove the folders of sockets that nobody listens at any more: kill -9 of a run leaves its server's."""
+    if forkserver._forkserver._forkserver_pid is not None:  # type: ignore
+        return
+    for left in folder.glob("pymp-*"):
+        with contextlib.suppress(OSError):
+            held = list(left.iterdir())
+            known = left.stat()
+            old = known.st_uid == os.getuid() and time.time() - known.st_mtime > NEW_S
+            if old and held and not any(map(_is_answered, held)):
+                shutil.rmtree(left, ignore_errors=True)
+
+
+def _is_answered(path: Path) -> bool:
+    """Whether a path is anything but a socket that refuses."""
+    if not path.is_socket():
+        return True
+    with socket.socket(socket.AF_UNIX) as asked:
+        try:
+            asked.connect(str(path))
+        except ConnectionRefusedError:
+            return False
+        except OSError:
+            return True
+    return True
 
 
 @contextlib.contextmanager
@@ -273,10 +307,10 @@ def _serve(
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # a library's warning says nothing to an engineer
     _end_with_parent()
-    _limit_memory(limits.memory_mb, limits.machine_share)
+    limit_memory(limits.memory_mb, limits.machine_share)
 
     def began(at: int) -> None:
-        _limit_processor(limits.processor_s)
+        limit_processor(limits.processor_s)
         pipe.send(("began", at))
 
     while True:
@@ -284,7 +318,7 @@ def _serve(
             task = pipe.recv()
         except (EOFError, OSError):
             return
-        _limit_processor(limits.processor_s)
+        limit_processor(limits.processor_s)
         try:
             answer = ("done", function(task, began))
         except Exception as error:  # told to the parent, which raises it
@@ -323,47 +357,3 @@ def _end_with_parent() -> None:
                 fcntl.fcntl(parent.sentinel, fcntl.F_SETOWN, os.getpid())
                 flags = fcntl.fcntl(parent.sentinel, fcntl.F_GETFL)
                 fcntl.fcntl(parent.sentinel, fcntl.F_SETFL, flags | os.O_ASYNC)
-
-
-def _limit_memory(megabytes: float, machine_share: float) -> None:
-    """Let allocations fail beyond what is held now and so many megabytes more, or a share of the machine's memory;
-    nothing where the system cannot."""
-    if sys.platform != "linux":
-        return
-    import resource
-
-    with contextlib.suppress(OSError, ValueError):
-        most = min(_held_bytes() + int(megabytes * MEGABYTE), int(machine_share * _machine_bytes()))
-        _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-        limit = most if hard == resource.RLIM_INFINITY else min(most, hard)
-        resource.setrlimit(resource.RLIMIT_DATA, (limit, hard))
-
-
-def _machine_bytes() -> float:
-    """Memory of this machine, or of the container that it is [bytes]."""
-    own = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    try:
-        with open("/sys/fs/cgroup/memory.max", encoding="ascii") as limit:
-            return min(own, float(limit.read()))
-    except (OSError, ValueError):  # none, or "max"
-        return own
-
-
-def _held_bytes() -> int:
-    """Memory of this process that counts towards RLIMIT_DATA [bytes]."""
-    with open("/proc/self/status", encoding="ascii") as status:
-        line = next(line for line in status if line.startswith("VmData:"))
-    return int(line.split()[1]) * 1024
-
-
-def _limit_processor(seconds: float) -> None:
-    """Let this process be ended after so many more seconds of processor time; nothing where the system cannot."""
-    if sys.platform == "win32":
-        return
-    import resource
-
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    limit = int(used.ru_utime + used.ru_stime + seconds) + 1
-    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
-    if hard == resource.RLIM_INFINITY or limit <= hard:
-        resource.setrlimit(resource.RLIMIT_CPU, (limit, hard))

@@ -7,6 +7,7 @@ import math
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from shutil import get_terminal_size
 from typing import Any
 
@@ -71,7 +72,9 @@ def ranked(
         Where there is no such store, night, column or area.
     """
     if column is not None and column not in SORTABLE:
-        raise InputError(f"column {column!r}", "one of " + ", ".join(SORTABLE), "correct --by")
+        near = get_close_matches(column, SORTABLE, 3)
+        expected = "one such as " + " or ".join(near) if near else "one of " + ", ".join(SORTABLE)
+        raise InputError(f"column {column!r}", expected, "correct --by")
     name = night or store.require()
     known = notes.read_notes(store.path)
     rows = [_noted(row, known) for row in store.rows("nights", name, (*KEPT, *LANE_FIGURES, "timezone"))]

@@ -11,8 +11,8 @@ from pathlib import Path
 from analyzer.limits import STORE
 from analyzer.store import notes
 from analyzer.store.store import MAKE_ONE, SCHEMA, Store, is_night
-from analyzer.store.table import KEPT, read_stored
-from identification.errors import InputError
+from analyzer.store.table import KEPT, DamagedError, read_stored
+from identification.errors import InputError, NotNowError
 from reports.whole_file import SUFFIX
 
 NEVER = "1900-01-01"
@@ -75,8 +75,11 @@ def _wrong(path: Path, whole: set[str]) -> Problem | None:
         return Problem(f"{path}: not the name of a table of a night", "move it away")
     try:
         read_stored(path)
-    except InputError as error:
+    except DamagedError as error:
         return Problem(error.seen, AGAIN)
+    except NotNowError as error:
+        seen, _, remedy = str(error).partition("; ")
+        return Problem(seen, remedy)
     if path.stem not in whole:
         return Problem(f"{path}: no night of that name in nights", "run the night again, or delete it")
     return None

@@ -14,6 +14,7 @@ import os
 import secrets
 import shutil
 import socket
+import sys
 import tempfile
 import threading
 import time
@@ -24,7 +25,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analyzer.history.parquet import forget_halves, holds_copies
-from analyzer.limits import STORE
+from analyzer.limits import STORAGE, STORE
 from analyzer.places import answering, content, is_remote
 from analyzer.store.notes import user
 from identification.errors import InputError
@@ -123,8 +124,7 @@ def locked(store: Path) -> Iterator[None]:
     mine = _signature_of_this()
     with ExitStack() as held:
         if is_remote(store):
-            _require_unsigned(store)
-            _sign_lock(store, mine)
+            _sign_alone(store, mine)
             held.callback(_unsign, store, mine)
             held.enter_context(_renewed(store, mine))
         else:
@@ -138,13 +138,60 @@ def locked(store: Path) -> Iterator[None]:
         yield
 
 
-def _require_unsigned(store: Path) -> None:
-    """Raise InputError where a signature of shared storage is not that of a dead run."""
+def _sign_alone(store: Path, mine: Signature) -> None:
+    """Sign a store of shared storage that nobody holds: the storage makes the object only where there is none, so
+    that of two runs that begin at one moment one is refused. Raises InputError where another run holds it."""
     with answering(store):
-        alive_s = _signature(store).get("alive_s")
+        dead = _require_unsigned(store)
+        if dead:
+            (store / OWNER).unlink(missing_ok=True)
+        try:
+            known = _made_alone(store / OWNER, _as_text(mine).encode("utf-8"))
+        except Exception:
+            if _signature(store).get("mark") != mine["mark"]:  # else the answer was lost, and it is made
+                _require_unsigned(store)
+                raise
+            known = True
+        if dead or not known:
+            time.sleep(STORAGE.settle_s)
+            if _signature(store).get("mark") != mine["mark"]:
+                raise _in_use(store)
+
+
+def _made_alone(path: Any, data: bytes) -> bool:
+    """Make an object where there is none; whether the storage is known to refuse where there is one."""
+    try:
+        path.fs.pipe_file(path.path, data, mode="create")
+    except (TypeError, NotImplementedError):
+        path.write_bytes(data)
+        return False
+    return True
+
+
+def _is_dead_here(known: Signature) -> bool:
+    """Whether a signature is of a process of this machine that is no more."""
+    process = known.get("process")
+    if sys.platform == "win32" or known.get("host") != socket.gethostname() or not isinstance(process, int):
+        return False
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return True
+    except (OSError, OverflowError):
+        return False
+    return False
+
+
+def _require_unsigned(store: Path) -> bool:
+    """Whether shared storage holds the signature of a dead run. Raises InputError where the run may be alive."""
+    known = _signature(store)
+    alive_s = known.get("alive_s")
+    if _is_dead_here(known):
+        return True
     if isinstance(alive_s, int | float) and time.time() - alive_s < STORE.dead_s:
         left = max(math.ceil((STORE.dead_s + alive_s - time.time()) / 60.0), 1)
         raise _in_use(store, f"; if it died, its hold ends in {left} min, then --resume goes on with it")
+    return bool(known)
 
 
 @contextmanager
@@ -188,12 +235,16 @@ def _signature_of_this() -> Signature:
 
 def _sign_lock(store: Path, mine: Signature) -> None:
     """Write down who holds the store, and that it lives."""
-    (store / OWNER).write_text(json.dumps(mine | {"alive_s": time.time()}), encoding="utf-8")
+    (store / OWNER).write_text(_as_text(mine), encoding="utf-8")
+
+
+def _as_text(mine: Signature) -> str:
+    return json.dumps(mine | {"alive_s": time.time()})
 
 
 def _unsign(store: Path, mine: Signature) -> None:
     """Take away a signature that is still one's own; what stays on shared storage is a dead run's in ten minutes."""
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(Exception):  # a storage that fails, too
         if _signature(store).get("mark") == mine["mark"]:
             (store / OWNER).unlink(missing_ok=True)
 

@@ -19,14 +19,24 @@ import secrets
 from collections.abc import Collection, Sequence
 from contextlib import nullcontext
 from datetime import date
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 
 from analyzer.columns import BELIEVED, NIGHTS, RESTING
-from analyzer.places import answering, content, is_remote, remove_tree
-from analyzer.store.table import KEPT, read_stored, rows_of_loops, rows_table, stored_names, write_table
+from analyzer.places import afresh, answering, content, each, is_passing, is_remote, not_now, remove_tree
+from analyzer.store.table import (
+    KEPT,
+    DamagedError,
+    read_stored,
+    rows_of_loops,
+    rows_table,
+    stored_names,
+    tables_beside,
+    write_table,
+)
 from identification.errors import InputError
 from reports.whole_file import whole_file
 
@@ -36,6 +46,10 @@ declared."""
 VERSION_FILE = "store.json"
 """Name within the store."""
 MAKE_ONE = "run 'triage run EXPORT --store DIR' first"
+OWN = frozenset({"parts", "run.lock", "run.owner.json", "notes.jsonl", "lost+found"})
+"""What a store may hold before it has a night or a version, beside names that begin with a point."""
+GO_ON = "go on with the same command and --resume"
+"""What to do about pieces of a night that are not whole."""
 
 
 def is_night(name: str) -> bool:
@@ -44,6 +58,34 @@ def is_night(name: str) -> bool:
         return name == date.fromisoformat(name).isoformat()
     except ValueError:
         return False
+
+
+def listed(folder: Path) -> list[Path]:
+    """What a folder holds, nothing where there is none. Raises NotNowError where it cannot be looked into."""
+    try:
+        return list(afresh(folder).iterdir())
+    except (FileNotFoundError, NotADirectoryError):
+        return []
+    except Exception as error:
+        if not is_passing(error):
+            raise
+        raise not_now(folder, error) from error
+
+
+def is_store(path: Path) -> bool:
+    """Whether a folder is a store: it has a version, or nights of the time before there was one."""
+    return (path / VERSION_FILE).exists() or (path / "nights").is_dir()
+
+
+def require_place(path: Path) -> None:
+    """Raise InputError where a store cannot be made at a path: it is a file, or a folder of something else."""
+    if not is_remote(path) and path.exists() and not path.is_dir():
+        raise InputError(f"--store {path}: a file", "a folder for the results, or none yet", "give a folder")
+    others = sorted(p.name for p in listed(path) if p.name not in OWN and not p.name.startswith("."))
+    if others and not is_store(path):
+        more = f" and {len(others) - 3} more" if len(others) > 3 else ""
+        seen = f"--store {path}: a folder that holds {', '.join(others[:3])}{more} and is no store"
+        raise InputError(seen, "a store, an empty folder, or none yet", "give another folder")
 
 
 class Store:
@@ -58,7 +100,7 @@ class Store:
 
     def files(self, table: str) -> list[Path]:
         """What a table has of nights; files of other names are nobody's nights."""
-        return sorted(p for p in (self.path / table).glob("*.parquet") if is_night(p.stem))
+        return sorted(p for p in listed(self.path / table) if p.suffix == ".parquet" and is_night(p.stem))
 
     def nights(self) -> list[str]:
         """Names of the nights that are complete, oldest first."""
@@ -66,11 +108,14 @@ class Store:
 
     def zone(self) -> str:
         """The plant's time zone as the latest night states it, UTC where none does."""
-        name = self.nights()[-1:]
-        if not name or "timezone" not in self.columns("nights", name[0]):
-            return "UTC"
-        stated = self.read("nights", name[0], ["timezone"]).column(0).to_pylist()
-        return next((z for z in stated if z), "UTC")
+        return self.stated_zone(self.nights()[-1:]) or "UTC"
+
+    def stated_zone(self, nights: Sequence[str]) -> str | None:
+        """The time zone that the first of some nights states, None where it states none."""
+        if not nights or "timezone" not in self.columns("nights", nights[0]):
+            return None
+        stated = self.read("nights", nights[0], ["timezone"]).column(0).to_pylist()
+        return next((z for z in stated if z), None)
 
     def require(self) -> str:
         """The latest night. Raises InputError where the path is no store, is one of a newer version, or holds no
@@ -139,12 +184,13 @@ class Store:
             write_table(rows, self.file(table, night))
 
     def set_aside_damaged(self, night: str) -> list[str]:
-        """Rename the tables of a night that cannot be read, so that it can be written anew; sentences on them."""
+        """Rename the damaged tables of a night, so that it can be written anew; sentences on them. Raises NotNowError
+        where one cannot be read at this time: what is not known to be damaged stays."""
         said = []
         for table in KEPT:
             try:
                 self.read_if_there(table.name, night)
-            except InputError as error:
+            except DamagedError as error:
                 path = self.file(table.name, night)
                 aside = path.with_name(f"{path.name}.{secrets.token_hex(4)}.damaged")
                 path.rename(aside)
@@ -163,7 +209,7 @@ class Store:
         newest = self.nights()[-1:]
         for path in self.files("compared"):
             if path.stem not in newest:
-                path.unlink(missing_ok=True)
+                self.write("compared", path.stem, None)
 
     @property
     def run_file(self) -> Path:
@@ -176,32 +222,61 @@ class Store:
 
     def whole_chunks(self, night: str) -> list[str]:
         """Keys of the chunks whose last piece, that of the table of nights, is there."""
-        pieces = (self.path / "parts" / night).glob("nights-*.parquet")
-        return sorted(p.stem.removeprefix("nights-") for p in pieces)
+        pieces = (p for p in listed(self.path / "parts" / night) if p.suffix == ".parquet")
+        return sorted(p.stem.removeprefix("nights-") for p in pieces if p.stem.startswith("nights-"))
 
     def begun(self) -> list[str]:
         """Nights that were begun and not finished."""
-        return sorted(p.name for p in (self.path / "parts").glob("*") if p.is_dir())
+        return sorted(p.name for p in (self.path / "parts").glob("*") if p.is_dir() and is_night(p.name))
 
     def read_parts(self, night: str, table: str, keys: Sequence[str]) -> pa.Table | None:
-        """The pieces of one table of a night that some chunks have written, None where there are none."""
-        found = []
-        for key in keys:
-            with contextlib.suppress(FileNotFoundError):
-                found.append(read_stored(self.part(night, table, key)))
+        """The pieces of one table of a night that some chunks have written, None where there are none. Raises
+        DamagedError where one of them is gone."""
+        paths = [self.part(night, table, key) for key in keys]
+        found = [
+            piece for piece in each(partial(self._piece, night, table), paths, keys) if piece is not None
+        ]
         return pa.concat_tables(found) if found else None
+
+    def _piece(self, night: str, table: str, path: Path, key: str) -> pa.Table | None:
+        """One piece of one table, None where the chunk has written none."""
+        try:
+            return read_stored(path)
+        except FileNotFoundError:
+            self._require_unwritten(night, table, key)
+            return None
+        except DamagedError as error:
+            raise DamagedError(error.seen, error.expected, GO_ON) from error
+
+    def _require_unwritten(self, night: str, table: str, key: str) -> None:
+        """Raise DamagedError where a chunk has written a piece that is not there."""
+        try:
+            written = table in tables_beside(self.part(night, "nights", key))
+        except FileNotFoundError:
+            written = True
+        if written:
+            raise self.gone(self.part(night, table, key))
+
+    def gone(self, piece: Path) -> DamagedError:
+        """What is said of a piece of a run that is no longer there, or never came."""
+        seen = f"{piece}: this piece of the night is gone"
+        expected = "a store that nobody else changes, and that all workers see"
+        return DamagedError(seen, expected, GO_ON)
 
     def drop_parts(self) -> None:
         """Forget all pieces, and the run that they are of."""
         remove_tree(self.path / "parts")
 
     def version(self) -> int:
-        """The version of its tables, 1 where it states none. Raises InputError where what states it is damaged."""
+        """The version of its tables, 1 where it states none. Raises InputError where what states it is damaged,
+        NotNowError where it cannot be read at this time."""
         path = self.path / VERSION_FILE
         try:
             with answering(self.path) if is_remote(self.path) else nullcontext():
                 return _stated_schema(path)
         except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+            if is_passing(error):
+                raise not_now(path, error) from error
             right, nights = json.dumps({"schema": SCHEMA}), self.nights()
             ends = " to ".join(dict.fromkeys((*nights[:1], *nights[-1:])))
             stand = f"the tables of {len(nights)} nights, {ends}, stand as they were"
@@ -224,8 +299,8 @@ class Store:
         """
         self.require_known()
         path, old, changed = self.path / VERSION_FILE, self.version() < SCHEMA, 0
-        for table in sorted((self.path / "nights").glob("*.parquet")) if old else ():
-            with contextlib.suppress(InputError):  # a damaged table stays for `store check` to name
+        for table in self.files("nights") if old else ():
+            with contextlib.suppress(DamagedError):  # a damaged table stays for `store check` to name
                 held = set(stored_names(table))
                 lacking = [c for c in NIGHTS if c.name not in held]
                 if lacking:

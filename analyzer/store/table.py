@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 from analyzer import columns as declared
 from analyzer.columns import Column, Kind, row_of
 from analyzer.loop.decisions import Action
-from analyzer.places import is_remote
+from analyzer.places import content, is_passing, is_remote, is_whole, not_now
 from analyzer.words.units import SECONDS
 from identification.errors import InputError
 from reports.whole_file import whole_file
@@ -65,6 +65,10 @@ REMEDY = (
 )
 
 
+class DamagedError(InputError):
+    """A table of the store holds what no run has written, or a piece of a run is gone."""
+
+
 def rows_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]) -> pa.Table:
     """Rows as a table with the types that its columns declare, empty where not known. Raises ValueError for a cell
     whose column is declared nowhere."""
@@ -83,15 +87,37 @@ def rows_of_loops(table: pa.Table, loops: Sequence[str], others: bool = False) -
 
 def write_table(table: pa.Table, path: Path) -> None:
     """Write a table so that a reader sees all of it or nothing."""
+    if is_remote(path):  # from memory: nothing is left on this machine, however the process ends
+        remote, sink = cast(Any, path), pa.BufferOutputStream()
+        pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
+        remote.fs.pipe_file(remote.path, sink.getvalue().to_pybytes())
+        return
     with whole_file(path, kept=True) as temporary:
         pq.write_table(table, temporary, compression="zstd", write_page_checksum=True)
+
+
+BESIDE = b"beside"
+"""Metadata of a chunk's piece of the table of nights: which other pieces the chunk has written."""
+
+
+def naming(table: pa.Table, beside: Iterable[str]) -> pa.Table:
+    """A chunk's piece of the table of nights, which names the chunk's other pieces."""
+    return table.replace_schema_metadata({BESIDE: " ".join(beside).encode()})
+
+
+def tables_beside(path: Path) -> list[str]:
+    """The tables of which a chunk has written pieces beside its piece of the table of nights; errors as of
+    `read_stored`."""
+    with _for_parquet(path) as held:
+        return (pq.read_schema(held).metadata or {}).get(BESIDE, b"").decode().split()
 
 
 def read_stored(
     path: Path, columns: Sequence[str] | None = None, filters: list[tuple[str, str, Any]] | None = None
 ) -> pa.Table:
-    """A table of the store, or some of its columns and rows. Raises FileNotFoundError where there is none; InputError
-    where the file is damaged, or holds other columns than results have."""
+    """A table of the store, or some of its columns and rows. Raises FileNotFoundError where there is none;
+    DamagedError where Parquet finds the file damaged, or it holds other columns than results have; NotNowError where
+    it cannot be read at this time."""
     wanted = list(columns) if columns else None
     with _for_parquet(path) as held:
         if filters is not None:
@@ -114,27 +140,32 @@ def stored_names(path: Path) -> list[str]:
 
 @contextmanager
 def _for_parquet(path: Path) -> Iterator[Any]:
-    """A path as Parquet's reader takes it: itself, or an open object of shared storage."""
+    """A path as Parquet's reader takes it: itself, or all bytes of an object of shared storage."""
     try:
         if is_remote(path):
-            with path.open("rb") as held:
-                yield held
+            yield pa.BufferReader(content(path))
         else:
             yield path
     except FileNotFoundError:
         raise
-    except (pa.ArrowException, OSError, ValueError) as error:
+    except Exception as error:
+        if is_passing(error):
+            raise not_now(path, error) from error
+        if not isinstance(error, pa.ArrowException | OSError | ValueError):
+            raise
+        if is_remote(path) and not is_whole(path):
+            raise not_now(path, error) from error
         seen = " ".join(str(error).split())[:100] or type(error).__name__
-        raise InputError(f"{path}: damaged ({seen})", WRITTEN, REMEDY) from error
+        raise DamagedError(f"{path}: damaged ({seen})", WRITTEN, REMEDY) from error
 
 
-def no_column(path: Path, column: str) -> InputError:
+def no_column(path: Path, column: str) -> DamagedError:
     """What is said of a table without a column that every one of its kind has."""
-    return InputError(f"{path}: no column {column}", WRITTEN, REMEDY)
+    return DamagedError(f"{path}: no column {column}", WRITTEN, REMEDY)
 
 
 def _require_declared(path: Path, schema: pa.Schema, wanted: list[str] | None) -> None:
-    """Raise InputError where a table has no loops, or a declared column is of another kind."""
+    """Raise DamagedError where a table has no loops, or a declared column is of another kind."""
     if (wanted is None or "loop" in wanted) and "loop" not in schema.names:
         raise no_column(path, "loop")
     for field in schema:
@@ -146,12 +177,12 @@ def _require_declared(path: Path, schema: pa.Schema, wanted: list[str] | None) -
             raise _of_another_kind(path, field.name, str(field.type), "numbers" if numbers else "text")
 
 
-def _of_another_kind(path: Path, column: str, held: str, wanted: str) -> InputError:
-    return InputError(f"{path}: damaged (column {column} holds {held})", wanted, REMEDY)
+def _of_another_kind(path: Path, column: str, held: str, wanted: str) -> DamagedError:
+    return DamagedError(f"{path}: damaged (column {column} holds {held})", wanted, REMEDY)
 
 
 def _require_meant(path: Path, table: pa.Table) -> None:
-    """Raise InputError where a column of JSON, or of a few words, holds other text."""
+    """Raise DamagedError where a column of JSON, or of a few words, holds other text."""
     for name in (PARSED | WORDS.keys()).intersection(table.column_names):
         known = WORDS.get(name)
         for text in table.column(name).unique().to_pylist():

@@ -1,7 +1,8 @@
 #!/bin/sh
 # One night: the newest export of a folder into the store, then the pages, then old nights away.
 # usage: night.sh PLANT        PLANT holds exports/, loops.csv, and changes.csv if settings are written down there
-# exit status: that of `triage run` (0 the night is there, 1 some loops failed, 2 nothing could be done)
+# exit status: that of `triage run` (0 the night is there, 1 some loops failed, 2 nothing could be done, 75 shared
+# storage failed for too long), 70 where triage did not even start
 set -u
 PLANT=${1:?usage: night.sh PLANT}
 TRIAGE=${TRIAGE:-triage}
@@ -14,12 +15,19 @@ EXPORT=$(ls -t exports | head -n 1)
 set -- "exports/$EXPORT" --loops loops.csv --timezone "$ZONE" --store store --jobs "$JOBS" --log triage.log
 [ -f changes.csv ] && set -- "$@" --changes changes.csv
 
+LOGGED=$(wc -c 2>/dev/null <triage.log || echo 0)
 $TRIAGE run "$@" 2>>triage.err
 STATUS=$?
-# killed by the system or stopped by a signal: what was done is kept, so one more try goes on from there
+# killed, stopped by a signal, or a storage that failed for a while: what was done is kept, so one more try goes on
 if [ "$STATUS" -gt 2 ]; then
+    [ "$STATUS" -eq 75 ] && sleep "${AGAIN_S:-600}"
     $TRIAGE run "$@" --resume 2>>triage.err
     STATUS=$?
+fi
+# a Python that cannot start ends with 1, too: it is a night only where the log of this night says so
+if [ "$STATUS" -eq 1 ]; then
+    [ "$(wc -c 2>/dev/null <triage.log || echo 0)" -ge "$LOGGED" ] || LOGGED=0
+    tail -c +$((LOGGED + 1)) triage.log 2>/dev/null | grep -q ' end status=1 ' || STATUS=70
 fi
 # pages are made whatever became of tonight: yesterday's night is still worth reading
 $TRIAGE pages store --out pages >/dev/null 2>>triage.err

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from analyzer.config import WorkerLimits
+from analyzer.night import own_limits
 from analyzer.night.workers import Began, Died, Workers
 
 LIMITS = WorkerLimits(memory_mb=512.0, processor_s=600.0, wall_s=6000.0)
@@ -226,3 +227,25 @@ def test_workers_are_started_where_temporary_files_have_long_names(tmp_path: Pat
     env = os.environ | {"TMPDIR": str(far)}
     done = subprocess.run([sys.executable, "-c", said], env=env, capture_output=True, text=True, timeout=120)
     assert done.stdout.strip() == "[('a', 'b')]", done.stderr
+
+
+@pytest.mark.parametrize(
+    ("line", "limits", "least"),
+    [
+        ("0::/system.slice/triage.service", {"system.slice/triage.service/memory.max": "500000000"}, 5e8),
+        ("0::/system.slice/triage.service", {"system.slice/memory.max": "400000000"}, 4e8),
+        ("0::/", {"memory.max": "300000000"}, 3e8),
+        ("9:memory:/docker/x\n4:cpu:/y", {"memory/docker/x/memory.limit_in_bytes": "200000000"}, 2e8),
+        ("9:memory:/docker/x", {"memory/memory.limit_in_bytes": "100000000"}, 1e8),
+        ("0::/system.slice/triage.service", {"system.slice/triage.service/memory.max": "max"}, None),
+        ("0::/", {}, None),
+    ],
+)
+def test_the_limit_of_memory_is_that_of_its_own_group(tmp_path, line, limits, least):
+    """Control groups of both versions, the process's own and those above it, limit what counts as the machine's."""
+    for name, text in limits.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text + "\n")
+    (tmp_path / "own").write_text(line + "\n")
+    whole = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    assert own_limits.machine_bytes(tmp_path, tmp_path / "own") == (least or whole)

@@ -2,9 +2,31 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import pytest
 
 from benchmarks.plant_night import line, make, night, tenth
+
+COUNT = """
+import os, subprocess, sys
+from benchmarks import adopt, spent
+adopt()
+before = spent()
+busy = "import time; end = time.process_time() + 0.5\\nwhile time.process_time() < end: pass"
+between = f"import os, subprocess, sys; subprocess.Popen([sys.executable, '-c', {busy!r}]); os._exit(0)"
+subprocess.run([sys.executable, "-c", between], check=True)
+now = spent()
+print(now.ru_utime + now.ru_stime - before.ru_utime - before.ru_stime)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are adopted on Linux alone")
+def test_processes_that_outlive_their_parent_count():
+    """Half a second that a grandchild spends after its parent has ended is among what is spent."""
+    done = subprocess.run([sys.executable, "-c", COUNT], capture_output=True, text=True, check=True)
+    assert 0.5 < float(done.stdout) < 5.0
 
 
 @pytest.mark.slow

@@ -1,0 +1,79 @@
+"""Changes of a store that are kept all together or not at all: written beside, and renamed at the end."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+
+from analyzer.places import is_remote
+from analyzer.store.store import Store
+from analyzer.store.table import KEPT, write_table
+
+FOLDER = "finished"
+"""Where tables lie among the pieces of a run until all are written."""
+
+
+class Draft(Store):
+    """A store as it will be: what was written is read from beside it, all else from the store itself."""
+
+    def __init__(self, path: Path, folder: Path) -> None:
+        super().__init__(path)
+        self._folder = folder
+        self._made: dict[tuple[str, str], bool] = {}
+
+    def file(self, table: str, night: str) -> Path:
+        return self._beside(table, night) if (table, night) in self._made else super().file(table, night)
+
+    def files(self, table: str) -> list[Path]:
+        names = {p.stem for p in super().files(table)} | {n for t, n in self._made if t == table}
+        return [self.file(table, n) for n in sorted(names) if self._made.get((table, n), True)]
+
+    def write(self, table: str, night: str, rows: pa.Table | None) -> None:
+        if rows is None:
+            self._beside(table, night).unlink(missing_ok=True)
+        else:
+            write_table(rows, self._beside(table, night))
+        self._made[table, night] = rows is not None
+
+    def keep(self) -> None:
+        """Put all that was written in its place, the tables of nights last: a reader meets whole nights."""
+        order = [t.name for t in reversed(KEPT)]
+        for table, night in sorted(self._made, key=lambda made: (order.index(made[0]), made[1])):
+            _moved(self._beside(table, night), super().file(table, night), self._made[table, night])
+        self._made.clear()
+
+    def _beside(self, table: str, night: str) -> Path:
+        return self._folder / table / f"{night}.parquet"
+
+
+def _moved(made: Path, to: Any, there: bool) -> None:
+    if not there:
+        to.unlink(missing_ok=True)
+    elif is_remote(to):
+        to.fs.put_file(str(made), to.path)
+    else:
+        to.parent.mkdir(parents=True, exist_ok=True)
+        os.replace(made, to)
+
+
+@contextmanager
+def drafted(store: Store) -> Iterator[Draft]:
+    """A draft of a store, kept at the end; where an error comes first, the store is what it was."""
+    if is_remote(store.path):
+        with tempfile.TemporaryDirectory(prefix="triage-finished-") as made:
+            draft = Draft(store.path, Path(made))
+            yield draft
+            draft.keep()
+        return
+    folder = store.path / "parts" / FOLDER
+    shutil.rmtree(folder, ignore_errors=True)
+    draft = Draft(store.path, folder)
+    yield draft
+    draft.keep()
