@@ -111,6 +111,10 @@ class SignalLimits(Limits, section="signals"):
     """How spectra, cycles and correlations are read, and what of noise is an outlier."""
 
 
+class ExperimentLimits(Limits, section="experiments"):
+    """How experiments are found in a record, and how each is fitted over its answer."""
+
+
 @dataclass(frozen=True, slots=True)
 class ExplainLimits:
     """What decides about recorder, controller, effects and their proof."""
@@ -125,5 +129,5 @@ LIMITS = ExplainLimits()
 """The limits where none are given."""
 FIT, SLIPS, STEM, INTERVALS = FitLimits(), SlipLimits(), StemLimits(), IntervalLimits()
 LAW, LOCATION, REFERENCE, SIGNALS = LawLimits(), LocationLimits(), ReferenceLimits(), SignalLimits()
-FRICTION, STARTS = FrictionLimits(), StartLimits()
+FRICTION, STARTS, EXPERIMENTS = FrictionLimits(), StartLimits(), ExperimentLimits()
 """Numbers of a method, the same for every plant: no plant has reasons of its own to change them."""
