@@ -16,17 +16,28 @@ from analyzer.loop.judged_stretch import controller_of
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loop.sample_clock import constant_stretches, snapped
 from analyzer.loops.spec import LoopSpec
-from identification.controller.pi_regression import fed_back
+from identification.controller.pi_regression import ControlLaw, Trends, fed_back, unstated_law
 from identification.errors import NotAssessedError, TriageError
 from identification.experiments.find import Experiment, by_hand, in_automatic
 from identification.experiments.model import Modelled, Pooled, modelled, pooled
 from identification.limits import EXPERIMENTS, LIMITS
 from identification.models import Pid
 from identification.record import Floats, LoopRecord, Mask
+from identification.signals.robust import robust_deviation
 from tuning.from_test import FromTest, corners, settings_from
 
 CONSTANTS = {"gain": "gain", "slope_pct_per_s": "slope", "lags_s": "time_constant_s"}
 """Constants of a model, and what the belief calls them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Controlled:
+    """What an experiment in automatic tells of its controller: how far PV goes beyond SP [% of span], and the law
+    that gives OP, None where none does."""
+
+    overshoot_pct: float
+    law: ControlLaw | None
+    dt_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +46,7 @@ class Learned:
 
     found, all of them; prepared, the record that they lie in; models, of those that tell a process; model, all of
     these as one, None where none does; settings from it, None where it gives none; untold, of each that tells
-    nothing why.
+    nothing why; controlled, what the model's own experiment in automatic tells of the controller.
     """
 
     found: tuple[Experiment, ...]
@@ -44,6 +55,7 @@ class Learned:
     model: Pooled | None = None
     settings: FromTest | None = None
     untold: tuple[tuple[Experiment, str], ...] = ()
+    controlled: Controlled | None = None
 
 
 def manual_of(spec: LoopSpec, prepared: Prepared, series: Mapping[str, Series], config: Config) -> Mask:
@@ -117,7 +129,22 @@ def learned(
         return Learned(found, even, untold=tuple(untold))
     open_ones = [m for m in models if not m.experiment.course.closed]
     whole = pooled(open_ones or models)
-    return Learned(found, even, tuple(models), whole, _settings(whole, spec, even), tuple(untold))
+    first = whole.used[0].experiment
+    seen = controlled(even.record.span(first.first, first.last)) if first.course.closed else None
+    return Learned(found, even, tuple(models), whole, _settings(whole, spec, even), tuple(untold), seen)
+
+
+def controlled(part: LoopRecord) -> Controlled:
+    """The overshoot of an experiment in automatic, noise left out, and the law that gives OP in it."""
+    way = float(np.sign(np.median(part.error[:5]))) or 1.0
+    beyond = -way * part.error
+    reached = np.flatnonzero(beyond >= 0.0)
+    noise = 3.0 * robust_deviation(np.diff(part.pv)) / math.sqrt(2.0)
+    most = float(beyond[reached[0] :].max()) - noise if reached.size else 0.0
+    q = LIMITS.controller
+    free = part.usable & (part.op > q.at_limit) & (part.op < 100.0 - q.at_limit)
+    law = unstated_law(Trends(part.sp, part.pv, part.op, free, q))
+    return Controlled(max(most, 0.0), law if law is not None and law.kp * law.ki > 0.0 else None, part.dt_s)
 
 
 def _settings(model: Pooled, spec: LoopSpec, prepared: Prepared) -> FromTest | None:

@@ -10,6 +10,7 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import sentences
 from analyzer.words.units import duration, number
+from identification.controller.pid_regression import integral_time
 from identification.experiments.columns import Kind
 from identification.experiments.find import Course, Experiment
 from identification.experiments.model import Pooled
@@ -114,15 +115,30 @@ def lines(of: Learned, spec: LoopSpec, present: Pid | None, zone: str) -> Iterat
         yield f"model of {len(of.model.used)} experiments, weights {shares}"
     yield f"model: {of.model.kind}, 90 % intervals"
     e = of.model.estimates
-    for name in (*TITLES, *(k for k in e if k.startswith("neighbour"))):
+    for name in (*TITLES, *(k for k in e if k not in TITLES)):
         if name in e and (name != "time_constant_s" or "second_lag_s" in e):
             yield f"  {estimate_text(name, e[name])}"
     if "gain" in e:
         scale = of.prepared.scale
         yield f"  gain in own units: {number(e['gain'].value * scale.span / scale.op_span)} of PV per unit of OP"
+    yield from controller_lines(of)
     yield from settings_lines(of, spec, present)
     for text in left_open(of):
         yield f"  the experiment does not tell: {text}"
+
+
+def controller_lines(of: Learned) -> Iterator[str]:
+    """What an experiment in automatic tells of its controller."""
+    seen = of.controlled
+    if seen is None:
+        return
+    if seen.law is not None:
+        law = seen.law
+        ti_s = integral_time(law.kp, law.ki, law.residual.size) * seen.dt_s
+        share = f"explains {100 * law.explained:.0f} % of OP"
+        yield f"controller as recorded: Kp {number(law.kp)} %/%, Ti {number(ti_s)} s, {share}"
+    if seen.overshoot_pct > 0.0:
+        yield f"PV goes {number(seen.overshoot_pct)} % of span beyond SP"
 
 
 def lone_lines(of: Learned, zone: str) -> Iterator[str]:
