@@ -124,6 +124,8 @@ def learned(
             models.append(modelled(even.record, x, beside))
         except NotAssessedError as error:
             untold.append((x, str(error)))
+        except (ArithmeticError, ValueError) as error:  # a fit that runs away costs the loop nothing else
+            untold.append((x, f"no fit: {error}"))
     models.sort(key=lambda m: m.experiment.first)
     if not models:
         return Learned(found, even, untold=tuple(untold))
