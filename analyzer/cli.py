@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands import explain, options, report, run, store
+from analyzer.commands import explain, options, report, run, store, test_plan
 from analyzer.commands.options import say
 from analyzer.loop.decisions import Lane
 from reports.texts import visible
@@ -133,7 +133,7 @@ def config() -> None:
 
 for command in (
     *(run.run, report.report, report.pages, store.note, store.summary, store.store),
-    *(explain.explain, explain.simulate),
+    *(explain.explain, explain.simulate, test_plan.test_plan),
 ):
     main.add_command(command)
 

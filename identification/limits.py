@@ -115,6 +115,10 @@ class SignalLimits(Limits, section="signals"):
     """How spectra, cycles and correlations are read, and what of noise is an outlier."""
 
 
+class ExperimentLimits(Limits, section="experiments"):
+    """How experiments are found in a record, and how each is fitted over its answer."""
+
+
 @dataclass(frozen=True, slots=True)
 class ExplainLimits:
     """What decides about recorder, controller, effects and their proof."""
@@ -130,4 +134,5 @@ LIMITS = ExplainLimits()
 FIT, SLIPS, STEM, INTERVALS = FitLimits(), SlipLimits(), StemLimits(), IntervalLimits()
 LAW, LOCATION, REFERENCE, SIGNALS = LawLimits(), LocationLimits(), ReferenceLimits(), SignalLimits()
 FRICTION, STARTS, SMOOTH = FrictionLimits(), StartLimits(), SmoothLimits()
+EXPERIMENTS = ExperimentLimits()
 """Numbers of a method, the same for every plant: no plant has reasons of its own to change them."""

@@ -140,6 +140,8 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], config: C
     before : that of the night before, None where there is none; row : the loop's of the night; repaired_s : when
     notes say that its valve was repaired [s since 1970-01-01 UTC].
     """
+    if row["status"] == Status.OK and row["oscillating_pct"] is None and row.get("experiment"):
+        return _with_constants(before or Belief(row["loop"], ""), row, config.belief)
     if row["status"] != Status.OK or row["oscillating_pct"] is None:
         return before
     now, limits = before or Belief(row["loop"], ""), config.belief
@@ -154,6 +156,18 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], config: C
     phases = with_repetitions(now.phases, row, limits.repetitions)
     now = replace(now, night=row["night"], end_s=_span(row)[1], remedy=done, last=seen, phases=phases)
     return replace(now, kp=row["kp"], ti=row["ti"], told=tell(now, row, limits))
+
+
+def _with_constants(now: Belief, row: Row, limits: BeliefLimits) -> Belief:
+    """The belief with the constants of an experiment, in a night that tells nothing else: not that it was one."""
+    share = valve.faded_over(now.night, row["night"], limits) if now.night else 1.0
+    constants = {k: pool.faded(share) for k, pool in now.constants.items()}
+    said = said_of(row) or {}
+    for name in set(CONSTANTS) & said.keys():
+        value, deviation = said[name]
+        pool = constants.get(name, Pool())
+        constants[name] = pool.plus(value, deviation, limits.least_deviation, limits.most_deviation)
+    return replace(now, constants=constants)
 
 
 def _span(row: Row) -> tuple[float, float]:

@@ -30,7 +30,7 @@ READ = (
     *("oscillation_significance", "oscillating_pct", "period_s", "cause", "valve_fault", "source_loop"),
     *("master", "lack", *(f"osc_{c}_pct" for c in CAUSES)),
     *("action", "due", "kp_new", "ti_new", "advice", "expected_period_s", "expected_pv_amplitude_pct"),
-    *("lanes", "reason", "straight_pct", "witness", "evidence", "settings_changed"),
+    *("lanes", "reason", "straight_pct", "witness", "evidence", "settings_changed", "experiment"),
     *("backlash_pct", "stickband_pct", "slip_jump_pct"),
     *("phases", "pv_lo", "pv_hi", "pv_unit", "timezone"),
 )

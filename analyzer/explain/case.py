@@ -23,11 +23,12 @@ from analyzer.limits import EXPLAIN
 from analyzer.loop.assess import convicted
 from analyzer.loop.cause import NO_CAUSE, Verdict
 from analyzer.loop.decisions import Cause, Fault
+from analyzer.loop.experiments import Learned, learned
 from analyzer.loop.fitness import pv_that_jumps
 from analyzer.loop.identified import intervals
 from analyzer.loop.oscillation import counting, detect
 from analyzer.loop.quality import Prepared, prepare
-from analyzer.loop.sample_clock import onto_clock
+from analyzer.loop.sample_clock import onto_clock, snapped
 from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import controller
@@ -42,12 +43,14 @@ from identification.record import Floats
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One loop of an export, ready to be explained: its record, the subject made of it, and what was left aside."""
+    """One loop of an export, ready to be explained: its record, the subject made of it, what was left aside, and what
+    its experiments tell."""
 
     spec: LoopSpec
     prepared: Prepared
     subject: Recording
     shortened: str = ""
+    learned: Learned | None = None
 
 
 def tags_of(spec: LoopSpec, specs: Sequence[LoopSpec]) -> list[str]:
@@ -78,27 +81,6 @@ def ops_beside(
             if not gap.all() and float(np.ptp(op)) > 0:
                 out.append(op)
     return tuple(out)
-
-
-def snapped(series: dict[str, Series], pv: str) -> dict[str, Series]:
-    """The same samples with stamps that scatter by less than half a sample put onto PV's uniform clock.
-
-    Holding values on a clock would repeat or lose a sample wherever a stamp is a little late.
-    """
-    at_s = series[pv].stamp_s
-    if at_s.size < 3:
-        return series
-    spacing = float(np.median(np.diff(at_s)))
-    index = np.concatenate(([0.0], np.cumsum(np.maximum(np.round(np.diff(at_s) / spacing), 1.0))))
-    dt, start = (float(v) for v in np.polyfit(index, at_s - at_s[0], 1))
-    out = {}
-    for tag, x in series.items():
-        at = np.round((x.stamp_s - at_s[0] - start) / dt)
-        near = bool(np.max(np.abs(x.stamp_s - at_s[0] - start - at * dt), initial=0.0) < 0.49 * dt)
-        if not near or (x.stamp_s.size > 1 and float(np.diff(at).min()) < 1.0):
-            return series
-        out[tag] = Series(at_s[0] + at * dt, x.value, x.bad, x.text)
-    return out
 
 
 VALVE_FIGURES = ("backlash_pct", "stickband_pct", "slip_jump_pct")
@@ -173,7 +155,14 @@ def case(
     raw = series[spec.pv or ""]
     series = snapped(series, spec.pv or "")
     whole = prepare(spec, series, config.quality)
-    prepared, shortened = telling_stretch(as_given(whole), most)
+    taught = learned(spec, series, whole, config, beside=ops_beside(spec, specs, series, whole, config))
+    coarse = whole if most is None or len(whole.record) <= most else coarser(whole, taught, config)
+    prepared, shortened = telling_stretch(as_given(coarse), most)
+    if coarse is not whole:
+        stated = f"each {coarse.record.dt_s:.3g} s: its experiments need no more."
+        shortened = (
+            f"Judged at one sample in {round(coarse.record.dt_s / whole.record.dt_s)}, {stated} {shortened}"
+        )
     r = prepared.record
     if not prepared.op_known:
         raise NotAssessedError(f"{spec.loop}: needs OP, has none")
@@ -189,14 +178,26 @@ def case(
     subject = subject_of(spec, prepared, stamps, verdict, others, config)
     factor = coarser_by(subject) if is_experiment(subject) else 1
     if factor == 1:
-        return Case(spec, prepared, subject, shortened)
+        return Case(spec, prepared, subject, shortened, taught)
     thin = replace(prepared, record=r.thinned(factor))
     said = (
         f"Judged at one sample in {factor}, each {thin.record.dt_s:.3g} s: its time constant needs no more."
     )
     others = tuple(x[: len(thin.record) * factor : factor] for x in others)
     subject = subject_of(spec, thin, stamps[::factor], verdict, others, config)
-    return Case(spec, thin, subject, f"{shortened} {said}".strip())
+    return Case(spec, thin, subject, f"{shortened} {said}".strip(), taught)
+
+
+def coarser(whole: Prepared, taught: Learned | None, config: Config) -> Prepared:
+    """A record that is too fast for what its experiments tell at a coarser step, so that none of them is cut."""
+    if taught is None or taught.model is None:
+        return whole
+    e, record = taught.model.estimates, whole.record
+    answer_s = e["dead_time_s"].value + (e["lags_s"].value if "lags_s" in e else 0.0)
+    limits = config.explain.search
+    factor = int(answer_s / (limits.samples_a_lag * record.dt_s))
+    factor = min(factor, len(record) // limits.experiment_samples)
+    return whole if factor < 2 else replace(whole, record=record.thinned(factor))
 
 
 def subject_of(

@@ -14,6 +14,8 @@ import numpy as np
 
 from analyzer.explain.case import Case
 from analyzer.explain.models import SCALE, Brought, judged, plain_start, rescaled, span_note
+from analyzer.loop.experiments import Learned
+from analyzer.words.experiments import in_a_clause
 from identification.controller.pi_regression import ControlLaw
 from identification.controller.pid_regression import integral_time
 from identification.mismatch.answer import Answer, answer
@@ -42,7 +44,8 @@ class Explained:
         c, found, s = self.case, self.found, self.case.prepared.scale
         scale = dict(zip(SCALE, (s.low, s.span, s.op_low, s.op_span), strict=True))
         names = tuple(e.name for e in self.said.effects)
-        return to_data(c.spec.loop, found.p.inputs, found.best.model.c, names, found.late_s, scale)
+        # the constants that pages draw and the proof judges, not those that tell the next sample best
+        return to_data(c.spec.loop, found.p.inputs, found.proven.drawn[1], names, found.late_s, scale)
 
 
 def explained(
@@ -66,6 +69,10 @@ def explained(
     data = as_data(c, said, own)
     if c.subject.stated is None:  # where they are stated, the controller's check says what is to be said
         data |= law_data(found.law, c.subject.dt_s)
+    if c.learned is not None and c.learned.model is not None:
+        data["experiments"] = json_ready(experiment_data(c.learned))
+        clause = in_a_clause(c.learned)
+        data["reason"] = f"{data['reason']} {clause[:1].upper()}{clause[1:]}."
     if others:  # of each, where something was found that could be held against it
         data["held_out_on"] = [
             {
@@ -77,6 +84,18 @@ def explained(
             for name, x in zip(others, found.others, strict=False)
         ]
     return Explained(c, found, said, data, own)
+
+
+def experiment_data(of: Learned) -> dict[str, Any]:
+    """What experiments tell: kind of answer, constants with 90 % intervals, and the courses that tell them."""
+    model = of.model
+    assert model is not None  # asked for where there is one
+    return {
+        "kind": str(model.kind),
+        "constants": {k: asdict(e) for k, e in model.estimates.items()},
+        "courses": [str(m.experiment.course) for m in model.used],
+        "weights": list(model.weights),
+    }
 
 
 def in_percent_of(c: Case, other: Case) -> Recording:

@@ -128,7 +128,8 @@ def _rms(misfit: Mapping[str, float]) -> Cell:
 
 
 def _fit(misfit: Mapping[str, float]) -> Cell:
-    return Cell(f"{misfit['fit_pct']:.1f}", misfit["fit_pct"])
+    fit_pct = misfit["fit_pct"]
+    return Cell("–") if fit_pct is None else Cell(f"{fit_pct:.1f}", fit_pct)
 
 
 def features(data: Data) -> Table:

@@ -47,6 +47,27 @@ def onto_clock(series: Series, clock: Floats, dt_s: float, limits: QualityLimits
     return value[np.maximum(at, 0)], (at < 0) | (age > limits.gap_factor * own) | lost
 
 
+def snapped(series: dict[str, Series], pv: str) -> dict[str, Series]:
+    """The same samples with stamps that scatter by less than half a sample put onto PV's uniform clock.
+
+    Holding values on a clock would repeat or lose a sample wherever a stamp is a little late.
+    """
+    at_s = series[pv].stamp_s
+    if at_s.size < 3:
+        return series
+    spacing = float(np.median(np.diff(at_s)))
+    index = np.concatenate(([0.0], np.cumsum(np.maximum(np.round(np.diff(at_s) / spacing), 1.0))))
+    dt, start = (float(v) for v in np.polyfit(index, at_s - at_s[0], 1))
+    out = {}
+    for tag, x in series.items():
+        at = np.round((x.stamp_s - at_s[0] - start) / dt)
+        near = bool(np.max(np.abs(x.stamp_s - at_s[0] - start - at * dt), initial=0.0) < 0.49 * dt)
+        if not near or (x.stamp_s.size > 1 and float(np.diff(at).min()) < 1.0):
+            return series
+        out[tag] = Series(at_s[0] + at * dt, x.value, x.bad, x.text)
+    return out
+
+
 def _last_good_held(value: Floats, good: Mask) -> tuple[Floats, Mask]:
     if good.all():
         return value, ~good

@@ -8,19 +8,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analyzer.config import AdviceLimits, Config
+from analyzer.limits import EXPLAIN
 from analyzer.loop.advice import Advice, propose, sought_for, withheld
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.decisions import Action, Cause, Need, Needs
+from analyzer.loop.experiments import Learned, learned
 from analyzer.loop.fitness import at_limits, unfit_for_cause
 from analyzer.loop.identified import intervals, load_of, tuned
+from analyzer.loop.sample_clock import onto_clock
 from analyzer.loop.settings_side_by_side import compared, middle_ti
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
+from analyzer.words import experiments
 from analyzer.words.reason import sign_in_full
 from analyzer.words.units import number
 from identification.errors import InputError, NotAssessedError
 from identification.models import Estimate, Loop, Pid, Process, Valve
-from identification.record import Floats
+from identification.record import Floats, LoopRecord
 from reports.pages import Field, Line, Panels, Picture, Place, Plot
 from tuning.describing import describe
 from tuning.forecast import Forecast, in_digits, loop_in_digits, predict, run
@@ -204,8 +208,49 @@ def _trend_panels(t: Tuning, new: Pid, title: str) -> Panels:
 def proposal(one: PlantLoop, drawn: bool) -> tuple[list[str], dict[str, bytes]]:
     """Lines of text and, if wanted, pictures by file name for one loop over a night. Raises InputError where its
     settings are not known, NotAssessedError where its trends give no model."""
-    spec, prepared, stated, config = one.spec, one.prepared, one.controller, one.plant.config
-    loop, night = spec.loop, "" if one.night is None else one.night.name
+    spec, stated, loop = one.spec, one.controller, one.spec.loop
+    night = "" if one.night is None else one.night.name
+    taught = taught_by(one)
+    shown = [] if taught is None else list(experiments.lines(taught, spec, stated, one.plant.zone))
+    known = taught is not None and taught.model is not None
+    try:
+        text, pictures = _routine(one, stated, night, drawn)
+    except (InputError, NotAssessedError) as error:
+        if not known:
+            raise
+        return [
+            f"{loop}, night {night}: model from experiments",
+            *shown,
+            f"the routine tells nothing: {error}",
+        ], {}
+    return [*shown, *text], pictures
+
+
+def taught_by(one: PlantLoop) -> Learned | None:
+    """What the experiments of a loop tell, its neighbours' OPs beside."""
+    spec, plant, record = one.spec, one.plant, one.prepared.record
+    series = plant.trends(spec.tags, one.night)
+    return learned(spec, series, one.prepared, plant.config, beside=_neighbours(one, record))
+
+
+def _neighbours(one: PlantLoop, record: LoopRecord) -> tuple[Floats, ...]:
+    """OPs of the plant's other loops on a record's clock, as many as an explanation reads."""
+    spec, plant = one.spec, one.plant
+    tags = [s.op for s in plant.specs if s.loop != spec.loop and s.op and s.op != spec.op]
+    tags = list(dict.fromkeys(tags))[: EXPLAIN.neighbours]
+    clock, found = record.start_s + record.time_s, []
+    for x in plant.trends(tags, one.night).values() if tags else ():
+        op, gap = onto_clock(x, clock, record.dt_s, plant.config.quality)
+        if not gap.all() and float(np.ptp(op)) > 0.0:
+            found.append(op)
+    return tuple(found)
+
+
+def _routine(
+    one: PlantLoop, stated: Pid | None, night: str, drawn: bool
+) -> tuple[list[str], dict[str, bytes]]:
+    """The same by what the loop does in automatic."""
+    spec, prepared, config, loop = one.spec, one.prepared, one.plant.config, one.spec.loop
     if stated is None:
         seen = f"{loop}: no kp and ti in loops.csv"
         raise InputError(seen, "both", "state them, so that new ones can be compared")

@@ -8,6 +8,7 @@ from analyzer.config import Config
 from analyzer.history.plant_clock import stamp
 from analyzer.loop.assess import hidden, unassessable
 from analyzer.loop.decisions import Needs
+from analyzer.loop.experiments import Learned, found_in
 from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
 from analyzer.loop.judged_stretch import controller_of, differing
 from analyzer.loop.measure import time_scale
@@ -18,8 +19,10 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import no_loops
 from analyzer.night.asked import Asked, guarded
 from analyzer.night.nights import Plant
+from analyzer.words.experiments import found_lines
 from identification.errors import TriageError
 
+ALONE = "fit for a model from its experiments alone"
 MOST_NAMES = 5
 """Loops that are named in a line."""
 
@@ -58,14 +61,19 @@ def loop_line(plant: Plant, spec: LoopSpec) -> tuple[str, bool]:
     if spec.pv is None:
         return f"{spec.loop}: no PV tag {spec.wanted_pv or spec.loop + '.PV'} in the export", True
     try:
-        prepared = prepare(spec, plant.trends(spec.tags), plant.config.quality)
+        series = plant.trends(spec.tags)
+        prepared = prepare(spec, series, plant.config.quality)
     except TriageError as error:
         return f"{spec.loop}: {_tags(spec)}; fit for nothing: {error}", True
     record = prepared.record
     lacking = unassessable(record, plant.config)
     fit = _fit_for(lacking, spec, prepared, plant.config)
+    taught = Learned(found_in(spec, prepared, series, plant.config), prepared)
+    by_hand = any(not x.course.closed for x in taught.found)
+    fit = fit.replace("fit for nothing", ALONE) if by_hand else fit
     parts = [_tags(spec), f"{len(record)} samples every {record.dt_s:g} s", *prepared.notes, fit]
-    return f"{spec.loop}: " + "; ".join(parts), lacking is not None
+    lines = [f"{spec.loop}: " + "; ".join(parts), *found_lines(taught, plant.zone)]
+    return "\n  ".join(lines), lacking is not None and not by_hand
 
 
 def _changes_counted(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> str:

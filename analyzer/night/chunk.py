@@ -22,6 +22,8 @@ from analyzer.loop.advice import Advice, advise
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.conclusion import Lost, concluded
 from analyzer.loop.decisions import Action, Cause, Cell, Finding, Lack, LacksError, Need, Needs, Status
+from analyzer.loop.experiments import learned
+from analyzer.loop.experiments_row import by_experiment, with_experiment
 from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
 from analyzer.loop.oscillation import counting
 from analyzer.loop.page_trends import turn_events
@@ -132,11 +134,20 @@ def _loop_row(
         known["straight_pct"] = 100.0 * prepared.compressed_share
         known |= standing(prepared, controller_of(spec, prepared), spec.type, config)
         earlier = earlier_settings(stated, changes, prepared)
-        found, advice = assess_loop(spec, prepared, config, advising, earlier, held)
+        taught, present = learned(spec, part, prepared, config, closed=False), controller_of(spec, prepared)
+        try:
+            found, advice = assess_loop(spec, prepared, config, advising, earlier, held)
+        except LacksError as error:
+            if taught is None or taught.model is None:
+                raise
+            kept.nights.append(by_experiment(taught, spec, night.name, error.needs, present, known))
+            return
         known |= _typed_in(earlier, spec, found, night.zone)
         known["turns"] = turn_events(prepared, found) if advising else None
         known["witness"] = witness(found.verdict, counting(found.oscillations) is not None, prepared, config)
         told = concluded(found, advice, spec, night.name, config.advice, **known)
+        if taught is not None:
+            told = with_experiment(told, taught, spec, present)
         drawn = _settings_row(spec, night.name, advice)
     except Exception as error:  # an error of one loop is that loop's result, never the night's end
         kept.nights.append(_lost(error, config).of(spec, night.name, **known))

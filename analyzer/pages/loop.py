@@ -16,6 +16,7 @@ from analyzer.limits import PAGES
 from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES, Fault, Status
 from analyzer.pages import loop_pictures, words
+from analyzer.pages.experiments import experiments_section
 from analyzer.pages.reading import BESIDE, Thinned
 from analyzer.pages.words import Row, duration, keys, known_figures, lead, number, page_table, titled
 from analyzer.pages.work import work_order
@@ -71,6 +72,7 @@ def loop_page(
         parts.section("Notes", words.listing(reversed(notes)) if notes else None),
         parts.section("What and why", _facts(row), _believed(row) if row["believed_nights"] else None),
         shared,
+        experiments_section(row),
         _explained_section(explained, row),
         _evidence_section(row),
         _picture_section(thin, row),

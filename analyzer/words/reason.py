@@ -57,14 +57,19 @@ def _whole(found: Finding) -> str:
         root = found.follows
         sure = f"fix that loop first (it starts there with {root.confidence_pct:.0f} %)"
         return f"{cycle_text(found)}: follows {root.loop}{later(root.lag_s)}; {sure}"
+    experiment = found.text("experiment")
     if found.swing is None:
+        if experiment:
+            return joined(
+                experiment, found.remedy.text, f"nothing else is told: {lacking}" if lacking else None
+            )
         return f"not assessed: {found.remedy.text or lacking}"
     names = ", ".join(found.moves[:MOST_NAMES]) + (" ..." if len(found.moves) > MOST_NAMES else "")
     moves = f"it also moves {names}: fix this one first" if names else None
     at_once = found.remedy.action in SAID_AT_ONCE or found.lack is Lack.OP_RANGE
     more = found.remedy.text if at_once and found.remedy.text != lacking else None
     first, *others = _cause(found).split("; ")
-    return joined(first, moves, more, to_stroke(found), *others)
+    return joined(first, moves, more, to_stroke(found), experiment, *others)
 
 
 def _cause(found: Finding) -> str:

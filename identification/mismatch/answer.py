@@ -80,7 +80,7 @@ def answer(found: Explanation, s: Recording) -> Answer:
         where_of(found, s, block, at),
         fit_of(found, s.dt_s),
         constants_moved(found),
-        (1.0 - found.proven.overall[1].fit_pct / 100.0) ** 2,
+        (1.0 - (found.proven.overall[1].fit_pct or 0.0) / 100.0) ** 2,
         note,
         caution,
         words.cycles_told(found) if by_cycles(found) else "",
@@ -181,6 +181,19 @@ def parameters_of(p: Problem, fit: Fitted, row: Variant) -> dict[str, Estimate]:
             out[q.name] = exact(value, q.unit, half)
     derived = about(row.name).derived
     return out | (derived(out) if derived is not None else {})
+
+
+SIZES = (
+    *("coupling_gain", "gain_drift", "gain_slope", "curve", "opposing_share", "flow_share", "slow_share"),
+    *("amplitude_pct", "size_1_pct"),
+)
+"""Parameters that are the size of an effect: at zero there is none."""
+
+
+def holds_zero(p: Problem, fit: Fitted, row: Variant) -> bool:
+    """Whether the interval of an effect's size holds zero, so that nothing shows that there is one."""
+    found = parameters_of(p, fit, row)
+    return any(found[name].low < 0.0 < found[name].high for name in SIZES if name in found)
 
 
 def alternatives(found: Explanation) -> tuple[str, ...]:

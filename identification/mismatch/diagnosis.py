@@ -17,9 +17,17 @@ import numpy as np
 from identification.controller.check import LATE_SAMPLES, Finding, judge
 from identification.controller.pi_regression import ControlLaw, Trends, shifted, unstated_law
 from identification.estimation.prediction_error import descended, gain
+from identification.mismatch.answer import holds_zero
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS, RECORDER_FAULTS, fault
 from identification.mismatch.effect import Ends, Friction
-from identification.mismatch.explanation import Explanation, agreed, beyond_the_grid, carried_over, ends
+from identification.mismatch.explanation import (
+    Explanation,
+    agreed,
+    beyond_the_grid,
+    by_cycles,
+    carried_over,
+    ends,
+)
 from identification.mismatch.friction import from_cycles, is_friction
 from identification.mismatch.outside import OUTSIDE, RIVALS, about
 from identification.mismatch.plain_loop import Clip, inputs_of, prepared, without_spikes
@@ -72,10 +80,18 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
         return carried_over(found)
     explained = beyond_the_grid(physics(found, tell, s))
     if not is_experiment(s):
-        return carried_over(explained)
+        return shown(carried_over(explained))
     p, plain = plain_loop(experiment=True)
     by_misfit = beyond_the_grid(physics(replace(found, p=p, plain=plain, best=plain), tell, s))
-    return agreed(explained, carried_over(by_misfit))
+    return shown(agreed(explained, carried_over(by_misfit)))
+
+
+def shown(found: Explanation) -> Explanation:
+    """The explanation without effects of whose size the interval holds zero: nothing shows that there is one."""
+    kept = int(by_cycles(found))
+    rows = zip(found.accepted[kept:], found.best.model.added[kept:], strict=True)
+    void = [c for c, row in rows if holds_zero(found.p, found.best, row)]
+    return carried_over(found.less(void)) if void else found
 
 
 def recorder_finding_of(s: Recording) -> Finding | None:

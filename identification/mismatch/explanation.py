@@ -150,7 +150,8 @@ def carried_over(found: Explanation) -> Explanation:
         kept = found if count == len(names) else first_effects(found, count)
         cycling = count == 1 and by_cycles(found)
         proof = held_out(kept.p, kept.plain, kept.best, cycle if cycling else 0)
-        unproven = not proof.carries and proof.falls and is_one_move(found.p)
+        unjudged = is_one_move(found.p) or proof.is_blind
+        unproven = not proof.carries and proof.falls and unjudged
         timed = proof.falls and all(EFFECTS[name].timed for name in names[:count])
         if proof.carries or unproven or cycling or timed:
             return replace(kept, proof=proof, refuted=names[count:], unproven=unproven)
@@ -227,7 +228,7 @@ def together(parts: Sequence[Misfit], samples: Sequence[int]) -> Misfit:
     """Misfits of several recordings as one, each sample counting alike."""
     n = np.array(samples, dtype=np.float64)
     rmse = np.array([m.rmse for m in parts])
-    moves = np.array([m.rmse / max(1.0 - m.fit_pct / 100.0, 1e-9) for m in parts])
+    moves = np.array([m.rmse / max(1.0 - (m.fit_pct or 0.0) / 100.0, 1e-9) for m in parts])
     left, own = (float(np.sqrt(np.sum(n * x**2) / n.sum())) for x in (rmse, moves))
     return Misfit(left, 100.0 * (1.0 - left / max(own, 1e-12)))
 

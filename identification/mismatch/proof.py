@@ -96,10 +96,11 @@ def held_out_gain(p: Problem, fits: tuple[Fitted, Fitted]) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Misfit:
-    """Root mean square [% PV] of PV less a simulation with its mean freed, and the share of PV's motion it fits."""
+    """Root mean square [% PV] of PV less a simulation with its mean freed, and the share of PV's motion it fits, None
+    where PV does not move by more than it leaves anyway: such a span judges no model."""
 
     rmse: float
-    fit_pct: float
+    fit_pct: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,8 +138,10 @@ def misfit(y: Floats, simulated: Floats, window: int = 0, part: slice = slice(No
     """Misfit of a simulation anchored in windows, in a part of it; fit_pct is 100 (1 - rms error / rms of PV so
     anchored itself)."""
     left, still = y - anchored(y, simulated, window), without_lines(y, window)
-    rmse = float(np.std(left[part]))
-    return Misfit(rmse, 100.0 * (1.0 - rmse / max(float(np.std(still[part])), 1e-12)))
+    rmse, moves = float(np.std(left[part])), float(np.std(still[part]))
+    if moves <= LIMITS.proof.spreads * float(np.std(still)):
+        return Misfit(rmse, None)
+    return Misfit(rmse, 100.0 * (1.0 - rmse / max(moves, 1e-12)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,9 +170,15 @@ class HeldOut:
         return self.overall[1].rmse < self.overall[0].rmse
 
     @property
+    def is_blind(self) -> bool:
+        """Whether PV stands still in what was held out, which then judges no model."""
+        return self.held[1].fit_pct is None
+
+    @property
     def follows(self) -> bool:
         """Whether the better model goes with PV at all on held-out data, and not merely less far astray."""
-        return self.held[1].fit_pct >= self.limits.proof.least_fit
+        fit_pct = self.held[1].fit_pct
+        return fit_pct is not None and fit_pct >= self.limits.proof.least_fit
 
     @property
     def carries(self) -> bool:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from identification.estimation.search import simulated_best
 from identification.mismatch.effect import Block, Ends, Fault, Finding, Floats, Recording, within
 from identification.mismatch.pictures import Axis, Picture, comb
 
@@ -14,9 +15,18 @@ def scattered_stamps(s: Recording) -> Finding | None:
     spacing = np.diff(s.stamp_s) / s.dt_s
     spacing = spacing[(spacing > 0.02) & (spacing < 1.98)]
     jitter = float(np.std(spacing)) / np.sqrt(2.0) if spacing.size > 10 else 0.0
-    if jitter < s.limits.recorder.jitter:
+    if jitter < s.limits.recorder.jitter or _is_slight(jitter * s.dt_s, s):
         return None
     return Finding({"jitter_samples": jitter}, np.ones(s.stamp_s.size, dtype=bool))
+
+
+def _is_slight(jitter_s: float, s: Recording) -> bool:
+    """Whether a scatter [s] is a small part of the process's time constant, in a recording in which no stated
+    controller acts on each sample."""
+    if s.stated is not None or float(np.ptp(s.op)) == 0.0:
+        return False
+    process = simulated_best(s.pv - s.pv.mean(), s.op, s.usable, s.dt_s)
+    return jitter_s < s.limits.recorder.jitter_lag * process.time_constant_s
 
 
 def spacings(found: Finding, s: Recording, _: Floats) -> Picture:

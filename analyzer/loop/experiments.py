@@ -1,0 +1,245 @@
+"""Experiments in a loop's record: where they are, the model that they make together, and settings from it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analyzer.config import Config
+from analyzer.history.series import Series
+from analyzer.loop.decisions import Cell
+from analyzer.loop.judged_stretch import controller_of
+from analyzer.loop.quality import Prepared, prepare
+from analyzer.loop.sample_clock import constant_stretches, snapped
+from analyzer.loops.spec import LoopSpec
+from identification.controller.pi_regression import ControlLaw, Trends, fed_back, unstated_law
+from identification.errors import NotAssessedError, TriageError
+from identification.experiments.find import Experiment, by_hand, in_automatic
+from identification.experiments.model import Modelled, Pooled, modelled, pooled
+from identification.limits import EXPERIMENTS, LIMITS
+from identification.models import Pid
+from identification.record import Floats, LoopRecord, Mask
+from identification.signals.robust import robust_deviation
+from tuning.from_test import FromTest, corners, settings_from
+
+CONSTANTS = {"gain": "gain", "slope_pct_per_s": "slope", "lags_s": "time_constant_s"}
+"""Constants of a model, and what the belief calls them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Controlled:
+    """What an experiment in automatic tells of its controller: how far PV goes beyond SP [% of span], and the law
+    that gives OP, None where none does."""
+
+    overshoot_pct: float
+    law: ControlLaw | None
+    dt_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Learned:
+    """What the experiments of a record tell.
+
+    found, all of them; prepared, the record that they lie in; models, of those that tell a process; model, all of
+    these as one, None where none does; settings from it, None where it gives none; untold, of each that tells
+    nothing why; controlled, what the model's own experiment in automatic tells of the controller.
+    """
+
+    found: tuple[Experiment, ...]
+    prepared: Prepared
+    models: tuple[Modelled, ...] = ()
+    model: Pooled | None = None
+    settings: FromTest | None = None
+    untold: tuple[tuple[Experiment, str], ...] = ()
+    controlled: Controlled | None = None
+
+
+def manual_of(spec: LoopSpec, prepared: Prepared, series: Mapping[str, Series], config: Config) -> Mask:
+    """True where OP is moved by hand or by a script, shape (n,): in manual by its mode; everywhere, where no SP is
+    recorded and OP, which mostly stands, does not answer PV; else where OP stands for long, at a limit too."""
+    record, q = prepared.record, LIMITS.controller
+    stands = constant_stretches(
+        record.op, record.dt_s, config.quality.manual_s, config.quality.manual_samples
+    )
+    if spec.mode in series:
+        return record.mask("manual")
+    if record.sp_estimated and _stands(record.op) and fed_back(record.op, record.pv) < q.feedback:
+        return np.ones(len(record), dtype=bool)
+    return record.mask("manual") | (stands & record.mask("saturated"))
+
+
+def _stands(op: Floats) -> bool:
+    return float(np.mean(np.diff(op) != 0.0)) < EXPERIMENTS.moving
+
+
+def on_even_clock(
+    spec: LoopSpec, series: Mapping[str, Series], prepared: Prepared, config: Config
+) -> Prepared:
+    """The record without the samples that a clock repeats or loses where stamps scatter a little."""
+    even = snapped(dict(series), spec.pv or "")
+    return (
+        prepared
+        if even.get(spec.pv or "") is series.get(spec.pv or "")
+        else prepare(spec, even, config.quality)
+    )
+
+
+def found_in(
+    spec: LoopSpec, prepared: Prepared, series: Mapping[str, Series], config: Config
+) -> tuple[Experiment, ...]:
+    """The experiments of a record, those by hand first."""
+    if not prepared.op_known or not prepared.op_scaled or prepared.shared is not None:
+        return ()
+    manual = manual_of(spec, prepared, series, config)
+    return (*by_hand(prepared.record, manual), *(() if manual.all() else in_automatic(prepared.record)))
+
+
+def learned(
+    spec: LoopSpec,
+    series: Mapping[str, Series],
+    prepared: Prepared,
+    config: Config,
+    closed: bool = True,
+    beside: Sequence[Floats] = (),
+) -> Learned | None:
+    """What experiments tell of a loop; None where there are none.
+
+    closed : whether those in automatic are modelled too, which a night leaves to its routine; beside : OPs of
+    neighbours on the record's clock, shape (n,) each.
+    """
+    found = found_in(spec, prepared, series, config)
+    if not found:
+        return None
+    even = prepared if beside else on_even_clock(spec, series, prepared, config)
+    if even is not prepared:
+        found = found_in(spec, even, series, config)
+    models, untold = [], []
+    wanted = [x for x in sorted(found, key=lambda x: -x.size) if closed or not x.course.closed]
+    for x in wanted[: EXPERIMENTS.most if closed else EXPERIMENTS.most_a_night]:
+        try:
+            models.append(modelled(even.record, x, beside))
+        except NotAssessedError as error:
+            untold.append((x, str(error)))
+        except (ArithmeticError, ValueError) as error:  # a fit that runs away costs the loop nothing else
+            untold.append((x, f"no fit: {error}"))
+    models.sort(key=lambda m: m.experiment.first)
+    if not models:
+        return Learned(found, even, untold=tuple(untold))
+    open_ones = [m for m in models if not m.experiment.course.closed]
+    whole = pooled(open_ones or models)
+    first = whole.used[0].experiment
+    seen = controlled(even.record.span(first.first, first.last)) if first.course.closed else None
+    return Learned(found, even, tuple(models), whole, _settings(whole, spec, even), tuple(untold), seen)
+
+
+def controlled(part: LoopRecord) -> Controlled:
+    """The overshoot of an experiment in automatic, noise left out, and the law that gives OP in it."""
+    way = float(np.sign(np.median(part.error[:5]))) or 1.0
+    beyond = -way * part.error
+    reached = np.flatnonzero(beyond >= 0.0)
+    noise = 3.0 * robust_deviation(np.diff(part.pv)) / math.sqrt(2.0)
+    most = float(beyond[reached[0] :].max()) - noise if reached.size else 0.0
+    q = LIMITS.controller
+    free = part.usable & (part.op > q.at_limit) & (part.op < 100.0 - q.at_limit)
+    law = unstated_law(Trends(part.sp, part.pv, part.op, free, q))
+    return Controlled(max(most, 0.0), law if law is not None and law.kp * law.ki > 0.0 else None, part.dt_s)
+
+
+def _settings(model: Pooled, spec: LoopSpec, prepared: Prepared) -> FromTest | None:
+    """Settings from a model; None of a process that gives none."""
+    stated = controller_of(spec, prepared)
+    scan_s = stated.scan_s if stated is not None else spec.scan_s or prepared.record.dt_s
+    process = model.process
+    try:
+        return settings_from(process, corners(process, dict(model.estimates)), scan_s)
+    except (ValueError, TriageError):
+        return None
+
+
+def farther(present: Pid, new: Pid) -> float:
+    """How many times new settings are the present ones, in gain or integral time, at least 1."""
+    if present.kp * new.kp <= 0.0 or not math.isfinite(present.ti_s) or present.ti_s <= 0.0:
+        return math.inf
+    return max(*(max(a / b, b / a) for a, b in ((present.kp, new.kp), (present.ti_s, new.ti_s))))
+
+
+def constants_known(model: Pooled) -> Mapping[str, tuple[float, float]]:
+    """Constants with the deviation of their logarithms, by the names that the belief has for them."""
+    out = {}
+    for name, known in CONSTANTS.items():
+        e = model.estimates.get(name)
+        if e is not None and e.value * e.low > 0.0 and e.value * e.high > 0.0:
+            out[known] = (e.value, abs(math.log(e.high / e.low)) / 3.29)
+    dead = model.estimates["dead_time_s"]
+    if dead.value > 0.0:
+        out["dead_time_s"] = (dead.value, (dead.high - dead.low) / 3.29 / dead.value)
+    if "gain" in out and "time_constant_s" in out:
+        (k, a), (t, b) = out["gain"], out["time_constant_s"]
+        out["slope"] = (k / t, math.hypot(a, b))
+    return out
+
+
+def with_constants(witness: str | None, model: Pooled) -> str:
+    """What a night witnesses of its valve, with the constants that experiments know better, or alone."""
+    said = json.loads(witness) if witness else {}
+    for name, (value, deviation) in constants_known(model).items():
+        if name not in said or deviation < said[name][1]:
+            said[name] = [float(f"{value:.4g}"), float(f"{deviation:.4g}")]
+    return json.dumps(said, separators=(",", ":"))
+
+
+def model_row(model: Pooled) -> dict[str, Cell]:
+    """The constants of a row: gain, slope, the longest lag and dead time, play."""
+    e = model.estimates
+    value = {name: x.value for name, x in e.items()}
+    lag = value.get("time_constant_s") if "second_lag_s" in e else value.get("lags_s")
+    slope = value["slope_pct_per_s"] if "gain" not in e else value["gain"] / (lag or 1.0)
+    out: dict[str, Cell] = {
+        "gain": value.get("gain"),
+        "time_constant_s": lag,
+        "slope_pct_per_s": slope,
+        "dead_time_s": value["dead_time_s"],
+    }
+    return out | ({"backlash_pct": value["backlash_pct"]} if "backlash_pct" in e else {})
+
+
+def as_rows(of: Learned) -> str:
+    """The experiments as the store keeps them (JSON): span [s since 1970-01-01 UTC], course, moves, what each
+    tells, and its answer in a few hundred points, PV in % of span."""
+    record = of.prepared.record
+    told = {m.experiment: m for m in of.models}
+    why = dict(of.untold)
+    return json.dumps([_as_row(record, x, told.get(x), why.get(x)) for x in of.found], separators=(",", ":"))
+
+
+def _as_row(record: LoopRecord, x: Experiment, m: Modelled | None, why: str | None) -> dict[str, object]:
+    start_s = record.start_s
+    row: dict[str, object] = {
+        "first_s": round(start_s + x.first * record.dt_s, 3),
+        "last_s": round(start_s + x.last * record.dt_s, 3),
+        "course": str(x.course),
+        "moves": x.moves,
+        "size_pct": float(f"{x.size:.4g}"),
+    }
+    if m is None:
+        return row | ({"untold": why} if why else {})
+    at = np.unique(np.linspace(0, m.pv.size - 1, EXPERIMENTS.points).round().astype(int))
+    short = {k: [float(f"{v:.5g}") for v in getattr(m, k)[at]] for k in ("pv", "simulated", "op")}
+    times = [round(float(t), 2) for t in m.time_s[at]]
+    known = {
+        k: [float(f"{v:.5g}") for v in (e.value, e.low, e.high)] + [e.unit] for k, e in m.estimates.items()
+    }
+    lone = {"lone_pv": m.lone_pv, "lone_op": m.lone_op}
+    return row | {"kind": str(m.kind), "constants": known, "time_s": times, **short, **lone}
+
+
+def chosen(of: Learned, present: Pid | None) -> Pid | None:
+    """New settings in place of the present ones; None where these are as good, or none follow."""
+    if of.settings is None or present is None:
+        return None
+    new = replace(of.settings.robust, scan_s=present.scan_s)
+    return new if farther(present, new) > EXPERIMENTS.as_good else None

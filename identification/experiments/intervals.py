@@ -1,0 +1,171 @@
+"""How well an experiment tells its constants: 90 % intervals from the curvature at the optimum."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from identification.estimation.descent import NINETY
+from identification.experiments.columns import Kind
+from identification.experiments.fit import TIMES, Fitted, columns
+from identification.experiments.wander import whitened
+from identification.limits import EXPERIMENTS
+from identification.models import Estimate
+from identification.record import Floats
+
+NUDGE = 1e-4
+"""Step of a numerical derivative, in logs, or in terms of the shortest time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Deviations of log gain, log of the sum of lags, and dead time [s], each of an integrator's too, whose lags are
+    none; covariance, of all constants: times, then coefficients, shape (m, m)."""
+
+    log_gain: float
+    log_lags: float
+    dead_s: float
+    covariance: Floats = field(repr=False)
+
+
+def covariance_of(fit: Fitted) -> Floats:
+    """Covariance of times and coefficients, shape (m, m), from the white columns' Gram matrix."""
+    trial, shape, times = fit.trial, fit.shape, fit.times
+    parts = []
+    own = TIMES[shape.kind]
+    for at in range(times.size):
+        is_dead = at == own and shape.answers
+        step = NUDGE * max(trial.block_s, 0.1 * fit.dead_s) * 10.0 if is_dead else NUDGE * 10.0
+        up, down = times.copy(), times.copy()
+        up[at] += step
+        down[at] = max(down[at] - step, 0.0) if is_dead else down[at] - step
+        moved = (columns(trial, shape, up) - columns(trial, shape, down)) @ fit.linear
+        parts.append(moved / (up[at] - down[at]))
+    design = np.column_stack([*parts, columns(trial, shape, times)])
+    white, _ = whitened(np.ascontiguousarray(design), trial.usable, fit.wander.phi, fit.wander.ratio)
+    size = np.sqrt((white**2).sum(axis=0)) + 1e-12
+    gram = white.T @ white / fit.variance
+    logs = np.zeros(size.size)
+    logs[: times.size] = EXPERIMENTS.log_known**-2
+    if shape.answers:
+        logs[own] = max(sum(fit.lags_s) + fit.dead_s, trial.block_s) ** -2.0
+    gram += np.diag(logs + 1e-10 * size**2 / fit.variance)
+    scale = np.sqrt(np.diag(gram))
+    return np.asarray(np.linalg.inv(gram / np.outer(scale, scale)) / np.outer(scale, scale))
+
+
+def spread_of(fit: Fitted) -> Spread:
+    """How far the constants may be off."""
+    cov = covariance_of(fit)
+    own, first = TIMES[fit.shape.kind], fit.times.size
+    lags = np.exp(fit.times[:own])
+    weights = lags / max(float(lags.sum()), 1e-12)
+    gain = math.sqrt(max(cov[first, first], 0.0)) / max(abs(fit.gain), 1e-12)
+    sum_s = math.sqrt(max(float(weights @ cov[:own, :own] @ weights), 0.0)) if own else 0.0
+    dead = math.sqrt(max(cov[own, own], 0.0)) if fit.shape.answers else 0.0
+    return Spread(gain, sum_s, dead, cov)
+
+
+def weights_of(found: Sequence[Fitted]) -> Floats:
+    """What each candidate counts, shape (m,), by Akaike weights (Burnham, Anderson 2002, section 2.9)."""
+    score = np.array([f.score for f in found])
+    weight = np.exp(score - score.max())
+    return np.asarray(weight / weight.sum())
+
+
+@dataclass(frozen=True, slots=True)
+class Averaged:
+    """Gain (of an integrator slope), sum of lags [s] and dead time [s] over all candidates of a family, and their
+    deviations: of each candidate, and between candidates. Log gain and log lags are averaged."""
+
+    gain: float
+    lags_s: float
+    dead_s: float
+    spread: Spread
+
+
+def _counts(f: Fitted, best: Fitted) -> bool:
+    """Whether a candidate counts beside the best: of its family and sign; the zero of an inverse response goes with
+    any dead time where there is none."""
+    same = f.shape.is_ramp == best.shape.is_ramp and f.gain * best.gain > 0.0
+    return same and f.shape.kind is not Kind.INVERSE
+
+
+def averaged(found: Sequence[Fitted]) -> Averaged:
+    """The constants of a best candidate and of all others of its family, best first: a lag cannot always be told from
+    two, nor drift from none, and an interval has to hold whichever it is."""
+    best = found[0]
+    tried = [(f, spread_of(f)) for f in found if f is best or _counts(f, best)]
+    told = [(f, s) for f, s in tried if f is best or s.log_gain < EXPERIMENTS.loose]
+    same, spreads = [f for f, _ in told], [s for _, s in told]
+    weight = weights_of(same)
+    rows = np.array([[math.log(abs(f.gain)), math.log(max(sum(f.lags_s), 1e-9)), f.dead_s] for f in same])
+    inner = np.array([[s.log_gain, s.log_lags, s.dead_s] for s in spreads])
+    mean = weight @ rows
+    wide = EXPERIMENTS.wider * np.sqrt(weight @ (inner**2 + (rows - mean) ** 2))
+    sign = math.copysign(1.0, best.gain)
+    spread = Spread(float(wide[0]), float(wide[1]), float(wide[2]), spreads[0].covariance)
+    return Averaged(sign * math.exp(mean[0]), math.exp(mean[1]), float(mean[2]), spread)
+
+
+def _factor(value: float, log_deviation: float, unit: str) -> Estimate:
+    """A number with an interval in terms of itself."""
+    factor = math.exp(min(NINETY * log_deviation, 20.0))
+    low, high = sorted((value / factor, value * factor))
+    return Estimate(value, low, high, unit)
+
+
+def estimates_of(found: Sequence[Fitted], mean: Averaged) -> dict[str, Estimate]:
+    """The constants with 90 % intervals, by the names of the ranking's columns; of candidates, the best first."""
+    best, wide = found[0], mean.spread
+    ramp = best.shape.is_ramp
+    out = {}
+    if ramp:
+        out["slope_pct_per_s"] = _factor(mean.gain, wide.log_gain, "%/(% s)")
+    else:
+        out["gain"] = _factor(mean.gain, wide.log_gain, "%/%")
+        out["lags_s"] = _factor(mean.lags_s, wide.log_lags, "s")
+        out |= _lags(best, wide)
+    # OP was moved up to one sample before the sample that first shows it
+    late_s, before_s = NINETY * wide.dead_s, EXPERIMENTS.unseen * best.trial.dt_s
+    dead_s = mean.dead_s
+    out["dead_time_s"] = Estimate(
+        dead_s, max(dead_s - late_s, 0.0), dead_s + math.hypot(late_s, before_s), "s"
+    )
+    return out | _rest(best, wide)
+
+
+def _lags(fit: Fitted, spread: Spread) -> dict[str, Estimate]:
+    """The lags of a candidate by themselves, the longest first."""
+    out = {}
+    order = np.argsort(-fit.times[: TIMES[fit.shape.kind]])
+    for name, at in zip(("time_constant_s", "second_lag_s"), order, strict=False):
+        log = EXPERIMENTS.wider * math.sqrt(max(spread.covariance[at, at], 0.0))
+        out[name] = _factor(float(np.exp(fit.times[at])), log, "s")
+    return out
+
+
+def _rest(fit: Fitted, spread: Spread) -> dict[str, Estimate]:
+    """Play, inverse response, drift and neighbours' gains, as far as the candidate has them."""
+    out, shape, first = {}, fit.shape, fit.times.size
+    deviation = EXPERIMENTS.wider * np.sqrt(np.maximum(np.diag(spread.covariance), 0.0))
+    at = first + shape.answers + 1
+    if shape.kind is Kind.INVERSE:
+        share = fit.linear[1] / fit.linear[0]
+        half = NINETY * deviation[first + 1] / abs(fit.linear[0])
+        out["zero_s"] = Estimate(abs(share), abs(share) - half, abs(share) + half, "s")
+    if shape.play:
+        place = TIMES[shape.kind] + 1
+        out["backlash_pct"] = _factor(math.exp(fit.times[place]), deviation[place], "% of OP")
+    if shape.drift:  # of an integrator it is OP's balance
+        per_h = 2.0 * 3600.0 / fit.trial.duration_s
+        value, half = per_h * fit.linear[at - first], per_h * NINETY * deviation[at]
+        out["drift_pct_per_h"] = Estimate(float(value), float(value - half), float(value + half), "%/h")
+    for place in range(len(shape.beside)):
+        column = fit.linear.size - len(shape.beside) + place
+        value, half = float(fit.linear[column]), NINETY * float(deviation[first + column])
+        out[f"neighbour_{shape.beside[place]}_gain"] = Estimate(value, value - half, value + half, "%/%")
+    return out

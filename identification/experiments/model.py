@@ -1,0 +1,198 @@
+"""From an experiment to a model, and from several to one: constants with intervals, and what each counts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from identification.errors import NotAssessedError
+from identification.estimation.descent import NINETY
+from identification.experiments.closed import closed_candidates, shown_sign
+from identification.experiments.columns import Kind, trial_of
+from identification.experiments.find import Course, Experiment
+from identification.experiments.fit import Fitted, candidates, tells_play
+from identification.experiments.intervals import Averaged, averaged, estimates_of
+from identification.limits import EXPERIMENTS
+from identification.models import Estimate, Fopdt, Integrator, Process
+from identification.record import Floats, LoopRecord, Mask
+from identification.signals.lone import lone_values, without_lone
+
+
+@dataclass(frozen=True, slots=True)
+class Modelled:
+    """What one experiment tells.
+
+    experiment; kind of answer; estimates, by name with 90 % intervals; mean, the constants over all candidates;
+    nat, what OP brings to the likelihood [nat]; explained, share of PV's motion [-]; time_s, pv, simulated [% PV] and
+    op [% OP] in blocks, shape (n,), from the record's start; lone_pv, lone_op, times of single values left out [s];
+    tells_play, whether OP moved so that play would be seen.
+    """
+
+    experiment: Experiment
+    kind: Kind
+    estimates: Mapping[str, Estimate]
+    mean: Averaged
+    nat: float
+    explained: float
+    time_s: Floats = field(repr=False)
+    pv: Floats = field(repr=False)
+    simulated: Floats = field(repr=False)
+    op: Floats = field(repr=False)
+    lone_pv: tuple[float, ...] = ()
+    lone_op: tuple[float, ...] = ()
+    tells_play: bool = False
+
+    @property
+    def process(self) -> Process:
+        """The process that settings are sought for; of two lags by the half rule (Skogestad 2003, eq. 10)."""
+        return process_of(self.kind, self.estimates)
+
+
+def process_of(kind: Kind, e: Mapping[str, Estimate]) -> Process:
+    """A process of one lag with dead time, or an integrator, of an experiment's constants."""
+    dead_s = e["dead_time_s"].value
+    if kind is Kind.INTEGRATOR:
+        return Integrator(e["slope_pct_per_s"].value, dead_s)
+    total = e["lags_s"].value
+    second = min(e["second_lag_s"].value, 0.5 * total) if "second_lag_s" in e else 0.0
+    late = dead_s + 0.5 * second + (e["zero_s"].value if "zero_s" in e else 0.0)
+    return Fopdt(e["gain"].value, max(total - 0.5 * second, 1e-6), late)
+
+
+def lone_in(record: LoopRecord) -> tuple[Mask, Mask]:
+    """Where single values of PV stand alone, and single ones of an OP that stands at one value before and after;
+    shape (n,) each."""
+    factor, stands = EXPERIMENTS.lone, EXPERIMENTS.stands
+    pv = lone_values(record.pv, record.at_work, factor, EXPERIMENTS.lone_share)
+    op = lone_values(record.op, record.at_work, factor, EXPERIMENTS.least_part)
+    for k in np.flatnonzero(op):
+        around = np.r_[record.op[max(k - stands, 0) : k], record.op[k + 1 : k + 1 + stands]]
+        op[k] = float(np.ptp(around)) == 0.0
+    return pv, op
+
+
+def modelled(record: LoopRecord, x: Experiment, beside: Sequence[Floats] = ()) -> Modelled:
+    """The model of one experiment of a record; beside, OPs of neighbours on the record's clock, shape (n,) each.
+
+    Raises NotAssessedError where PV does not answer OP, or the gain may be of either sign.
+    """
+    part = record.span(x.first, x.last)
+    lone_pv, lone_op = lone_in(part)
+    part = replace(part, bad=part.bad | lone_pv, op=without_lone(part.op, lone_op))
+    others = tuple(b[x.first : x.last] for b in beside if float(np.ptp(b[x.first : x.last])) > 0.0)
+    found, nat = _candidates(part, x, others)
+    best, mean = found[0], averaged(found)
+    if nat < EXPERIMENTS.answers or NINETY * mean.spread.log_gain > EXPERIMENTS.most_gain:
+        raise NotAssessedError(f"PV does not answer OP beyond its noise in this {x.course}")
+    trial, start_s = best.trial, x.first * record.dt_s
+    blocks = trial.op.reshape(-1, trial.factor).mean(axis=1)
+    return Modelled(
+        x,
+        best.shape.kind,
+        estimates_of(found, mean),
+        mean,
+        nat,
+        1.0 - float(np.var((trial.pv - best.simulated)[trial.usable]) / np.var(trial.pv[trial.usable])),
+        start_s + trial.time_s,
+        trial.pv,
+        best.simulated,
+        blocks,
+        tuple(start_s + record.dt_s * np.flatnonzero(lone_pv)),
+        tuple(start_s + record.dt_s * np.flatnonzero(lone_op)),
+        tells_play(part.op),
+    )
+
+
+def _candidates(part: LoopRecord, x: Experiment, others: tuple[Floats, ...]) -> tuple[list[Fitted], float]:
+    """Candidates, best first, and what OP brings [nat]; in finer blocks where the answer is fast for the first."""
+    factor = max(len(part) // EXPERIMENTS.blocks, 1)
+    for _ in range(2):
+        found, nat = _in_blocks(part, x, factor, others)
+        if not found:
+            raise NotAssessedError(f"no process explains PV in this {x.course}")
+        fast_s = sum(found[0].lags_s) + found[0].dead_s
+        fine = max(int(fast_s / EXPERIMENTS.blocks_a_lag / part.dt_s), 1)
+        if fine >= factor:
+            break
+        factor = max(fine, len(part) // EXPERIMENTS.most_blocks, 1)
+    return found, nat
+
+
+def _in_blocks(
+    part: LoopRecord, x: Experiment, factor: int, others: tuple[Floats, ...]
+) -> tuple[list[Fitted], float]:
+    trial = trial_of(part, factor, others)
+    if int(trial.usable.sum()) < EXPERIMENTS.samples:
+        need = f"needs {EXPERIMENTS.samples} good samples, has {int(trial.usable.sum())}"
+        raise NotAssessedError(f"{need} in this {x.course}")
+    if x.course.closed:
+        found = closed_candidates(trial, shown_sign(trial), x.course is Course.WARM_UP)
+        left = math.inf if not found else float(np.var(found[0].trial.pv - found[0].simulated))
+        good = left < (1.0 - EXPERIMENTS.explained) * float(np.var(trial.pv))
+        return found, EXPERIMENTS.answers if good else 0.0
+    found, still = candidates(trial)
+    return found, found[0].score - still.score
+
+
+@dataclass(frozen=True, slots=True)
+class Pooled:
+    """Several experiments as one: kind and estimates, the weight of each [-], and those that agree in kind."""
+
+    kind: Kind
+    estimates: Mapping[str, Estimate]
+    weights: tuple[float, ...]
+    used: tuple[Modelled, ...]
+
+    @property
+    def process(self) -> Process:
+        """The process that settings are sought for."""
+        return process_of(self.kind, self.estimates)
+
+
+def pooled(found: Sequence[Modelled]) -> Pooled:
+    """One model of several experiments, each by what it tells, with what they differ by more than that
+    (DerSimonian, Laird 1986). Found, one at least; those of another family or sign than the surest are left out."""
+    surest = min(found, key=lambda m: m.mean.spread.log_gain)
+    ramp = surest.kind is Kind.INTEGRATOR
+    used = [m for m in found if (m.kind is Kind.INTEGRATOR) == ramp and m.mean.gain * surest.mean.gain > 0.0]
+    if len(used) == 1:
+        return Pooled(surest.kind, surest.estimates, (1.0,), (surest,))
+    out = dict(surest.estimates)
+    sign = math.copysign(1.0, surest.mean.gain)
+    names = ("slope_pct_per_s",) if ramp else ("gain", "lags_s")
+    gain = [(math.log(abs(m.mean.gain)), m.mean.spread.log_gain) for m in used]
+    mean, deviation, weights = together(gain)
+    out[names[0]] = _around_log(out[names[0]], sign, mean, deviation)
+    if not ramp:
+        mean, deviation, _ = together([(math.log(m.mean.lags_s), m.mean.spread.log_lags) for m in used])
+        out["lags_s"] = _around_log(out["lags_s"], 1.0, mean, deviation)
+    mean, deviation, _ = together([(m.mean.dead_s, max(m.mean.spread.dead_s, 1e-9)) for m in used])
+    late, old = NINETY * deviation, out["dead_time_s"]
+    unseen = old.high - old.value
+    out["dead_time_s"] = Estimate(
+        mean, max(mean - late, 0.0), mean + max(late, min(unseen, late + unseen)), "s"
+    )
+    return Pooled(surest.kind, out, tuple(weights.tolist()), tuple(used))
+
+
+def _around_log(old: Estimate, sign: float, mean: float, deviation: float) -> Estimate:
+    low, high = (sign * math.exp(mean + side * NINETY * deviation) for side in (-1.0, 1.0))
+    return Estimate(sign * math.exp(mean), min(low, high), max(low, high), old.unit)
+
+
+def together(found: Sequence[tuple[float, float]]) -> tuple[float, float, Floats]:
+    """Mean of numbers with their deviations, its deviation, and the weights, shape (m,), which sum to 1."""
+    value, wide = (np.array(x) for x in zip(*found, strict=True))
+    inverse = wide**-2.0
+    mean = float(inverse @ value / inverse.sum())
+    excess = float(inverse @ (value - mean) ** 2) - (value.size - 1)
+    between = max(excess / (inverse.sum() - (inverse**2).sum() / inverse.sum()), 0.0)
+    weight = 1.0 / (wide**2 + between)
+    return (
+        float(weight @ value / weight.sum()),
+        float(weight.sum() ** -0.5),
+        np.asarray(weight / weight.sum()),
+    )

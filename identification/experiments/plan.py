@@ -1,0 +1,96 @@
+"""The step test that settles what is unknown of a loop: how large, how long, and which way."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.estimation.descent import NINETY
+from identification.limits import EXPERIMENTS
+from identification.record import Floats, LoopRecord
+from identification.signals.robust import robust_deviation
+
+MOVES = (1.0, 1.0, -1.0, -1.0)
+"""Moves of a test, in steps: the second tells the gain without play, the third the play, the fourth the way back."""
+RAMPS = (1.0, -1.0, -1.0, 1.0)
+"""The same where PV integrates: back to OP's balance after each."""
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What is known of a loop before a test: gain [% PV/% OP], of an integrator PV's way over the
+    lag, None where it is not; lag and dead time [s]; width of
+    backlash or stickband [% OP], 0 where none is known; integrating, whether PV runs away while OP stands off its
+    balance; source, where that comes from."""
+
+    gain: float | None
+    lag_s: float
+    dead_s: float
+    width_pct: float = 0.0
+    integrating: bool = False
+    source: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A test: the size of a step [% OP], its levels in turn [% OP], how long each is held [s], noise from sample to
+    sample and between the means of two holds [% PV], PV's answer to a step [% PV], None where the gain is not known,
+    half-widths of the 90 % intervals that it should leave of gain and play, each in terms of itself, None likewise,
+    and whether OP's range, not noise, sets the size."""
+
+    step_pct: float
+    levels_pct: tuple[float, ...]
+    hold_s: float
+    noise_pct: float
+    wander_pct: float
+    answer_pct: float | None
+    gain_within: float | None
+    play_within: float | None
+    bounded: bool
+
+    @property
+    def duration_s(self) -> float:
+        """The whole test [s], the hold before its first move included."""
+        return (len(self.levels_pct)) * self.hold_s
+
+
+def wander_between(pv: Floats, block: int) -> float:
+    """Deviation [% PV] between the means of neighbouring blocks of so many samples, over the square root of two."""
+    n = pv.size // block
+    if n < 4:
+        return robust_deviation(pv - np.median(pv)) if pv.size else 0.0
+    means = pv[: n * block].reshape(n, block).mean(axis=1)
+    return robust_deviation(np.diff(means)) / math.sqrt(2.0)
+
+
+def planned(record: LoopRecord, known: Known) -> Plan:
+    """The test of a loop at the operating point where its record ends."""
+    good = record.at_work
+    pv, op = record.pv[good], record.op[good]
+    noise = robust_deviation(np.diff(pv)) / math.sqrt(2.0) if pv.size > 2 else 0.0
+    hold_s = known.dead_s + EXPERIMENTS.hold_lags * known.lag_s
+    hold_s = max(hold_s, EXPERIMENTS.hold_samples * record.dt_s)
+    wander = max(
+        wander_between(pv, max(int(hold_s / record.dt_s), 1)), noise / math.sqrt(hold_s / record.dt_s)
+    )
+    gain = abs(known.gain) if known.gain else None
+    answer = max(EXPERIMENTS.over_wander * wander, EXPERIMENTS.over_sample * noise)
+    wanted = EXPERIMENTS.first_step if gain is None else answer / gain
+    wanted = max(wanted, EXPERIMENTS.over_play * known.width_pct, EXPERIMENTS.least_step)
+    middle = float(np.median(op[-max(op.size // 20, 1) :])) if op.size else 50.0
+    room = max(100.0 - EXPERIMENTS.margin - middle, middle - EXPERIMENTS.margin)
+    bearable = math.inf if gain is None or known.integrating else EXPERIMENTS.most_answer / gain
+    step = min(wanted, max(0.5 * room, 0.0), bearable)
+    way = 1.0 if middle + 2.0 * step <= 100.0 - EXPERIMENTS.margin else -1.0
+    step = float(f"{max(step, 0.1):.2g}")
+    moves = RAMPS if known.integrating else MOVES
+    levels = tuple(round(middle + way * step * x, 2) for x in np.cumsum((0.0, *moves)))
+    seen = None if gain is None else gain * step
+    if known.integrating and seen is not None and seen > EXPERIMENTS.most_answer:
+        hold_s = known.dead_s + known.lag_s * EXPERIMENTS.most_answer / seen
+        seen = EXPERIMENTS.most_answer
+    within = None if seen is None or seen == 0.0 else NINETY * wander / seen
+    play = None if within is None or known.width_pct <= 0.0 else 2.0 * within * step / known.width_pct
+    return Plan(step, levels, hold_s, noise, wander, seen, within, play, step < 0.9 * wanted)

@@ -1,0 +1,135 @@
+"""Step tests of known processes, for proofs: a simulator of its own, which shares no code with the packages.
+
+Each is drawn by a seed: lag, two lags, integrator or inverse response; one to six moves; noise to a third of the
+answer; drift; play; a sample in 1 to 60 s; stamps that scatter. Processes are integrated by small Euler steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+FINE = 60
+"""Euler steps in the shortest time of a process."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What was drawn: gain [% PV/% OP], of an integrator its slope [1/s]; lags [s]; dead time [s]; zero of an inverse
+    response [s]; play [% OP]; noise over the answer [-]; moves; sample [s]; scatter of stamps in terms of it; drift
+    over the record in terms of the answer."""
+
+    kind: str
+    gain: float
+    lags_s: tuple[float, ...]
+    dead_s: float
+    zero_s: float
+    play: float
+    noise: float
+    moves: int
+    sample_s: float
+    scatter: float
+    drift: float
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Stamps [s], PV and OP [% of span], shape (n,) each."""
+
+    stamp_s: Floats
+    pv: Floats
+    op: Floats
+
+
+def drawn(seed: int) -> Truth:
+    """A process and its test."""
+    rng = np.random.default_rng(seed)
+    kind = rng.choice(["lag", "two lags", "integrator", "inverse response"], p=[0.45, 0.35, 0.12, 0.08])
+    slow = float(np.exp(rng.uniform(np.log(60.0), np.log(1500.0))))
+    lags = {"lag": (slow,), "integrator": ()}.get(kind, (slow, slow * float(rng.uniform(0.15, 0.7))))
+    total = sum(lags) or slow
+    moves = int(rng.integers(1, 7))
+    # play is told apart from gain by moves in one direction and by reversals; of fewer moves it is not
+    play = float(rng.uniform(0.05, 0.3)) if moves >= 4 and rng.random() < 0.4 else 0.0
+    sample = float(np.clip(np.exp(rng.uniform(0.0, np.log(60.0))), 1.0, min(60.0, total / 40.0)))
+    gain = float(rng.choice([-1.0, 1.0]) * np.exp(rng.uniform(np.log(0.3), np.log(3.0))))
+    return Truth(
+        str(kind),
+        gain / (5.0 * slow) if kind == "integrator" else gain,
+        lags,
+        float(rng.uniform(0.1, 1.0)) * slow * (0.4 if kind == "integrator" else 1.0),
+        slow * float(rng.uniform(0.3, 1.0)) if kind == "inverse response" else 0.0,
+        play,
+        float(rng.uniform(0.01, 1.0 / 3.0)),
+        moves,
+        max(round(sample), 1.0),
+        float(rng.choice([0.0, 0.1, 0.3])),
+        float(rng.choice([0.0, 1.0]) * rng.uniform(-0.4, 0.4)),
+    )
+
+
+def recorded(t: Truth, seed: int) -> Recorded:
+    """The test as a historian has it."""
+    rng = np.random.default_rng([seed, 1])
+    scale = (sum(t.lags_s) + t.dead_s) if t.lags_s else 6.0 * t.dead_s
+    ways = directions(t, rng)
+    sizes = rng.uniform(4.0, 8.0, t.moves)
+    rests = scale * rng.uniform(4.0, 6.0, t.moves + 1)
+    rests[0] = scale * rng.uniform(1.5, 3.0)
+    end_s = float(rests.sum())
+    shortest = min([x for x in (*t.lags_s, t.zero_s, t.dead_s) if x > 0.0])
+    fine_s = min(shortest / FINE, t.sample_s / 2.0)
+    clock = np.arange(0.0, end_s, fine_s)
+    op = np.full(clock.size, 45.0)
+    for at, way, size in zip(np.cumsum(rests)[:-1], ways, sizes, strict=True):
+        op[clock >= at] += way * size
+    stem = behind_play(op, t.play * float(sizes.mean()), float(rng.uniform()))
+    clean = response(
+        t, np.r_[np.full(round(t.dead_s / fine_s), stem[0]), stem][: clock.size] - stem[0], fine_s
+    )
+    answer = abs(t.gain) * float(sizes.mean()) * (float(rests.mean()) if t.kind == "integrator" else 1.0)
+    stamps = np.arange(0.0, end_s - t.sample_s, t.sample_s)
+    stamps = stamps + t.scatter * t.sample_s * rng.uniform(-0.5, 0.5, stamps.size) + 0.5 * t.sample_s
+    at = np.minimum((stamps / fine_s).astype(int), clock.size - 1)
+    load = t.drift * answer * stamps / end_s
+    pv = 50.0 + clean[at] + load + t.noise * answer * rng.normal(size=at.size)
+    return Recorded(stamps, pv, op[at])
+
+
+def directions(t: Truth, rng: np.random.Generator) -> Floats:
+    """Ways of the moves: any, behind play with a reversal and two in one direction."""
+    while True:
+        ways = rng.choice([-1.0, 1.0], t.moves)
+        if abs(ways.cumsum()).max() > 3:
+            continue
+        same = (ways[1:] == ways[:-1]).any() and (ways[1:] != ways[:-1]).any()
+        if t.play == 0.0 or same:
+            return np.asarray(ways)
+
+
+def behind_play(op: Floats, width: float, begun: float) -> Floats:
+    """The stem within a gap of that width, where it begins at a share of it."""
+    out, at = np.empty(op.size), op[0] + (begun - 0.5) * width
+    for k, x in enumerate(op):
+        at = min(max(at, x - 0.5 * width), x + 0.5 * width)
+        out[k] = at
+    return out
+
+
+def response(t: Truth, moved: Floats, step_s: float) -> Floats:
+    """The process's answer to a late stem, by Euler steps."""
+    if t.kind == "integrator":
+        return np.asarray(t.gain * step_s * np.cumsum(moved))
+    x, states = moved, []
+    for lag in t.lags_s:
+        y, at = np.empty(x.size), 0.0
+        for k, u in enumerate(x):
+            at += step_s / lag * (u - at)
+            y[k] = at
+        states.append(y)
+        x = y
+    rate = np.diff(x, prepend=0.0) / step_s
+    return np.asarray(t.gain * (x - t.zero_s * rate))

@@ -1,0 +1,123 @@
+"""Simulated step tests read as a night reads them: constants beside the truth, intervals, and signs.
+
+    python -m proofs.step_tests --tests 60 --seed 1
+
+The plant is proofs/step_test_plant.py, which shares no code with the packages. Writes proofs/step_tests.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from analyzer.config import Config
+from analyzer.history.series import Series
+from analyzer.loop.experiments import learned
+from analyzer.loop.quality import prepare
+from analyzer.loops.spec import LoopSpec
+from proofs.step_test_plant import Truth, drawn, recorded
+
+RESULT = Path(__file__).with_suffix(".md")
+WITHIN = {"gain": 0.10, "sum of lags": 0.15, "dead time": 0.30}
+"""Errors that count as right, in terms of the truth; a dead time within a sample too."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One constant of one test: its name, truth, estimate with interval, None where there is no model, and whether it
+    counts as right."""
+
+    name: str
+    truth: float
+    value: float | None
+    low: float
+    high: float
+    right: bool
+
+    @property
+    def holds(self) -> bool:
+        """Whether the interval holds the truth."""
+        return self.value is not None and self.low <= self.truth <= self.high
+
+
+def asked(seed: int) -> tuple[Truth, list[Asked]]:
+    """What the program says of one test, beside the truth."""
+    t = drawn(seed)
+    r = recorded(t, seed)
+    none = np.zeros(r.pv.size, dtype=bool)
+    series = {"T.PV": Series(r.stamp_s, r.pv, none, None), "T.OP": Series(r.stamp_s, r.op, none, None)}
+    spec = LoopSpec("T", pv="T.PV", op="T.OP", pv_lo=0.0, pv_hi=100.0)
+    config = Config()
+    found = learned(spec, series, prepare(spec, series, config.quality), config)
+    model = None if found is None else found.model
+    names = {"gain": t.gain, "sum of lags": sum(t.lags_s), "dead time": t.dead_s}
+    if t.kind == "integrator":
+        del names["sum of lags"]
+    keys = {"gain": "slope_pct_per_s" if t.kind == "integrator" else "gain", "sum of lags": "lags_s"}
+    out = []
+    for name, truth in names.items():
+        e = None if model is None else model.estimates.get(keys.get(name, "dead_time_s"))
+        if e is None:
+            out.append(Asked(name, truth, None, 0.0, 0.0, False))
+            continue
+        near = max(WITHIN[name] * abs(truth), t.sample_s if name == "dead time" else 0.0)
+        out.append(Asked(name, truth, e.value, e.low, e.high, abs(e.value - truth) <= near))
+    return t, out
+
+
+def table(found: list[tuple[Truth, list[Asked]]]) -> Iterator[str]:
+    """The result as lines of Markdown."""
+    every = [a for _, of in found for a in of]
+    yield "| constant | tests | no model | right | interval holds the truth |\n|---|---|---|---|---|"
+    for name, share in WITHIN.items():
+        own = [a for a in every if a.name == name]
+        some = [a for a in own if a.value is not None]
+        right, holds = sum(a.right for a in own), sum(a.holds for a in some)
+        label = f"{name} within {100 * share:.0f} %{' or a sample' if name == 'dead time' else ''}"
+        lost = len(own) - len(some)
+        hold = f"{holds} of {len(some)} ({100 * holds / max(len(some), 1):.0f} %)"
+        yield f"| {label} | {len(own)} | {lost} | {right} ({100 * right / len(own):.0f} %) | {hold} |"
+    gains = [a for a in every if a.name == "gain" and a.value is not None]
+    wrong = sum((a.value or 0.0) * a.truth < 0.0 for a in gains)
+    some = [a for a in every if a.value is not None]
+    yield f"\nIntervals of all constants: {100 * sum(a.holds for a in some) / len(some):.0f} % hold the truth."
+    yield f"Wrong signs: {wrong} of {len(gains)}."
+    yield "\n| by noise over the answer | tests | gain right | lags right | dead time right |\n|---|---|---|---|---|"
+    for low, high in ((0.0, 0.1), (0.1, 0.2), (0.2, 0.34)):
+        part = [of for t, of in found if low <= t.noise < high]
+        cells = []
+        for name in WITHIN:
+            own = [a for of in part for a in of if a.name == name]
+            cells.append(f"{sum(a.right for a in own)} of {len(own)}")
+        yield f"| {low:g} to {high:g} | {len(part)} | {' | '.join(cells)} |"
+
+
+def main() -> None:
+    """Print the table, and write it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--tests", type=int, default=60)
+    parser.add_argument("--seed", type=int, default=1)
+    args = parser.parse_args()
+    found = []
+    for k in range(args.tests):
+        found.append(asked(1000 * args.seed + k))
+        print(k, found[-1][0].kind, [(a.name, a.right, a.holds) for a in found[-1][1]], flush=True)
+    head = f"# Step tests\n\n`python -m proofs.step_tests --tests {args.tests} --seed {args.seed}`\n"
+    about = (
+        "\nLag, two lags, integrator or inverse response; one to six moves of 4 to 8 %; noise of 1 to 33 % of the "
+        "mean answer; in half of the tests a drift of up to 40 % of it; play of 5 to 30 % of a step in two of five "
+        "tests of four moves and more; a sample in 1 to 60 s, forty in the sum of lags at least, for a record needs "
+        "200; stamps that scatter by "
+        "up to 30 % of a sample.\n\n"
+    )
+    text = head + about + "\n".join(table(found)) + "\n"
+    RESULT.write_text(text, encoding="utf-8")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,194 @@
+"""Constants of an experiment against processes stepped by hand, and what is found where nothing answers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identification.errors import NotAssessedError
+from identification.experiments.columns import Kind
+from identification.experiments.find import Course, Experiment, by_hand, in_automatic
+from identification.experiments.model import modelled, pooled, together
+from identification.record import LoopRecord
+from proofs.step_test_plant import behind_play
+
+
+def stepped(op, lags, dead, gain, dt=1.0, fine=20):
+    """A process's answer by Euler steps of a twentieth of a sample."""
+    u = np.repeat(op - op[0], fine)
+    late = round(dead / dt * fine)
+    x = np.concatenate((np.zeros(late), u))[: u.size]
+    for lag in lags:
+        y, at, a = np.empty(x.size), 0.0, dt / fine / lag
+        for k, v in enumerate(x):
+            y[k] = at
+            at += a * (v - at)
+        x = y
+    return gain * x[::fine]
+
+
+def record(pv, op, dt=1.0, sp=None):
+    """A record without a controller, or with its SP."""
+    n = pv.size
+    return LoopRecord(
+        "L", 0.0, dt, np.zeros(n) if sp is None else sp, pv, op, np.zeros(n, bool), sp_estimated=sp is None
+    )
+
+
+def moves(*levels, each=400):
+    """OP held at some levels in turn."""
+    return np.repeat(np.array(levels, float), each)
+
+
+def whole(r, course=Course.STEPS):
+    """All of a record as one experiment."""
+    return Experiment(course, 0, len(r), 3, float(np.ptp(r.op)))
+
+
+NOISE = np.random.default_rng(7).normal(size=8000)
+
+
+def test_nothing_is_told_where_pv_does_not_answer():
+    """Noise alone, white or wandering, tells no model, whatever OP does."""
+    op = moves(40, 45, 38, 44)
+    for noise in (NOISE[: op.size], np.cumsum(NOISE[: op.size])):
+        with pytest.raises(NotAssessedError):
+            modelled(record(50 + noise, op), whole(record(50 + noise, op)))
+
+
+def test_an_on_off_controller_makes_no_experiment():
+    """OP that switches wherever PV crosses two levels is a controller's, not a hand's."""
+    pv, op, y, on = [], [], 50.0, 1.0
+    for k in range(4000):
+        on = 1.0 if y < 48 else 0.0 if y > 52 else on
+        y += (20 + 60 * on - y) / 300.0
+        pv.append(y + 0.01 * NOISE[k])
+        op.append(100 * on)
+    r = record(np.array(pv), np.array(op))
+    assert by_hand(r, np.ones(len(r), bool)) == ()
+
+
+def test_a_set_point_that_is_always_under_way_is_no_experiment():
+    """A slave's set point moves with every sample: no step of it is one."""
+    sp = 50 + np.cumsum(0.1 * NOISE[:2000])
+    assert in_automatic(record(sp + 0.1 * NOISE[2000:4000], sp + 1, sp=sp)) == ()
+
+
+@pytest.mark.parametrize("gain", [1.8, -0.6])
+def test_a_lag_with_dead_time_is_recovered_within_its_intervals(gain):
+    """Steps of a lag of 60 s and 15 s dead time, noise a tenth of the answer: gain within 3 %, lag within 10 %, dead
+    time within 2 s, and all within their intervals but a sample."""
+    op = moves(40, 45, 38, 44)
+    pv = 50 + stepped(op, [60.0], 15.0, gain) + 0.5 * abs(gain) * NOISE[: op.size]
+    m = modelled(record(pv, op), whole(record(pv, op)))
+    e = m.estimates
+    assert e["gain"].value == pytest.approx(gain, rel=0.03)
+    assert e["lags_s"].value == pytest.approx(60.0, rel=0.1)
+    assert e["dead_time_s"].value == pytest.approx(15.0, abs=2.0)
+    assert e["gain"].low <= gain <= e["gain"].high
+    assert m.process.gain * gain > 0
+
+
+def test_two_lags_are_told_from_one():
+    """Lags of 80 and 30 s with little noise come out as two, their sum within 5 %."""
+    op = moves(40, 45, 38, each=800)
+    pv = 50 + stepped(op, [80.0, 30.0], 10.0, 1.5) + 0.05 * NOISE[: op.size]
+    m = modelled(record(pv, op), whole(record(pv, op)))
+    assert m.kind is Kind.TWO_LAGS
+    assert m.estimates["lags_s"].value == pytest.approx(110.0, rel=0.05)
+
+
+def test_drift_is_told_apart_from_gain():
+    """A drift of 2 % of PV an hour leaves the gain as it is, and is told within 5 %."""
+    op = moves(40, 45, 38, 44, each=900)
+    drift = 2.0 * np.arange(op.size) / 3600.0
+    pv = 50 + stepped(op, [60.0], 15.0, 1.0) + drift + 0.1 * NOISE[: op.size]
+    e = modelled(record(pv, op), whole(record(pv, op))).estimates
+    assert e["gain"].value == pytest.approx(1.0, rel=0.03)
+    assert e["drift_pct_per_h"].value == pytest.approx(2.0, rel=0.05)
+
+
+def test_play_is_told_where_op_reverses_once_again():
+    """Play of 1.5 % behind moves 40, 45, 50, 44, 39, 45 is recovered within a quarter, and the gain within 5 %."""
+    op = moves(40, 45, 50, 44, 39, 45)
+    stem = behind_play(op, 1.5, 0.5)
+    pv = 50 + stepped(stem, [40.0], 8.0, 1.2) + 0.1 * NOISE[: op.size]
+    e = modelled(record(pv, op), whole(record(pv, op))).estimates
+    assert e["backlash_pct"].value == pytest.approx(1.5, rel=0.25)
+    assert e["gain"].value == pytest.approx(1.2, rel=0.05)
+
+
+def test_a_neighbour_moves_pv_by_its_own_op():
+    """PV that answers a neighbour's OP too has the own gain within 5 %, and the neighbour's beside it."""
+    op, other = moves(40, 45, 38, 44), np.repeat([50.0, 56, 49, 57, 50, 56, 50, 57], 200)
+    pv = 50 + stepped(op, [50.0], 10.0, 1.0) + stepped(other, [70.0], 0.0, 0.5) + 0.1 * NOISE[: op.size]
+    e = modelled(record(pv, op), whole(record(pv, op)), (other,)).estimates
+    assert e["gain"].value == pytest.approx(1.0, rel=0.05)
+    assert e["neighbour_0_gain"].value == pytest.approx(0.5, rel=0.15)
+
+
+def test_a_single_sample_that_stands_alone_is_left_out():
+    """One PV sample up by 100 % and one OP sample up by 30 % are named and change the constants by less than 1 %."""
+    op = moves(40, 45, 38, 44)
+    pv = 50 + stepped(op, [60.0], 15.0, 1.0) + 0.1 * NOISE[: op.size]
+    clean = modelled(record(pv, op), whole(record(pv, op))).estimates
+    spoilt, spike = pv.copy(), op.copy()
+    spoilt[700] += 100.0
+    spike[1000] += 30.0
+    m = modelled(record(spoilt, spike), whole(record(pv, op)))
+    assert m.lone_pv == (700.0,)
+    assert m.lone_op == (1000.0,)
+    assert m.estimates["gain"].value == pytest.approx(clean["gain"].value, rel=0.01)
+
+
+def warmed(kp=2.0, ti=400.0, gain=4.0, dt=1.0):
+    """A heater of two lags from cold under PI, of which Euler steps of a tenth of a sample are simulated."""
+    x1 = x2 = total = 0.0
+    pv, op = [], []
+    for k in range(2400):
+        y = 30 + x2 + 0.02 * NOISE[k]
+        e = 60.0 - y
+        u = kp * (e + total / ti)
+        held = min(max(u, 0.0), 100.0)
+        total += e * dt if held == u else 0.0
+        pv.append(y)
+        op.append(held)
+        for _ in range(10):
+            x1 += 0.1 * dt * (gain * held - x1) / 200.0
+            x2 += 0.1 * dt * (x1 - x2) / 20.0
+    return np.array(pv), np.array(op), np.full(2400, 60.0)
+
+
+def test_a_heater_that_warms_up_under_control_has_a_positive_gain():
+    """From SP, PV and OP of a warm-up under PI: gain positive and within 15 %, sum of lags within 15 %, though OP
+    falls as PV rises."""
+    pv, op, sp = warmed()
+    r = record(pv, op, sp=sp)
+    (x,) = in_automatic(r)
+    assert x.course is Course.WARM_UP
+    e = modelled(r, x).estimates
+    assert e["gain"].value == pytest.approx(4.0, rel=0.15)
+    assert e["lags_s"].value == pytest.approx(220.0, rel=0.15)
+
+
+def test_experiments_count_by_what_they_tell():
+    """Two numbers of deviations 1 and 3 pool with weights 9 to 1 where they agree; where they differ by more than
+    that, nearly alike (DerSimonian, Laird 1986)."""
+    mean, deviation, weights = together([(10.0, 1.0), (10.5, 3.0)])
+    assert weights == pytest.approx([0.9, 0.1])
+    assert mean == pytest.approx(10.05)
+    assert deviation == pytest.approx(np.sqrt(0.9))
+    assert together([(10.0, 1.0), (30.0, 1.2)])[2] == pytest.approx([0.5, 0.5], abs=0.01)
+
+
+def test_several_experiments_make_one_model():
+    """Two tests of one process pool to a gain nearer than the worse of both, with weights that sum to one."""
+    found = []
+    for scale in (0.2, 1.0):
+        op = moves(40, 45, 38, 44)
+        pv = 50 + stepped(op, [60.0], 15.0, 1.0) + scale * NOISE[: op.size]
+        found.append(modelled(record(pv, op), whole(record(pv, op))))
+    p = pooled(found)
+    assert sum(p.weights) == pytest.approx(1.0)
+    assert p.weights[0] > p.weights[1]
+    assert p.estimates["gain"].value == pytest.approx(1.0, rel=0.03)
