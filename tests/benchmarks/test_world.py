@@ -1,0 +1,69 @@
+"""A small fixed part of benchmarks/world: causes of plain loops, and whether a simulated present is believed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analyzer.config import Config
+from analyzer.history.series import Series
+from analyzer.loop.advice import sought_for
+from analyzer.loop.agreement import agreement
+from analyzer.loop.assess import Assessment, assess
+from analyzer.loop.identified import load_of
+from analyzer.loop.judged_stretch import controller_of
+from analyzer.loop.oscillation import counting
+from analyzer.loop.quality import prepare
+from benchmarks.world.__main__ import spec_of
+from benchmarks.world.draw import Drawn, run
+from benchmarks.world.recorder import recorded
+from benchmarks.world.simulate import BACKLASH, Controller, Process, Valve, sensitivity
+from identification.models import Pid
+
+START_S = 1_772_409_600.0
+PROCESS = Process(1.2, 150.0, 0.0, 15.0)
+TIGHT = Drawn("T", "tight", PROCESS, Controller(11.5, 110.0), Valve(), 21, 0.0, 0.0, 1.0, 0.0)
+MOVED = replace(TIGHT, seed=22, moves=8.0)
+SINE = Drawn("L", "load", PROCESS, Controller(2.5, 150.0), Valve(), 23, 0.0, 260.0, 1.0, 0.0)
+WORN = Drawn("B", "backlash", PROCESS, Controller(3.5, 40.0), Valve(BACKLASH, 3.0), 24, 0.0, 0.0, 1.0, 0.0)
+HEALTHY = Drawn("H", "healthy", PROCESS, Controller(2.5, 150.0), Valve(), 25, 0.0, 0.0, 1.0, 2.0)
+
+
+def assessed(d: Drawn, way: str = "plain") -> tuple[Assessment, Pid]:
+    """What eight hours of a loop come to, and its controller."""
+    r, spec = recorded(run(d, hours=8), way, 1), spec_of(d)
+    stamp, good = START_S + r["stamp_s"], np.zeros(r["pv"].size, dtype=bool)
+    found = {f"{d.name}.{role.upper()}": Series(stamp, r[role], good) for role in ("sp", "pv", "op")}
+    made = prepare(spec, found, Config().quality)
+    pid = controller_of(spec, made)
+    assert pid is not None
+    return assess(made, pid, Config()), pid
+
+
+@pytest.mark.parametrize("way", ["plain", "rows missing"])
+@pytest.mark.parametrize(
+    ("drawn", "cause"), [(HEALTHY, "none"), (SINE, "load"), (TIGHT, "tuning"), (MOVED, "tuning")]
+)
+def test_the_loop_or_its_load_makes_the_cycle(drawn: Drawn, cause: str, way: str) -> None:
+    """A loop of Ms above 4 that rings is tuning's, with set point moves or without; under a sine the same process
+    well tuned has a load's cycle, and without one none; missing rows change nothing."""
+    assert (sensitivity(drawn.process, drawn.controller)[0] > 4.0) == (cause == "tuning")
+    assert assessed(drawn, way)[0].verdict.cause == cause
+
+
+def test_a_simulated_present_is_believed_only_where_it_agrees() -> None:
+    """The identified loop of a worn valve has the recorded period, error and travel; with a derivative that the
+    plant's controller has not it has many times the stem travel, and is not believed."""
+    found, pid = assessed(WORN)
+    cycle, limits = counting(found.oscillations), Config().advice
+    assert cycle is not None
+    assert (found.verdict.cause, found.verdict.fault) == ("valve", "backlash")
+    loop, fit, _ = sought_for(found.verdict, pid, limits)
+    load = load_of(fit, pid)
+    assert agreement(loop, fit, load, cycle.period_s).worst(limits) is None
+    wrong = replace(loop, controller=replace(pid, td_s=20.0, td_filter=0.0))
+    name, ratio = agreement(wrong, fit, load, cycle.period_s).worst(limits) or ("", 0.0)
+    assert "travel" in name
+    assert ratio > 3.0
