@@ -60,20 +60,27 @@ def by_hand(record: LoopRecord, manual: Mask) -> tuple[Experiment, ...]:
 
 def _in_span(record: LoopRecord, first: int, last: int) -> Experiment | None:
     """The experiment of one span in manual, with as much before and after its moves as they last; None where OP or PV
-    stands still, or OP switches wherever PV crosses a level, as an on/off controller does."""
+    stands still, or a controller moves OP whatever the mode says: it switches wherever PV crosses a level, or moves to
+    and fro at most samples."""
     op, pv = record.op[first:last], record.pv[first:last]
     moves = np.flatnonzero(np.diff(op) != 0.0) + 1
     size = float(np.ptp(op))
     if last - first < EXPERIMENTS.samples or size < EXPERIMENTS.least_move or float(np.ptp(pv)) == 0.0:
         return None
     large = moves[np.abs(op[moves] - op[moves - 1]) > EXPERIMENTS.least_part * size]
-    if switched_by_pv(op, pv, moves):
+    if switched_by_pv(op, pv, moves) or _restless(op, moves):
         return None
     span = int(moves[-1] - moves[0])
     reach = max(EXPERIMENTS.reach * span, EXPERIMENTS.samples) if moves.size > 1 else last - first
     begin, end = max(int(moves[0] - reach), 0), min(int(moves[-1] + reach), last - first)
     course = _course(op, moves, large, record.position is not None)
     return Experiment(course, first + begin, first + end, max(large.size, 1), size)
+
+
+def _restless(op: Floats, moves: Places) -> bool:
+    """Whether OP moves up and down at most samples, as neither a hand nor a test does; a ramp moves one way."""
+    up = float((op[moves] > op[moves - 1]).mean()) if moves.size else 1.0
+    return moves.size > EXPERIMENTS.restless * op.size and 0.1 < up < 0.9
 
 
 def switched_by_pv(op: Floats, pv: Floats, moves: Places) -> bool:
