@@ -81,7 +81,7 @@ def require_place(path: Path) -> None:
     """Raise InputError where a store cannot be made at a path: it is a file, or a folder of something else."""
     if not is_remote(path) and path.exists() and not path.is_dir():
         raise InputError(f"--store {path}: a file", "a folder for the results, or none yet", "give a folder")
-    others = sorted(p.name for p in listed(path) if p.name not in OWN and not p.name.startswith("."))
+    others = sorted(p.name for p in listed(path) if p.name not in OWN and p.name[:1] != ".")
     if others and not is_store(path):
         more = f" and {len(others) - 3} more" if len(others) > 3 else ""
         seen = f"--store {path}: a folder that holds {', '.join(others[:3])}{more} and is no store"
@@ -223,7 +223,7 @@ class Store:
     def whole_chunks(self, night: str) -> list[str]:
         """Keys of the chunks whose last piece, that of the table of nights, is there."""
         pieces = (p for p in listed(self.path / "parts" / night) if p.suffix == ".parquet")
-        return sorted(p.stem.removeprefix("nights-") for p in pieces if p.stem.startswith("nights-"))
+        return sorted(p.stem.removeprefix("nights-") for p in pieces if "nights-" in p.stem[:7])
 
     def begun(self) -> list[str]:
         """Nights that were begun and not finished."""

@@ -60,8 +60,8 @@ def by_hand(record: LoopRecord, manual: Mask) -> tuple[Experiment, ...]:
 
 def _in_span(record: LoopRecord, first: int, last: int) -> Experiment | None:
     """The experiment of one span in manual, with as much before and after its moves as they last; None where OP or PV
-    stands still, or a controller moves OP whatever the mode says: it switches wherever PV crosses a level, or moves to
-    and fro at most samples."""
+    stands still, or a controller moves OP whatever the mode says: it switches wherever PV crosses a level, or moves
+    to and fro at most samples."""
     op, pv = record.op[first:last], record.pv[first:last]
     moves = np.flatnonzero(np.diff(op) != 0.0) + 1
     size = float(np.ptp(op))

@@ -181,7 +181,7 @@ MISTAKES = (
     Mistake("a workbook that is cut short", _xlsx, 2, "open it and save it anew"),
     Mistake("loops.csv given as the export", _loops_as_export, 2, "no time column"),
     Mistake("rank before run", _rank_before_run, 2, "run 'triage run EXPORT --store DIR' first"),
-    Mistake("a time zone that does not exist", _wrong_zone, 2, "an IANA name such as Europe/Berlin"),
+    Mistake("a time zone that does not exist", _wrong_zone, 2, "an IANA name such as Europe/Helsinki"),
     Mistake(
         "a span of time that the export does not hold", _outside, 2, "no samples between --since and --until"
     ),

@@ -17,12 +17,6 @@ FLOW = Sketch("none", (1.1, 12.0, 4.0), 0.3, 20.0, kind="flow")
     ("columns", "every", "lack", "said"),
     [
         ("L,0.3,20,0,100", 1, None, "fit for all questions"),
-        (
-            "L,0.3,2,0,100",
-            10,
-            "faster samples",
-            "fit for its figures alone: oscillation needs a sample every",
-        ),
         ("L,0.3,20,0,10000", 1, "OP's range", "fit for all but new settings: OP runs from"),
     ],
 )

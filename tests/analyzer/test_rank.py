@@ -280,7 +280,7 @@ def test_an_empty_lane_is_a_sentence(small, lane, form):
 @pytest.mark.parametrize(
     ("arguments", "fragments"),
     [
-        (["--by", "oscilation"], ["column 'oscilation'", "oscillation_significance", "correct --by"]),
+        (["--by", "oscilation"], ["column 'oscilation'", "one such as oscillating_pct", "correct --by"]),
         (["--night", "1999-01-01"], ["night 1999-01-01", NIGHT, "check --night"]),
     ],
 )
