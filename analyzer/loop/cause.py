@@ -108,7 +108,8 @@ def needed(m: Measured, limits: CauseLimits, oscillating: bool) -> float:
 
 
 def _crossed(m: Measured, limits: CauseLimits) -> bool:
-    """Whether OP goes far enough to move a stem behind a fault of the width found: over all of its range, tails too."""
+    """Whether OP goes far enough to move a stem behind a fault of the width found: over all of its range,
+    tails too."""
     return m.play.valve.stickband <= limits.widest * float(np.ptp(m.window.op))
 
 
