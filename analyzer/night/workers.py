@@ -41,8 +41,9 @@ POLL_S = 0.5
 """How often the clocks of the items in hand are looked at [s]."""
 OUT_OF_TIME = -int(getattr(signal, "SIGXCPU", 24))
 """Exit status of a worker that used up its processor time."""
-NEW_S = 60.0
-"""Age under which a server may not listen yet [s]."""
+NEW_S = 43_200.0
+"""Age up to which the folder of a server stays, for the process that began it may live and remove it itself [s]: longer
+than a night's run, shorter than a day."""
 SERVER_GONE = 255
 """Exit status of workers whose server is gone, which alone knows their own (multiprocessing.popen_forkserver)."""
 
