@@ -46,12 +46,21 @@ def blurred(products: Floats, gains: Floats) -> float:
     return float(gains[1] ** 2 * products[4, 4] / products[3, 3])
 
 
+def _level_by_turns(moved: Floats, inside: Mask, length: int) -> Floats:
+    """The mean of each row over each turn of so many columns, shape of `moved`; those outside are zero."""
+    starts = np.arange(0, max(inside.size - length // 2, 1), max(length, 1))
+    counts = np.maximum(np.add.reduceat(inside.astype(float), starts), 1.0)
+    means = np.add.reduceat(moved, starts, axis=1) / counts
+    return np.repeat(means, np.diff([*starts, inside.size]), axis=1)
+
+
 def increments(
     rows: Floats, out_of_law: Mask, samples: int, step: int = 1, level: bool = False
 ) -> Floats | None:
     """Mean products, shape (5, 5), of increments over so many samples, begun every `step`, of the rows, shape (5, n),
     that span none that is out of the law, less what goes with those of further rows, where there are any; `level`:
-    less their means, for a constant error of PV's makes the integral run away."""
+    less their means over LAW.level_of of them in turn, for an error of SP's or PV's record that stays, as rounding
+    leaves it, makes the integral run away."""
     since = np.cumsum(out_of_law)
     inside = (since[samples::step] == since[:-samples:step]) & ~out_of_law[:-samples:step]
     count = int(np.count_nonzero(inside))
@@ -59,7 +68,7 @@ def increments(
         return None
     moved = (rows[:, samples::step] - rows[:, :-samples:step]) * inside
     if level:
-        moved -= np.outer(moved.sum(axis=1) / count, inside)
+        moved -= _level_by_turns(moved, inside, LAW.level_of * samples // step) * inside
     for feed in moved[5:]:
         moved = _without(moved, feed.copy())
     moved = moved[:5]
