@@ -37,7 +37,7 @@ from analyzer.loop.identified import sensitivity
 from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
-from analyzer.loop.ringing import Ringing
+from analyzer.loop.ringing import Regularity, Ringing
 from identification.errors import NotAssessedError
 from identification.estimation.gauss_newton import descend
 from identification.estimation.irregular_slips import SlipPath, fit_irregular, path_evidence
@@ -177,14 +177,15 @@ def jump_evidence(m: Measured, limits: CauseLimits) -> tuple[float, float]:
 def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> Verdict:
     """The verdict on one loop.
 
-    Of a loop that oscillates the likeliest cause is named where its probability is high enough; the valve's more so,
+    Where the controller's law is known the identified loop tells whether it rings by itself. Else, of a loop that
+    oscillates, the likeliest cause is named where its probability is high enough; the valve's more so,
     and only where PV speaks for its fault, for a valve that is blamed is taken out. Where a
     sign is not known none is.
     """
     if oscillation is None:
         return _quiet(m, limits)
-    bounded = m.kurtosis < limits.kept_size and m.saturated < limits.held
-    if m.ringing is not None and m.ringing.is_tight(m.evidence, bounded, limits):
+    seen_as = Regularity(oscillation.rhythm.first, m.kurtosis, m.saturated >= limits.held)
+    if m.ringing is not None and m.ringing.is_tight(seen_as, m.evidence, limits):
         return _rings(m, m.ringing, oscillation, limits)
     seen = measures(m, oscillation)
     if not np.isfinite(seen).all():
@@ -194,6 +195,8 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
     confidence = {c: 100.0 * p for c, p in found.items()}
     if first is Cause.VALVE and (m.size < limits.least_size or not speaks(m, limits, True)):
         confidence[first] = min(confidence[first], 0.9 * limits.named_pct)
+    if m.ringing is not None:  # the law is known, so the model has said that the loop does not ring by itself
+        confidence[Cause.TUNING] = min(confidence[Cause.TUNING], 0.9 * limits.named_pct)
     cause = first if confidence[first] >= _least(first, m, limits) else Cause.UNDECIDED
     fault = fault_of(m, limits) if cause is Cause.VALVE else Fault.NONE
     return Verdict(cause, confidence, fault, signs_of(m, oscillation, seen), measured=m)

@@ -146,6 +146,7 @@ def measure(
     scale, calm = time_scale(record, oscillation, controller), oscillation is None
     window = window_of(record, scale, limits, kind, calm)
     _check_judged(window, limits)
+    law = controller or recovered(record, scale, limits.law_known)
     controller = controller or recovered(record, scale)
     due = due_to_answer(record, window, scale)
     linear, play, stick, best, gained, jump = _fits(window, scale, due, limits, oscillation)
@@ -173,7 +174,7 @@ def measure(
             return replace(seen_alone, steady=math.inf)
         alone = not record.mask("idle").any()  # else another one moves PV too
         return _without_a_cycle(seen_alone, best, linear, due if alone else None)
-    return _of_a_cycle(seen_alone, best, linear, scale, error)
+    return _of_a_cycle(seen_alone, best, linear, law, error)
 
 
 def ringing_period(m: Measured, limits: CauseLimits) -> float | None:
@@ -189,12 +190,13 @@ def _without_a_cycle(m: Measured, best: Fit, linear: Fit, due: Mask | None) -> M
     return replace(m, steady=0.0 if shown is None else shown.steadiness, asked=asked)
 
 
-def _of_a_cycle(m: Measured, best: Fit, linear: Fit, scale: float, error: Spectrum | None) -> Measured:
-    """What a cycle of this period shows beside: in the load that the fits leave, and in the wave of the error."""
-    dt_s = linear.window.dt_s
+def _of_a_cycle(m: Measured, best: Fit, linear: Fit, law: Pid | None, error: Spectrum | None) -> Measured:
+    """What a cycle of this period shows beside: in the load that the fits leave, in the wave of the error and,
+    where the controller's law is known, in the margins of the loop."""
+    dt_s, scale = linear.window.dt_s, m.scale_s
     found = replace(
         m,
-        ringing=ringing_of(linear, (best,) if m.evidence > 0.0 else (), m.controller, scale),
+        ringing=ringing_of(linear, (best,) if m.evidence > 0.0 else (), law, scale),
         line_linear=_prominence(residual(linear), dt_s, scale),
         line_valve=_prominence(residual(best), dt_s, scale),
         consistency=_consistency(linear, scale),
@@ -285,10 +287,10 @@ def _stem_shown(window: Window, shown: Seen, due: Mask, scale_s: float) -> Fits:
     return linear, play, stick, best, gained, 0.0 if stick is None else math.inf
 
 
-def recovered(record: LoopRecord, scale_s: float) -> Pid | None:
-    """PI settings recovered from the record where they explain OP, None where they do not."""
+def recovered(record: LoopRecord, scale_s: float, least: float = 0.5) -> Pid | None:
+    """PI settings recovered from the record where they explain at least so much of OP's moves [-], None where not."""
     found = fit_pi(record, scale_s)
-    if found is None or found.explained < 0.5 or not math.isfinite(found.ti_s):
+    if found is None or found.explained < least or not math.isfinite(found.ti_s):
         return None
     return Pid(found.kp, found.ti_s, scan_s=record.dt_s)
 

@@ -8,15 +8,25 @@ identification/estimation/smooth_load.py.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from analyzer.config import CauseLimits
 from identification.estimation.smooth_load import SmoothFit, fit_line, fit_smooth, resonant_starts
-from identification.estimation.window import Fit
-from identification.models import Loop, Pid
+from identification.estimation.window import Fit, Window
+from identification.models import Loop, Pid, Process
 from tuning.frequency_response import controller_response, maximum_sensitivity, resonance_s
+
+
+@dataclass(frozen=True, slots=True)
+class Regularity:
+    """How regular a cycle is: height of the first returning peak of the error's autocorrelation [-], kurtosis of the
+    error's band at the period [-], and whether OP reaches a limit in each cycle, which then holds its size."""
+
+    correlation: float
+    kurtosis: float
+    limited: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,15 +47,23 @@ class Ringing:
     line_nat: float
     valve_nat: float
 
-    def is_tight(self, evidence: float, bounded: bool, limits: CauseLimits) -> bool:
-        """Whether the loop itself makes the cycle: it rings at the observed period, and neither a line of the
-        load nor a fault of the valve is needed.
+    def is_tight(self, m: Regularity, evidence: float, limits: CauseLimits) -> bool:
+        """Whether the loop itself makes the cycle: it rings at the observed period, no more regularly than it can,
+        and neither a line of the load nor a fault of the valve is needed.
 
-        evidence, for that fault under a free noise model [nat]; bounded, whether the cycle keeps its size
-        though no limit of OP holds it: noise through a resonance does not (Rice 1945).
+        evidence, for that fault under a free noise model [nat].
         """
         faulty = min(evidence, self.valve_nat) >= limits.evidence
-        return self.rings(limits) and not (bounded or faulty or self.has_line(limits))
+        return self.rings(limits) and not (faulty or self.has_line(limits)) and self.is_as_regular(m, limits)
+
+    def is_as_regular(self, m: Regularity, limits: CauseLimits) -> bool:
+        """Whether the loop makes a cycle as regular as the observed one. Where OP reaches its limit in each cycle,
+        any. Else noise rings through the loop: it does not keep its size (Rice 1945), comes back by exp(-2 pi z) a
+        period under damping z, and its peak is about 1/(2 z)."""
+        if m.limited:
+            return True
+        implied = math.pi / -math.log(min(max(m.correlation, 1e-3), 1.0 - 1e-9))
+        return m.kurtosis >= limits.kept_size and implied <= limits.ringing_decay * self.ms
 
     def has_line(self, limits: CauseLimits) -> bool:
         """Whether the load has a line that keeps its phase."""
@@ -67,6 +85,13 @@ def same_period(predicted_s: float, seen_s: float, limits: CauseLimits) -> bool:
     return abs(math.log(predicted_s / seen_s)) <= math.log(limits.ringing_period)
 
 
+def between_samples(process: Process, window: Window, controller: Pid) -> Process:
+    """The process as the controller sees it. What is fitted holds OP from one sample of the record to the next, while
+    the controller moves it between them: half an interval of that hold belongs to the dead time."""
+    hold_s = max(window.dt_s / window.factor - controller.scan_s, 0.0)
+    return replace(process, dead_time_s=process.dead_time_s + 0.5 * hold_s)
+
+
 def calm_resonance(linear: Fit, controller: Pid | None, scale_s: float) -> tuple[float, float]:
     """Maximum sensitivity [-] of the identified loop of a record without a cycle, and the period [s] of its peak; 1
     without settings, or where they act the wrong way."""
@@ -77,7 +102,7 @@ def calm_resonance(linear: Fit, controller: Pid | None, scale_s: float) -> tuple
     smooth = fit_smooth(window, scale_s, [(b, None) for b in begins])
     if controller.kp * smooth.process.gain <= 0.0:
         return 1.0, scale_s
-    loop = Loop(smooth.process, controller)
+    loop = Loop(between_samples(smooth.process, window, controller), controller)
     return maximum_sensitivity(loop), resonance_s(loop)
 
 
@@ -101,7 +126,7 @@ def ringing_of(
     lined = fit_line(window, period_s, (smooth, away), begins)
     faulty = [fit_smooth(window, period_s, plain, x.valve, smooth) for x in valves]
     best = max((f.log_likelihood for f in faulty), default=-math.inf)
-    loop = Loop(smooth.process, controller)
+    loop = Loop(between_samples(smooth.process, window, controller), controller)
     right_way = controller.kp * smooth.process.gain > 0.0
     return Ringing(
         smooth,
