@@ -21,6 +21,8 @@ class Action(StrEnum):
     RETUNE = "retune"
     REPAIR_VALVE = "repair valve"
     SEE_SOURCE_LOOP = "see source loop"
+    FIND_DISTURBANCE = "find disturbance"
+    CHECK_LIMIT = "check limit"
     CHECK_SETTINGS = "check settings"
     CHECK_MEASUREMENT = "check measurement"
     NEEDS_DATA = "needs data"

@@ -39,6 +39,14 @@ WHY: Mapping[str, str] = tomllib.loads((files("tuning") / "reasons.toml").read_t
 """Why settings are proposed or none, by the cause or by what decided it."""
 
 
+WITHOUT_SETTINGS = {
+    Cause.LOAD: Action.FIND_DISTURBANCE,
+    Cause.UNDECIDED: Action.UNDECIDED,
+    Cause.NONE: Action.NONE,
+}
+"""What to do about a loop whose cause asks for no settings."""
+
+
 @dataclass(frozen=True, slots=True)
 class Proposal:
     """What to do about a loop.
@@ -92,7 +100,7 @@ def recommend(
     """
     _check(cause, load)
     if cause not in (Cause.VALVE, Cause.TUNING):
-        return Proposal(Action.UNDECIDED if cause == Cause.UNDECIDED else Action.NONE, WHY[cause])
+        return Proposal(WITHOUT_SETTINGS[Cause(cause)], WHY[cause])
     kp, slope = loop.controller.kp, loop.process.slope
     if kp * slope <= 0.0:
         return Proposal(Action.CHECK_SETTINGS, WHY["wrong_sign"].format(kp=kp, slope=slope))

@@ -34,7 +34,7 @@ CONSTANTS = ("slope", "time_constant_s", "gain", "dead_time_s", "width", "slip_j
 """Constants that nights pool."""
 OF_VALVE = ("width", "slip_jump")
 """Those of them that a repair changes."""
-FIRST = (Action.CHECK_MEASUREMENT, Action.CHECK_SETTINGS)
+FIRST = (Action.CHECK_MEASUREMENT, Action.CHECK_SETTINGS, Action.CHECK_LIMIT)
 """What is told in the night that finds it: no settings of other nights hold where these are not known."""
 AGAINST = {
     Cause.VALVE: (Action.REPAIR_VALVE, Action.CHECK_SETTINGS),
@@ -315,7 +315,7 @@ def _with_remedy(now: Belief, own: Told, told: Told, limits: BeliefLimits) -> To
             return replace(told, action=Action.REPAIR_VALVE, due=Due.SHUTDOWN)
         if told.cause is Cause.LOAD:
             followed = own.cause is not Cause.LOAD or own.action is Action.SEE_SOURCE_LOOP
-            return replace(told, action=Action.NONE if followed else own.action)
+            return replace(told, action=Action.FIND_DISTURBANCE if followed else own.action)
         return replace(told, action=now.remedy.abstaining)
     action, held = now.remedy.action, now.remedy.held
     if action is Action.RETUNE and held is not None:

@@ -125,6 +125,10 @@ NOTHING_SURER = (None, Action.NONE, Action.NEEDS_DATA, Action.CHECK_SETTINGS)
 """Actions in whose place a doubtful measurement is looked at first: what rests on it is doubtful too."""
 
 
+NOTHING_ELSE = (Action.NONE, Action.UNDECIDED)
+"""Actions in whose place it is found out what holds OP at its limit."""
+
+
 def in_lanes(found: Finding, limits: LaneLimits) -> Finding:
     """A loop with the lanes that its figures put it into."""
     standing = {r.lane for r in RULES if r.stands(found, limits)}
@@ -144,7 +148,9 @@ def action_of(found: Finding) -> Action | None:
         explained = Lane.AT_LIMIT in lanes or _offset(found)
         if asks and not (asks == [Lane.LASTING_ERROR] and explained):
             return Action.CHECK_MEASUREMENT
-    return Action.UNDECIDED if action is Action.NONE and {Lane.AT_LIMIT, Lane.WINDUP} & set(lanes) else action
+    if action in NOTHING_ELSE and {Lane.AT_LIMIT, Lane.WINDUP} & set(lanes):
+        return Action.CHECK_LIMIT
+    return action
 
 
 def lanes_in(row: Mapping[str, Any]) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from identification.models import Loop, Pid
 from identification.record import Floats
 from tuning.frequency_response import integral_s, is_stable
 from tuning.limit_cycle import Cycle, confirm
-from tuning.recommend import Proposal, recommend
+from tuning.recommend import WITHOUT_SETTINGS, Proposal, recommend
 from tuning.search import rounded
 
 SAID = sentences("settings")
@@ -140,7 +140,7 @@ def withheld(
     if found.needs is not None:
         return _lacking(found.needs)
     if verdict.cause in (Cause.NONE, Cause.LOAD):
-        return Advice(Action.NONE)
+        return Advice(WITHOUT_SETTINGS[verdict.cause])
     if counting(found.oscillations) is None:
         at_fault = verdict.cause is Cause.VALVE
         return (

@@ -21,7 +21,7 @@ from analyzer.lanes.standing import standing
 from analyzer.loop.advice import Advice, advise
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.conclusion import Lost, concluded
-from analyzer.loop.decisions import Action, Cause, Cell, Finding, Lack, LacksError, Need, Needs, Status
+from analyzer.loop.decisions import Cell, Finding, Lack, LacksError, Need, Needs, Status
 from analyzer.loop.experiments import learned
 from analyzer.loop.experiments_row import by_experiment, with_experiment
 from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
@@ -43,10 +43,7 @@ from analyzer.store.table import naming, rows_table, write_table
 from analyzer.words import units as words
 from identification.errors import NotAssessedError, TriageError
 from reports.page_file import dumps
-
-HISTORY = {Cause.NONE: Action.NONE, Cause.LOAD: Action.NONE, Cause.UNDECIDED: Action.UNDECIDED}
-"""Actions of nights that are not the last, empty for the others: settings are advised on for tomorrow, not for the
-week before."""
+from tuning.recommend import WITHOUT_SETTINGS
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +89,7 @@ def assess_loop(
     stated = controller_of(spec, prepared)
     found = assess(prepared, stated, config, spec.type, earlier)
     if not advising:
-        return found, Advice(HISTORY.get(found.verdict.cause))
+        return found, Advice(WITHOUT_SETTINGS.get(found.verdict.cause))  # settings are for tomorrow alone
     pair = None
     if held is not None and held[0] == (spec.kp, spec.ti):
         kp, ti = held[1]

@@ -42,8 +42,8 @@ POLL_S = 0.5
 OUT_OF_TIME = -int(getattr(signal, "SIGXCPU", 24))
 """Exit status of a worker that used up its processor time."""
 NEW_S = 43_200.0
-"""Age up to which the folder of a server stays, for the process that began it may live and remove it itself [s]: longer
-than a night's run, shorter than a day."""
+"""Age up to which the folder of a server stays [s], for the process that began it may live and remove it itself:
+longer than a night's run, shorter than a day."""
 SERVER_GONE = 255
 """Exit status of workers whose server is gone, which alone knows their own (multiprocessing.popen_forkserver)."""
 

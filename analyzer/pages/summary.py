@@ -59,6 +59,7 @@ def _work(row: words.Row) -> set[str]:
         Action.CHECK_MEASUREMENT: "measurement",
         Action.CHECK_SETTINGS: "unstated" if None in (row["kp"], row["ti"]) else "settings",
         Action.NEEDS_DATA: "halve" if tuning else "",
+        Action.FIND_DISTURBANCE: "disturbance",
     }
     at_limit = Lane.AT_LIMIT in lanes_in(row) and not tuning
     winds_up = Lane.WINDUP in lanes_in(row)

@@ -53,11 +53,8 @@ def _case(row: Row) -> str:
     action = Action(row["action"])
     if action is Action.REPAIR_VALVE and not _stroke(row)[1]:
         return "dead valve"
-    if action is Action.NONE and row["cause"] == Cause.LOAD:
-        return "moved from outside"
-    if action is Action.UNDECIDED and row["cause"] == Cause.NONE:
-        return next((str(x) for x in (Lane.AT_LIMIT, Lane.WINDUP) if x in lanes_in(row)), action)
-    return action
+    winds_up = Lane.WINDUP in lanes_in(row) and Lane.AT_LIMIT not in lanes_in(row)
+    return "winds up" if action is Action.CHECK_LIMIT and winds_up else action
 
 
 def _expected(row: Row) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from analyzer.columns import GROUPS, Row, names
-from analyzer.loop.decisions import Action, Cause, GroupRole
+from analyzer.loop.decisions import GroupRole
 from analyzer.store.store import Store
 from analyzer.store.table import no_column
 
@@ -61,10 +61,7 @@ class GroupView:
         source = self.source
         if source is None:
             return ""
-        own = self.loops[source["loop"]]
-        if own["action"] in (Action.NONE, None, "") and own["cause"] == Cause.LOAD:
-            return "look for the load that enters here"
-        return str(own["action"] or "")
+        return str(self.loops[source["loop"]]["action"] or "")
 
 
 def read_groups(store: Store, night: str) -> list[GroupView]:

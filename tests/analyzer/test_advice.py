@@ -136,12 +136,12 @@ def test_units_and_form_of_the_plant(pipe):
 
 
 def test_load_is_left_alone():
-    """A loop that a machine swings gets action none and no settings."""
+    """A loop that a machine swings gets the action to find the disturbance, and no settings."""
     found = assessed(SWUNG)
     advice = settings(found, SWUNG)
     assert found.verdict.cause == "load"
-    assert (advice.action, advice.kp_new, advice.ti_new) == ("none", None, None)
-    assert propose(found.verdict, SWUNG.controller, 300.0, CONFIG).proposal.action == "none"
+    assert (advice.action, advice.kp_new, advice.ti_new) == ("find disturbance", None, None)
+    assert propose(found.verdict, SWUNG.controller, 300.0, CONFIG).proposal.action == "find disturbance"
 
 
 def test_no_cause_no_settings(pipe):

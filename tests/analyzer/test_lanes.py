@@ -198,8 +198,8 @@ def test_an_op_that_rests_at_its_limit_is_not_nothing_to_do():
     row = {"status": "ok", "action": "none", "cause": "none", "loop": "TIC1", "lanes": "at limit"}
     lanes = (Lane.AT_LIMIT, Lane.LASTING_ERROR)
     idle = Finding("TIC1", "2026-03-02", Status.OK, remedy=Remedy(Action.NONE))
-    assert action_of(replace(idle, lanes=lanes)) is Action.UNDECIDED
+    assert action_of(replace(idle, lanes=lanes)) is Action.CHECK_LIMIT
     assert action_of(idle) is Action.NONE
-    (_, do), (_, look), _ = work_order({**row, "action": "undecided"})
+    (_, do), (_, look), _ = work_order({**row, "action": "check limit"})
     assert "limit" in do
     assert "valve's size" in look

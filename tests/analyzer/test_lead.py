@@ -119,7 +119,7 @@ def test_a_loop_that_swings_from_limit_to_limit_is_not_sent_to_the_valves_size()
     """Of a loop too tight for its process that rests at a limit half of the time, an interim step is told, not the
     valve's size; of a calm loop at its limit the valve's size is."""
     tight = row("CH3", 60.0, action="needs data", cause="tuning", lanes="oscillation, at limit")
-    still = row("TIC2", 0.0, action="undecided", lanes="at limit")
+    still = row("TIC2", 0.0, action="check limit", lanes="at limit")
     said = first_things([tight, still])
     assert said[0].startswith("Halve the gain of CH3 or go to manual")
     assert said[1] == "See why OP of TIC2 rests at its limit: valve size, or what feeds it."

@@ -126,7 +126,7 @@ def test_a_loop_that_winds_up_is_to_be_set_right() -> None:
     assert told.lanes == (Lane.WINDUP,)
     from analyzer.words.reason import reason
 
-    assert action_of(told) is Action.UNDECIDED
+    assert action_of(told) is Action.CHECK_LIMIT
     assert "winds up while PIC1 has the valve, takes it back 75 s late" in reason(told)
 
 

@@ -244,7 +244,7 @@ def test_robust_loop_is_not_called_tight():
 def test_load_is_left_alone():
     """A load gets no settings."""
     p = recommend(STUDY, "load")
-    assert (p.action, p.controller) == ("none", None)
+    assert (p.action, p.controller) == ("find disturbance", None)
     assert "Look upstream" in p.reason
 
 
