@@ -74,7 +74,10 @@ def test_folders_of_dead_servers_go(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     with socket.socket(socket.AF_UNIX) as alive:
         alive.bind("pymp-alive/listener-x")
         alive.listen()
+        alive.settimeout(0.0)
         workers._forget_dead_servers(Path())
+        with pytest.raises(BlockingIOError):  # nobody has asked it anything, which would end it
+            alive.accept()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["pymp-alive", "pymp-other"]
 
 
