@@ -11,8 +11,9 @@ import numpy as np
 
 from analyzer.config import Config
 from analyzer.history.series import Series
-from analyzer.loop.assess import convicted
-from analyzer.loop.oscillation import counting, detect
+from analyzer.loop.assess import judged_where
+from analyzer.loop.cycling_span import detect_where_it_cycles
+from analyzer.loop.oscillation import counting
 from analyzer.loop.quality import prepare
 from analyzer.loops.spec import LoopSpec
 from proofs.common import command, command_line, publish, table
@@ -30,8 +31,8 @@ def judged(case: tuple[str, int]) -> tuple[str, bool, bool]:
     spec = LoopSpec("L", sp="L.SP", pv="L.PV", op="L.OP", pv_lo=0.0, pv_hi=100.0)
     config = Config()
     prepared = prepare(spec, series, config.quality)
-    seen = detect(prepared.record, config.oscillation)
-    found, verdict = convicted(prepared, seen, None, config, "")
+    seen, span = detect_where_it_cycles(prepared.record, config.oscillation)
+    found, verdict = judged_where(prepared, seen, span, None, config, "")
     claimed = counting(found) is not None
     return family, claimed, verdict.cause == "valve"
 

@@ -15,8 +15,9 @@ import numpy as np
 
 from analyzer.config import Config
 from analyzer.history.series import Series
-from analyzer.loop.assess import convicted
-from analyzer.loop.oscillation import counting, detect
+from analyzer.loop.assess import judged_where
+from analyzer.loop.cycling_span import detect_where_it_cycles
+from analyzer.loop.oscillation import counting
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loops.spec import LoopSpec
 from identification.models import Pid
@@ -44,8 +45,8 @@ def judged(seed: int) -> tuple[str, bool, bool, bool, str]:
     """Cause, whether it shows, whether it is clear, whether oscillation is found, cause named."""
     drawn, config = draw(seed), Config()
     prepared, stated = recorded(drawn, config)
-    seen = detect(prepared.record, config.oscillation)
-    found, said = convicted(prepared, seen, stated, config, drawn.kind)
+    seen, span = detect_where_it_cycles(prepared.record, config.oscillation)
+    found, said = judged_where(prepared, seen, span, stated, config, drawn.kind)
     return drawn.truth["cause"], shows(drawn), clear(drawn), counting(found) is not None, said.cause
 
 

@@ -20,13 +20,14 @@ from analyzer.config import AdviceLimits, Config
 from analyzer.history.plant_clock import stamp
 from analyzer.history.series import Series
 from analyzer.limits import EXPLAIN
-from analyzer.loop.assess import convicted
+from analyzer.loop.assess import judged_where
 from analyzer.loop.cause import NO_CAUSE, Verdict
+from analyzer.loop.cycling_span import detect_where_it_cycles
 from analyzer.loop.decisions import Cause, Fault
 from analyzer.loop.experiments import Learned, learned
 from analyzer.loop.fitness import pv_that_jumps
 from analyzer.loop.identified import intervals
-from analyzer.loop.oscillation import counting, detect
+from analyzer.loop.oscillation import counting
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loop.sample_clock import onto_clock, snapped
 from analyzer.loops.changes import TuningChange, in_force
@@ -109,9 +110,9 @@ def seen_in_cycles(verdict: Verdict, limits: AdviceLimits) -> SeenInCycles | Non
 
 def verdict_on(spec: LoopSpec, prepared: Prepared, config: Config) -> Verdict:
     """What a night would say of the whole recording: why it oscillates, or of which valve it rests."""
-    seen = detect(prepared.record, config.oscillation)
+    seen, span = detect_where_it_cycles(prepared.record, config.oscillation)
     stated = controller(spec, prepared.scale.span)
-    found, said = convicted(prepared, seen, stated, config, spec.type)
+    found, said = judged_where(prepared, seen, span, stated, config, spec.type)
     return said if counting(found) is not None or said.cause is Cause.VALVE else NO_CAUSE
 
 

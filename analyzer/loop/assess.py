@@ -24,6 +24,7 @@ from analyzer.loop.cause import (
     told_slip_by_slip,
     with_dead_valve,
 )
+from analyzer.loop.cycling_span import Span, detect_where_it_cycles
 from analyzer.loop.decisions import Cause, Lack, LacksError, Need, Needs
 from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
 from analyzer.loop.judged_stretch import Earlier, Stretch, differing, judged_stretch
@@ -210,17 +211,30 @@ def _judge_stretch(prepared: Prepared, stretch: Stretch, config: Config, kind: s
     """The verdict on the stretch that is judged; one that rests on little is a hint."""
     record = prepared.record
     part = replace(prepared, record=record.span(stretch.first, stretch.last))
-    of_all = detect(record, config.oscillation)
-    whole = len(part.record) == len(record)
-    found = of_all if whole else detect(part.record, config.oscillation)
+    of_all, span = detect_where_it_cycles(record, config.oscillation)
+    whole, found = len(part.record) == len(record), of_all
+    if not whole:
+        found, span = detect_where_it_cycles(part.record, config.oscillation)
     stated, settings = stretch.controller, None
     if stated is not None and part.op_known and not stretch.outdated:
         scale = time_scale(part.record, counting(found), stated)
         settings = differing(part.record, stated, scale, config.settings)
-    found, verdict = convicted(part, found, settings or stated, config, kind)
+    found, verdict = judged_where(part, found, span, settings or stated, config, kind)
     if _hours_in(part.record) < config.advice.least_h or too_thin(record.dt_s, settings or stated, config):
         verdict = as_hint(verdict, config.advice.hint_pct)
     return _Judged(part, found if whole else of_all, found, verdict, settings)
+
+
+def judged_where(
+    part: Prepared, found: Oscillations, span: Span, controller: Pid | None, config: Config, kind: str
+) -> tuple[Oscillations, Verdict]:
+    """What oscillates and why, by the span in which it is on."""
+    if span == (0, len(part.record)):
+        return convicted(part, found, controller, config, kind)
+    cycling = replace(part, record=part.record.span(*span))
+    own = detect(cycling.record, config.oscillation)
+    seen, verdict = convicted(cycling, own, controller, config, kind)
+    return found if seen is own else seen, verdict
 
 
 def _hours_in(record: LoopRecord) -> float:

@@ -95,19 +95,6 @@ class Measured:
         return self.linear.window
 
 
-def _op_range(window: Window, scale_s: float, oscillating: bool) -> float:
-    """Range of OP that a fault is compared with [% OP]: within two periods where it oscillates, else of all."""
-    whole = window.op_range
-    if not oscillating:
-        return whole
-    length = max(round(2 * scale_s / window.dt_s * window.factor), 2)
-    rows = window.op.size // length
-    if rows < 2:
-        return whole
-    local = np.ptp(window.op[: rows * length].reshape(rows, length), axis=1)
-    return min(whole, float(np.quantile(local, 0.75)))
-
-
 def _prominence(x: Floats, dt_s: float, period_s: float) -> float:
     s = spectrum(x, dt_s)
     return peak_prominence(tapered_power(s), s.duration_s / period_s)
@@ -151,7 +138,6 @@ def measure(
     due = due_to_answer(record, window, scale)
     linear, play, stick, best, gained, jump = _fits(window, scale, due, limits, oscillation)
     hopeless = oscillation is None and gained < _hopeful(window, due, limits)
-    op_range = _op_range(window, scale, oscillation is not None)
     amplification, stable = _amplification(linear.process, controller, scale)
     fine_linear, fine_play, fine_stick = _refined((linear, play, stick), best, hopeless)
     seen_alone = Measured(
@@ -159,7 +145,7 @@ def measure(
         play=fine_play,
         stick_slip=fine_stick,
         evidence=gained,
-        size=best.valve.stickband / max(op_range, 1e-9),
+        size=best.valve.stickband / max(window.cycle_range, 1e-9),
         jump=jump,
         amplification=amplification,
         stable=stable,
@@ -265,8 +251,8 @@ def _candidate_fits(
         return linear, play, None, play, gained, 0.0
     linear = better_linear(linear, play)
     best, stick, jump = play, None, 0.0
-    wide = play.valve.stickband > 0.25 * window.op_range
-    if short or (wide and (oscillation is not None or gained >= limits.evidence)):
+    wide = play.valve.stickband > 0.25 * window.reach
+    if short or oscillation is not None or (wide and gained >= limits.evidence):
         stick = fit_stick_slip(play, scale_s)
         jump = evidence(stick, play)
         jump -= max(play.log_likelihood - stick.log_likelihood, 0.0)
@@ -381,6 +367,7 @@ def window_of(
         position=stem,
         first=first,
         sp=None if part.sp_estimated or not np.ptp(part.sp) else block_means(part.sp, factor),
+        turn=0 if calm else max(round(2 * scale_s / record.dt_s), 2),
     )
 
 

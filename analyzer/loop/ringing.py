@@ -51,9 +51,12 @@ class Ringing:
         """Whether the loop itself makes the cycle: it rings at the observed period, no more regularly than it can,
         and neither a line of the load nor a fault of the valve is needed.
 
-        evidence, for that fault under a free noise model [nat].
+        evidence, for that fault under a free noise model [nat]; a fault that explains less than a line of the load
+        is neither.
         """
-        faulty = min(evidence, self.valve_nat) >= limits.evidence
+        faulty = min(evidence, self.valve_nat) >= max(limits.evidence, self.line_nat)
+        if math.isinf(self.ms) and m.limited:  # it must cycle, whatever the load does
+            return self.rings(limits) and not faulty
         return self.rings(limits) and not (faulty or self.has_line(limits)) and self.is_as_regular(m, limits)
 
     def is_as_regular(self, m: Regularity, limits: CauseLimits) -> bool:

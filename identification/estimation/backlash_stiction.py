@@ -76,7 +76,7 @@ def fit_play(linear: Fit, period_s: float, hopeful: float | None = None) -> Fit:
     enough.
     """
     window = linear.window
-    reach = max(window.op_range, 1e-9)
+    reach = window.reach
     screened = [sticking(share * reach, 0.0) for share in FIT.screen_shares]
     followed = len(screened) if hopeful is None else 1
     best = _likeliest(_chosen(linear, screened, period_s, followed))
@@ -114,7 +114,7 @@ def fit_stick_slip(play: Fit, period_s: float) -> Fit:
 
 def _coarse(play: Fit) -> list[StemLaw]:
     """Stickbands up to OP's range, with stems that rest and stems that slide."""
-    reach = max(play.window.op_range, 1e-9)
+    reach = play.window.reach
     near = play.valve.stickband / reach
     widths = {round(s, 4) for s in FIT.middle + FIT.large} | {near, 1.1 * near}
     return [

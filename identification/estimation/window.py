@@ -52,7 +52,8 @@ class Window:
     load steps, 0 where it does not; position : stem [% OP], shape of op, where recorded or, `decoded`, told from PV;
     fine : whether responses are stepped at the record's own interval rather than in blocks. Within a block OP
     answers PV's noise, which a fine response meets where the dead time is shorter than the block; in blocks it counts
-    from the next one on. first : sample of its record that it begins at.
+    from the next one on. first : sample of its record that it begins at. turn : samples of
+    OP in two periods of a cycle, 0 where there is none.
     """
 
     y: Floats
@@ -68,6 +69,7 @@ class Window:
     decoded: bool = False
     first: int = 0
     sp: Floats | None = None
+    turn: int = 0
 
     @cached_property
     def extra(self) -> Floats:
@@ -127,6 +129,22 @@ class Window:
         """Range of OP without its 2 % tails [% OP]."""
         low, high = np.quantile(self.op, [0.02, 0.98])
         return float(high - low)
+
+    @cached_property
+    def cycle_range(self) -> float:
+        """Range of OP within two periods where it cycles [% OP], else of all: moves of the set point take OP farther
+        than any cycle."""
+        rows = self.op.size // self.turn if self.turn else 0
+        if rows < 2:
+            return self.op_range
+        local = np.ptp(self.op[: rows * self.turn].reshape(rows, self.turn), axis=1)
+        return min(self.op_range, float(np.quantile(local, 0.75)))
+
+    @cached_property
+    def reach(self) -> float:
+        """Range of OP that widths are sought up to [% OP]: of all, unless its cycle is far smaller."""
+        whole, cycle = self.op_range, self.cycle_range
+        return max(cycle if cycle < FIT.far_smaller * whole else whole, 1e-9)
 
 
 def block_means(x: Floats, factor: int) -> Floats:
