@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 from pathlib import Path
@@ -101,23 +102,29 @@ def rank(
 @main.command()
 @options.export_options
 @options.of_loop("The loop to tune.")
+@options.DECIDED
+@options.formats("text", "json")
 @click.option("--out", type=options.FOLDER, help="Directory for pictures, and a page to try settings on.")
-def tune(asked: Asked, tag: str, out: Path | None) -> None:
-    """One loop: model, limit cycle predicted, new Kp and Ti with reasons, forecast, travel map.
+def tune(asked: Asked, tag: str, store: Path | None, form: str, out: Path | None) -> None:
+    """One loop: what the night decided, model, limit cycle predicted, new Kp and Ti, forecast, travel map.
 
-    Example: triage tune export.parquet --loops loops.csv --loop LIC2107 --out pictures
+    Example: triage tune export.parquet --loops loops.csv --loop LIC2107 --store store --out pictures
     """
     from analyzer.loop.tune import proposal
     from analyzer.night.asked import guarded
+    from reports.plain import json_ready
 
-    check_lines, pictures = proposal(guarded(asked).last_night(tag), out is not None)
-    for line in check_lines:
-        say(line)
+    one = guarded(asked).last_night(tag)
+    told = proposal(one, options.decision(one, store), out is not None)
+    if form == "json":
+        click.echo(json.dumps(json_ready(told.as_data())))
+    else:
+        say("\n".join(told.lines))
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
-        for name, picture in pictures.items():
+        for name, picture in told.pictures.items():
             (out / name).write_bytes(picture)
-            click.echo(f"written: {out / name}")
+            click.echo(f"written: {out / name}", err=form == "json")
 
 
 @main.command()

@@ -9,6 +9,7 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+import numpy as np
 from rich.cells import cell_len, chop_cells
 
 from reports.pages import Block, Cell, Column, Facts, Listing, Page, Table, Text, Tiles
@@ -139,3 +140,16 @@ def _line(cells: Sequence[str], columns: Sequence[Column], sizes: Sequence[int])
         space = " " * (size - cell_len(text))
         filled.append(space + text if column.numeric else text + space)
     return f" {GAP.join(filled)}".rstrip()
+
+
+def json_ready(x: Any) -> Any:
+    """The same with numbers that JSON knows: no NaN, no infinity, no numpy types."""
+    if isinstance(x, dict):
+        return {str(k): json_ready(v) for k, v in x.items()}
+    if isinstance(x, list | tuple):
+        return [json_ready(v) for v in x]
+    if isinstance(x, np.generic):
+        x = x.item()
+    if isinstance(x, float):
+        return float(f"{x:.6g}") if math.isfinite(x) else None
+    return x

@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from analyzer.commands.options import (
+    DECIDED,
     FILE,
     FOLDER,
     NOTHING_DONE,
     PLACE,
+    decision_of,
     export_options,
     formats,
     of_loop,
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
 @export_options
 @of_loop("Loop to explain.")
 @click.option("--model", type=FILE, help="Your own saved model: judged beside the refitted one.")
+@DECIDED
 @click.option(
     "--held-out",
     multiple=True,
@@ -48,18 +51,20 @@ if TYPE_CHECKING:
 def explain(
     asked: Asked,
     tag: str,
+    store: Path | None,
     model: Path | None,
     held_out: tuple[Path, ...],
     save_model: Path | None,
     form: str,
     out: Path | None,
 ) -> None:
-    """Where recording and plain simulation differ, which physics was left out, and how much it explains.
+    """What the night decided; where recording and plain simulation differ, which physics was left out, and how much
+    it explains.
 
     Example: triage explain export.parquet --loops loops.csv --loop FIC101
     """
     from analyzer.explain.case import asked_cases
-    from analyzer.explain.explained import abstained, explained
+    from analyzer.explain.explained import abstained, explained, with_decision
     from analyzer.explain.models import read_model
     from analyzer.explain.page import abstention, explanation_page
 
@@ -67,7 +72,7 @@ def explain(
         with trying() as tell:
             brought = read_model(model, tag) if model is not None else None
             case, others = asked_cases(asked, tag, held_out)
-            found = explained(case, tell, brought, others)
+            found = with_decision(explained(case, tell, brought, others), decision_of(asked, tag, store))
     except NotAssessedError as error:
         data = abstained(tag, str(error))
         _show(data, lambda: abstention(data), form, out)

@@ -8,7 +8,7 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import reduce, wraps
 from io import TextIOWrapper
 from pathlib import Path
@@ -17,11 +17,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from analyzer.places import is_outage, place, refused
-from identification.errors import InputError, TriageError
+from identification.errors import InputError, NotAssessedError, TriageError
 from reports.texts import visible, visible_lines
 from reports.whole_file import is_full
 
 if TYPE_CHECKING:
+    from analyzer.columns import Row
+    from analyzer.night.asked import Asked
+    from analyzer.night.nights import PlantLoop
     from analyzer.store.store import Store
 
 Command = Callable[..., Any]
@@ -143,6 +146,28 @@ def opened_store(path: Path) -> Store:
     kept = Store(path)
     kept.require()
     return kept
+
+
+DECIDED = click.option(
+    "--store", type=PLACE, help="Store whose nights decide; default: the last night of the export alone."
+)
+
+
+def decision(one: PlantLoop, store: Path | None) -> Row:
+    """What the night of a loop decided of it, by a store or by that night alone."""
+    from analyzer.night.decided import decided
+
+    assert one.night is not None  # asked for by night
+    return decided(one.plant, one.night, one.spec.loop, None if store is None else opened_store(store))
+
+
+def decision_of(asked: Asked, loop: str, store: Path | None) -> Row | None:
+    """The same of a loop's last night in an export; None where that night has too little of it."""
+    from analyzer.night.asked import guarded
+
+    with suppress(NotAssessedError):
+        return decision(guarded(asked).last_night(loop), store)
+    return None
 
 
 TIMES = ("%Y-%m-%d", *(f"%Y-%m-%d{between}%H:%M{end}" for between in "T " for end in (":%S", "")))

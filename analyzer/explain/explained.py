@@ -5,16 +5,17 @@ The data are the contract of `triage explain --format json`; text, page and stor
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from analyzer.columns import Row
 from analyzer.explain.case import Case
 from analyzer.explain.models import SCALE, Brought, judged, plain_start, rescaled, span_note
 from analyzer.loop.experiments import Learned
+from analyzer.words.decision import as_data as decision_data
 from analyzer.words.experiments import in_a_clause
 from identification.controller.pi_regression import ControlLaw
 from identification.controller.pid_regression import integral_time
@@ -24,6 +25,7 @@ from identification.mismatch.explanation import Explanation, proven_on
 from identification.mismatch.model_file import to_data
 from identification.mismatch.recording import Recording
 from identification.mismatch.words import reason
+from reports.plain import json_ready
 
 TOLD_IN_REASON = ("note", "caution", "shown", "outside")
 """Parts of an answer that the data have in their reason, and by a key of its own where there is such physics."""
@@ -86,6 +88,13 @@ def explained(
     return Explained(c, found, said, data, own)
 
 
+def with_decision(found: Explained, decision: Row | None) -> Explained:
+    """The same with what the night decided of the loop, to which the physics may only add."""
+    if decision is None:
+        return found
+    return replace(found, data=found.data | {"night": json_ready(decision_data(decision))})
+
+
 def experiment_data(of: Learned) -> dict[str, Any]:
     """What experiments tell: kind of answer, constants with 90 % intervals, and the courses that tell them."""
     model = of.model
@@ -129,19 +138,6 @@ def law_data(law: ControlLaw | None, dt_s: float) -> dict[str, Any]:
         return {}
     ti_s = integral_time(law.kp, law.ki, law.residual.size) * dt_s
     return json_ready({"controller": {"kp": law.kp, "ti_s": ti_s, "explained": law.explained}})
-
-
-def json_ready(x: Any) -> Any:
-    """The same with numbers that JSON knows: no NaN, no infinity, no numpy types."""
-    if isinstance(x, dict):
-        return {str(k): json_ready(v) for k, v in x.items()}
-    if isinstance(x, list | tuple):
-        return [json_ready(v) for v in x]
-    if isinstance(x, np.generic):
-        x = x.item()
-    if isinstance(x, float):
-        return float(f"{x:.6g}") if math.isfinite(x) else None
-    return x
 
 
 def abstained(loop: str, reason: str) -> dict[str, Any]:

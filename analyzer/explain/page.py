@@ -9,6 +9,7 @@ from analyzer.explain.explained import Explained
 from analyzer.explain.words import NOTES, Data, number_text, places, rms, share, title
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.pages.words import duration, number, stamp
+from analyzer.words.decision import decided
 from identification.mismatch.words import check, located_sentence, remarks
 from reports.pages import Block, Facts, Page, Section, Table, Text, Tiles
 from reports.texts import slug
@@ -70,7 +71,8 @@ def _footer(e: Explained) -> str:
 
 def _verdict_blocks(e: Explained) -> tuple[Block | None, ...]:
     brought = None if e.brought is None else Text((e.brought.note,))
-    return Text((e.data["reason"],), "lead"), Text((check(e.data),)), brought, Tiles(tuple(_tiles(e)))
+    night = Text((decided(e.data),)) if "night" in e.data else None
+    return Text((e.data["reason"],), "lead"), night, Text((check(e.data),)), brought, Tiles(tuple(_tiles(e)))
 
 
 def _tiles(e: Explained) -> list[tuple[str, str, str]]:

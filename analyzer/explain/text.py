@@ -9,6 +9,7 @@ from typing import Any
 from analyzer.explain import words
 from analyzer.explain.words import places, share, title
 from analyzer.pages.words import number
+from analyzer.words.decision import decided
 from identification.mismatch.words import check, remarks
 from reports.pages import Table
 
@@ -22,7 +23,7 @@ def answer_lines(data: Mapping[str, Any]) -> list[str]:
     fit = data["fit"]
     head = f"{data['loop']}: {title(data['verdict']) if fit else 'not told'}"
     block = f" ({data['block']})" if data["block"] != "none" else ""
-    out = [head + block, *wrap(data["reason"], WIDTH), *wrap(check(data), WIDTH)]
+    out = [head + block, *wrap(decided(data), WIDTH), *wrap(data["reason"], WIDTH), *wrap(check(data), WIDTH)]
     out += _part("Parameters (90 % intervals)", _texts(words.parameters(data)), (2,))
     out += _part("Controller, as SP, PV and OP show it", _controller_rows(data), (1,))
     simulations = _headed(("", "fitted", "fit %", "held out", "fit %"), _texts(words.misfits(data)))

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from analyzer.columns import Row
 from analyzer.config import AdviceLimits, Config
 from analyzer.limits import EXPLAIN
 from analyzer.loop.advice import Advice, propose, sought_for, withheld
 from analyzer.loop.assess import Assessment, assess
-from analyzer.loop.decisions import Action, Cause, Need, Needs
+from analyzer.loop.decisions import Action, Cause, Need, Needs, Status
 from analyzer.loop.experiments import Learned, learned
 from analyzer.loop.fitness import at_limits, unfit_for_cause
 from analyzer.loop.identified import intervals, load_of, tuned
+from analyzer.loop.judged_stretch import controller_of
 from analyzer.loop.sample_clock import onto_clock
 from analyzer.loop.settings_side_by_side import compared, middle_ti
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import experiments
+from analyzer.words.decision import as_data, decision_lines
 from analyzer.words.reason import sign_in_full
 from analyzer.words.units import number
 from identification.errors import InputError, NotAssessedError
@@ -75,9 +78,16 @@ def identified(found: Assessment, limits: AdviceLimits) -> tuple[Process, Valve,
     return tuned(fit, at_fault, limits), valve, intervals(fit, at_fault, limits)
 
 
-def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None) -> Tuning:
+def tune(
+    found: Assessment,
+    controller: Pid,
+    config: Config,
+    kept: Advice | None,
+    decided: tuple[Action, Pid | None] | None = None,
+) -> Tuning:
     """Propose settings for one assessed loop whose stated ones are `controller` [%, s]; `kept`, why none are to be
-    proposed (advice.withheld). Raises NotAssessedError where the loop's trends give no model."""
+    proposed (advice.withheld); decided, action and settings of all nights, which stand. Raises NotAssessedError where
+    the loop's trends give no model."""
     verdict = found.verdict
     first = found.oscillations.first
     period = first.period_s if first else None
@@ -86,6 +96,8 @@ def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None
         proposal = Proposal(kept.action, kept.reason)
     else:
         proposal = propose(verdict, controller, period, config).proposal
+    if decided is not None:
+        proposal = _as_decided(proposal, *decided)
     load = load_of(fit, controller)
     new = proposal.new
     is_long = load.size >= config.tuning.least_steps
@@ -103,12 +115,21 @@ def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None
     )
 
 
+def _as_decided(found: Proposal, action: Action, new: Pid | None) -> Proposal:
+    """A proposal with the action and the settings that were decided; of another action its reason says nothing."""
+    meanwhile = found.meanwhile if action is Action.REPAIR_VALVE else None
+    reason = found.reason if action is found.action else ""
+    return replace(found, action=action, reason=reason, controller=new, meanwhile=meanwhile)
+
+
 def _cycle_lines(t: Tuning) -> list[str]:
     recorded = "none"
     if t.period_s is not None and t.amplitude_pct is not None:
         recorded = f"{number(t.period_s)} s, ±{t.amplitude_pct:.3g} % of PV span"
     c = t.cycle.cycle
     simulated = f"{number(c.period_s)} s, ±{c.pv_amplitude:.3g} %" if c else "none"
+    if c is not None and c.pv_amplitude > 100.0:
+        simulated = "unstable, up to OP's limits"
     p = t.cycle.predicted
     predicted = f"{number(p.period_s)} s, ±{p.pv_amplitude:.3g} %" if p else "none"
     return [
@@ -137,14 +158,12 @@ def proposal_lines(t: Tuning, spec: LoopSpec, pv_span: float) -> list[str]:
     ]
     if "gain" not in t.estimates:
         out.append("gain and time constant: only their ratio is known from this record")
-    out += [*_cycle_lines(t), f"action: {t.proposal.action}"]
-    for title, pid in (("new settings", t.proposal.controller), ("until the repair", t.proposal.meanwhile)):
-        if pid is not None:
-            kp, ti = as_stated(pid, spec, pv_span)
-            out.append(
-                f"{title}: kp {number(kp)}, ti {number(ti)} {spec.ti_unit} ({spec.gain_unit}, {spec.form})"
-            )
-    return [*out, t.proposal.reason, *_forecast_lines(t)]
+    out += _cycle_lines(t)
+    if t.proposal.meanwhile is not None:
+        kp, ti = as_stated(t.proposal.meanwhile, spec, pv_span)
+        form = f"{spec.gain_unit}, {spec.form}"
+        out.append(f"until the repair: kp {number(kp)}, ti {number(ti)} {spec.ti_unit} ({form})")
+    return [*out, *filter(None, [t.proposal.reason]), *_forecast_lines(t)]
 
 
 def pictures(t: Tuning, title: str) -> tuple[Picture, ...]:
@@ -205,25 +224,48 @@ def _trend_panels(t: Tuning, new: Pid, title: str) -> Panels:
     return Panels("forecast", f"{title}: both tunings on the same load", plots)
 
 
-def proposal(one: PlantLoop, drawn: bool) -> tuple[list[str], dict[str, bytes]]:
-    """Lines of text and, if wanted, pictures by file name for one loop over a night. Raises InputError where its
-    settings are not known, NotAssessedError where its trends give no model."""
-    spec, stated, loop = one.spec, one.controller, one.spec.loop
-    night = "" if one.night is None else one.night.name
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What is told of retuning a loop: lines of text, pictures by file name, what the night decided, and the model
+    and the forecast as data."""
+
+    lines: list[str]
+    pictures: dict[str, bytes]
+    decision: Row
+    tuning: Tuning | None = None
+
+    def as_data(self) -> dict[str, Any]:
+        """All of it as plain data, the pictures left out."""
+        t = self.tuning
+        data: dict[str, Any] = {"loop": self.decision["loop"], "decision": as_data(self.decision)}
+        if t is None:
+            return data | {"estimates": {}, "simulated_cycle": None, "forecast": {}, "text": self.lines}
+        sides = {} if t.forecast is None else asdict(t.forecast)
+        data["estimates"] = {k: asdict(e) for k, e in t.estimates.items()}
+        data["simulated_cycle"] = None if t.cycle.cycle is None else asdict(t.cycle.cycle)
+        data["forecast"] = {
+            k: {x: sides[x][k] for x in ("before", "after", "change")} for k in FORECAST if sides
+        }
+        return data | {"text": self.lines}
+
+
+def proposal(one: PlantLoop, decision: Row, drawn: bool) -> Told:
+    """What is told of one loop over a night of which `decision` is the row, with pictures if wanted. Raises
+    InputError where its settings are not known, NotAssessedError where its trends give no model and the night
+    decided nothing."""
+    spec, stated = one.spec, one.controller
     taught = taught_by(one)
     shown = [] if taught is None else list(experiments.lines(taught, spec, stated, one.plant.zone))
     known = taught is not None and taught.model is not None
+    head = decision_lines(decision)
     try:
-        text, pictures = _routine(one, stated, night, drawn)
+        told = _routine(one, stated, decision, drawn)
     except (InputError, NotAssessedError) as error:
-        if not known:
+        decides = decision["status"] == Status.OK and not isinstance(error, InputError)
+        if not known and not decides:
             raise
-        return [
-            f"{loop}, night {night}: model from experiments",
-            *shown,
-            f"the routine tells nothing: {error}",
-        ], {}
-    return [*shown, *text], pictures
+        return Told([*head, *shown, f"no model from routine operation: {error}"], {}, decision)
+    return replace(told, lines=[*head, *shown, *told.lines])
 
 
 def taught_by(one: PlantLoop) -> Learned | None:
@@ -246,26 +288,32 @@ def _neighbours(one: PlantLoop, record: LoopRecord) -> tuple[Floats, ...]:
     return tuple(found)
 
 
-def _routine(
-    one: PlantLoop, stated: Pid | None, night: str, drawn: bool
-) -> tuple[list[str], dict[str, bytes]]:
+def _routine(one: PlantLoop, stated: Pid | None, decision: Row, drawn: bool) -> Told:
     """The same by what the loop does in automatic."""
     spec, prepared, config, loop = one.spec, one.prepared, one.plant.config, one.spec.loop
     if stated is None:
         seen = f"{loop}: no kp and ti in loops.csv"
         raise InputError(seen, "both", "state them, so that new ones can be compared")
     found = assess(prepared, stated, config, spec.type, one.earlier)
-    head = [f"{loop}, night {night}: cause {found.verdict.cause}"]
-    text = head + [f"sign of {s.points_to}: {sign_in_full(s)}" for s in found.verdict.signs]
+    cause, text = Cause(decision["cause"] or Cause.NONE), []
+    if found.verdict.cause is cause:
+        text = [f"sign of {s.points_to}: {sign_in_full(s)}" for s in found.verdict.signs]
+    else:  # as the plant, or other nights, have it
+        found = replace(found, verdict=replace(found.verdict, cause=cause))
     if found.verdict.measured is None:
         limited = at_limits(prepared.record, config.quality) if prepared.op_known else None
         needs = limited or unfit_for_cause(prepared, None, config)  # the nearest first
-        if found.verdict.cause is not Cause.VALVE:
-            raise NotAssessedError(f"{loop}: {needs or found.verdict.needs or NO_MOVES}")
-        return [*text, f"action: {Action.REPAIR_VALVE}", f"no settings: {needs or NO_MOVES}"], {}
-    tuning = tune(found, stated, config, withheld(found, spec, stated, prepared.scale.span, config))
+        raise NotAssessedError(f"{loop}: {needs or found.verdict.needs or NO_MOVES}")
+    new = None
+    if decision["action"] == Action.RETUNE:
+        new = controller_of(replace(spec, kp=decision["kp_new"], ti=decision["ti_new"]), prepared)
+    kept = withheld(found, spec, stated, prepared.scale.span, config)
+    tuning = tune(found, stated, config, kept, (Action(decision["action"] or Action.NONE), new))
     text += proposal_lines(tuning, spec, prepared.scale.span)
-    return _with_settings_beside(tuning, spec, prepared.scale.span, config, night, text, drawn)
+    lines, files = _with_settings_beside(
+        tuning, spec, prepared.scale.span, config, decision["night"], text, drawn
+    )
+    return Told(lines, files, decision, tuning)
 
 
 def _with_settings_beside(

@@ -147,7 +147,7 @@ class Plant:
     def last_night(self, name: str) -> PlantLoop:
         """One loop over the last night that its own samples make; errors as of `loop` and `nights_of`."""
         alone = replace(self, specs=(spec_of(self.specs, name),))
-        return alone.loop(name, alone.nights[-1])
+        return replace(alone.loop(name, alone.nights[-1]), plant=self)
 
 
 @dataclass(frozen=True)

@@ -137,7 +137,7 @@ def test_load_is_left_alone(tmp_path):
     """A loop that a machine swings gets no settings: the load oscillates."""
     swung = Sketch("load", (1.4, 90.0, 10.0), 0.8, 120.0, load_std=0.3, sine=3.0, sine_s=300.0)
     out = clean(asked(tmp_path, simulate(swung, 2.0), "0.8,120,0,100"), 0)
-    assert "action: none" in out
+    assert "action: find disturbance" in out
     assert "The load oscillates" in out
     assert "new settings:" not in out
 
@@ -160,7 +160,6 @@ def flat(n: int, **trends: np.ndarray) -> Trends:
 N = 3600
 UNFIT = {
     "OP that never moves": (flat(N, pv=flat(N).pv + np.linspace(0, 9, N)), "manual 100 %"),
-    "OP at its limit": (flat(N, pv=flat(N).pv - 10, op=np.full(N, 100.0)), "OP within its limits"),
     "no samples of PV": (flat(N, pv=np.full(N, np.nan)), "none that is good"),
     "a record of a minute": (flat(60), "needs 200 good PV samples, has 60"),
 }
@@ -173,12 +172,24 @@ def test_unfit_records_are_refused_in_one_line(tmp_path, name):
     assert wanted in refused(asked(tmp_path, trends))
 
 
-def test_compressed_trends_are_refused(tmp_path, tank):
-    """Trends on straight segments are refused: a play leaves no recorder in them."""
+def test_op_at_its_limit_is_an_action(tmp_path):
+    """Of a loop whose OP rests at its limit the limit is to be checked; there is no model, and it is said why."""
+    out = clean(asked(tmp_path, flat(N, pv=flat(N).pv - 10, op=np.full(N, 100.0))), 0)
+    assert "action: check limit" in out
+    assert "needs OP within its limits" in out
+    assert "new settings:" not in out
+
+
+def test_compressed_trends_give_no_settings(tmp_path, tank):
+    """Trends on straight segments give no settings, and are asked for uncompressed: a play leaves no recorder in
+    them."""
     at = np.arange(tank.pv.size)
     kept = at[::100]
     thinned = replace(tank, pv=np.interp(at, kept, tank.pv[kept]), op=np.interp(at, kept, tank.op[kept]))
-    assert "without compression" in refused(asked(tmp_path, thinned))
+    out = clean(asked(tmp_path, thinned), 0)
+    assert "without compression" in out
+    assert "action: needs data" in out
+    assert "new settings:" not in out
 
 
 def test_dead_time_beyond_the_record_gives_no_settings(tmp_path):

@@ -1,0 +1,73 @@
+"""What a night decided of a loop, in lines: the same words wherever a command tells it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from analyzer.columns import Row
+from analyzer.loop.decisions import Action, Cause, Due, Fault
+from analyzer.words.units import number
+
+TOLD = (
+    *(
+        "night",
+        "status",
+        "oscillating_pct",
+        "period_s",
+        "cause",
+        "valve_fault",
+        "backlash_pct",
+        "stickband_pct",
+    ),
+    *("source_loop", "action", "due", "kp", "ti", "kp_new", "ti_new", "reason", "advice"),
+)
+"""Columns of a decision that commands tell, as the contract of the ranking names them."""
+ABOVE_ACTION = (Cause.VALVE, Cause.TUNING, Cause.LOAD)
+
+
+def as_data(row: Row) -> Row:
+    """A decision as plain data."""
+    return {name: row[name] for name in TOLD}
+
+
+def decided(data: Mapping[str, Any]) -> str:
+    """What the night decided of an explained loop, in a sentence; '' where that is not known."""
+    row = data.get("night")
+    if row is None:
+        return ""
+    cause = row["cause"] or "not told"
+    action = f"action: {row['action'] or 'none'}{_due(row)}"
+    return f"The night of {row['night']} found: cause {cause}{_fault(row)}; {action}."
+
+
+def decision_lines(row: Row) -> list[str]:
+    """Cause, fault and action with what they rest on, a line each."""
+    at = f"{row['loop']}, night {row['night']}: cause {row['cause'] or 'not told'}{_surely(row)}"
+    lines = [at + _fault(row), f"action: {row['action'] or 'none'}{_due(row)}"]
+    if row["action"] == Action.RETUNE:
+        ti = f"{number(row['ti_new'])} {row['ti_unit'] or 's'}"
+        form = f"{row['gain_unit'] or 'percent'}, {row['form'] or 'ideal'}"
+        lines.append(f"new settings: kp {number(row['kp_new'])}, ti {ti} ({form})")
+    if row["reason"]:
+        lines.append(f"reason: {row['reason']}")
+    return lines
+
+
+def _surely(row: Row) -> str:
+    """How sure a cause is."""
+    cause = row["cause"]
+    share = row[f"osc_{cause}_pct"] if cause in ABOVE_ACTION else None
+    return f" ({share:.0f} %)" if share else ""
+
+
+def _fault(row: Row) -> str:
+    """What is wrong with the valve, with its width."""
+    fault, width = row["valve_fault"], row["stickband_pct"] or row["backlash_pct"]
+    if fault in (None, Fault.NONE):
+        return ""
+    return f"; valve {fault}" + (f" {number(width)} % of OP" if width else "")
+
+
+def _due(row: Row) -> str:
+    return f" at the {Due.SHUTDOWN}" if row["due"] == Due.SHUTDOWN else ""
