@@ -39,6 +39,12 @@ WHY: Mapping[str, str] = tomllib.loads((files("tuning") / "reasons.toml").read_t
 """Why settings are proposed or none, by the cause or by what decided it."""
 
 
+INTEGRAL_TIMES = 5
+"""Integral times tried from the longest to the shortest lag that the record allows: neighbours differ by less than
+two where the ends differ by ten."""
+STEPS, HALFWAY = (0.8, 0.6, 0.4), (0.5, 0.65, 0.8)
+"""Parts of the way to robust settings that are tried, on a logarithmic scale, where those cost too much error, and
+where the record leaves the dead time unsure."""
 WITHOUT_SETTINGS = {
     Cause.LOAD: Action.FIND_DISTURBANCE,
     Cause.UNDECIDED: Action.UNDECIDED,
@@ -90,13 +96,16 @@ def recommend(
     load: Floats | None = None,
     limits: TuningLimits = LIMITS,
     error: float | None = None,
+    halfway: bool = False,
 ) -> Proposal:
     """The proposal for one loop: identified process and valve with the present controller.
 
     cause, why the loop is in trouble, one of tuning.Cause, ValueError for any other; uncertainty, other loops that
     the data allow; load, load and noise as they add to PV, on the controller's clock, shape (n,) [% PV], ValueError
     where it is not finite; None, or one too short to tell (tuning.limits): steps at the valve; error, the recorded
-    average absolute error [% PV], which a loop that is hardly stable is simulated too badly to tell, None: simulated.
+    average absolute error [% PV], which a loop that is hardly stable is simulated too badly to tell, None:
+    simulated; halfway, whether the record leaves the dead time of a loop that rings unsure, so that a step about
+    halfway to robust settings is proposed.
     """
     _check(cause, load)
     if cause not in (Cause.VALVE, Cause.TUNING):
@@ -106,12 +115,17 @@ def recommend(
         return Proposal(Action.CHECK_SETTINGS, WHY["wrong_sign"].format(kp=kp, slope=slope))
     load = None if load is None or load.size < limits.least_steps else load
     if cause == Cause.TUNING:
-        return _tight(loop, uncertainty, load, limits, error)
+        return _tight(loop, uncertainty, load, limits, error, halfway)
     return _valve(loop, uncertainty, load, limits)
 
 
 def _tight(
-    loop: Loop, others: Sequence[Loop], load: Floats | None, limits: TuningLimits, error: float | None = None
+    loop: Loop,
+    others: Sequence[Loop],
+    load: Floats | None,
+    limits: TuningLimits,
+    error: float | None = None,
+    halfway: bool = False,
 ) -> Proposal:
     """SIMC for a loop that rings by its tuning: the nominal, or on a known load the one of least error.
 
@@ -127,11 +141,11 @@ def _tight(
         return Proposal(Action.UNDECIDED, why, ms_before=now)
     new, ms = found[0]
     if load is not None:
-        cases = _Cases((loop, *others), in_digits(load), error)
+        cases = _Cases((*others, loop)[: max(len(others), 1)], in_digits(load), error)
         new, ms = min(found, key=lambda pair: cases.mean(pair[0]))
         left = cases.worst(new)
-        if left > limits.tight_price:
-            return _first_step(cases, new, now, left, limits)
+        if left > limits.tight_price or halfway:
+            return _first_step(cases, new, now, left, limits, HALFWAY if halfway else STEPS)
     known = {"old": settings(loop.controller), "new": settings(new), "ms": robustness(ms)}
     was = robustness(now) + " on the identified process" * math.isinf(now)
     why = WHY["tight"].format(was=was, **known)
@@ -162,12 +176,14 @@ class _Cases:
         )
 
 
-def _first_step(cases: _Cases, robust_one: Pid, now: float, left: float, limits: TuningLimits) -> Proposal:
+def _first_step(
+    cases: _Cases, robust_one: Pid, now: float, left: float, limits: TuningLimits, steps: Sequence[float]
+) -> Proposal:
     """Settings between the present and robust ones that cost no more than the price allowed, the most robust of them;
     none where they win too little robustness."""
     loop, old = cases.loops[0], cases.loops[0].controller
     gains, times = robust_one.kp / old.kp, robust_one.ti_s / integral_s(old)
-    for share in (0.8, 0.6, 0.4):
+    for share in steps:
         kp, ti = old.kp * gains**share, integral_s(old) * times**share
         new = replace(old, kp=rounded(kp), ti_s=rounded(ti))
         ms = maximum_sensitivity(replace(loop, controller=new))
@@ -185,7 +201,7 @@ def _simc_settings(
 ) -> list[tuple[Pid, float]]:
     """SIMC settings with their Ms from the `first` step of the closed-loop time constant on, all samples robust.
 
-    The loop's own time constant and the shortest of its samples' give the integral times. The gain of a loop
+    Integral times lie between the loop's own time constant and the shortest of its samples'. The gain of a loop
     that rings is not raised. A derivative stays as it is, for nobody is told to switch it off.
     """
     h = scan_step(loop)
@@ -195,12 +211,12 @@ def _simc_settings(
     found = []
     for k in range(first, limits.slower_most):
         nominal = simc(loop.process, tau_c * limits.slower**k, h)
-        for ti in dict.fromkeys((nominal.ti_s, min([nominal.ti_s, *lags]))):
+        for ti in dict.fromkeys(np.geomspace(nominal.ti_s, min([nominal.ti_s, *lags]), INTEGRAL_TIMES)):
             kp = math.copysign(min(abs(nominal.kp), abs(loop.controller.kp)), nominal.kp)
             new = replace(loop.controller, kp=rounded(kp), ti_s=rounded(ti))
             ms = robust((loop, *others), new, most)
             found += [] if ms is None else [(new, ms)]
-        if len(found) >= limits.enough:
+        if len({new.kp for new, _ in found}) >= limits.enough:
             break
     return found
 

@@ -13,6 +13,7 @@ from analyzer.loop.decisions import Action, Cause, Due, Lack, Need, Needs
 from analyzer.loop.fitness import too_thin
 from analyzer.loop.identified import cautious, load_of, recorded_error, tuned, uncertain
 from analyzer.loop.oscillation import counting
+from analyzer.loop.ringing import between_samples
 from analyzer.loop.settings_side_by_side import Comparison, compared
 from analyzer.loops.slips import slip
 from analyzer.loops.spec import LoopSpec
@@ -68,7 +69,9 @@ class Proposed:
 def model_of(verdict: Verdict, controller: Pid) -> Loop:
     """The closed loop that a verdict's model and the settings make."""
     fit = verdict.fit
-    return Loop(fit.process, controller, fit.valve.valve if verdict.cause is Cause.VALVE else None)
+    if verdict.cause is Cause.VALVE:
+        return Loop(fit.process, controller, fit.valve.valve)
+    return Loop(between_samples(fit.process, fit.window, controller), controller)
 
 
 def advise(
@@ -178,7 +181,11 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
 def _too_thin(found: Assessment, controller: Pid | None, config: Config) -> Advice | None:
     """What sampling it takes, where the controller acts several times between two samples, unseen."""
     m = found.verdict.measured
-    thin = None if m is None else too_thin(m.window.dt_s / m.window.factor, controller, config)
+    thin = (
+        None
+        if m is None or found.verdict.rings
+        else too_thin(m.window.dt_s / m.window.factor, controller, config)
+    )
     return None if thin is None else _or_repair(found.verdict, _lacking(thin))
 
 
@@ -235,11 +242,15 @@ def _proposed(verdict: Verdict, controller: Pid, period_s: float | None, config:
 
 def _for_tuning(verdict: Verdict, loop: Loop, period_s: float | None, config: Config) -> Proposed:
     fit = verdict.fit
-    slow = replace(loop, process=cautious(fit.process, period_s))
+    slow = replace(
+        loop, process=replace(cautious(fit.process, period_s), dead_time_s=loop.process.dead_time_s)
+    )
     others = (loop, *uncertain(fit, loop)[:2])
     load = load_of(fit, loop.controller)
     error = recorded_error(fit, loop.controller)
-    return Proposed(recommend(slow, verdict.cause, others, load, config.tuning, error), loop, load, others)
+    thin = too_thin(fit.window.dt_s / fit.window.factor, loop.controller, config) is not None
+    found = recommend(slow, verdict.cause, others, load, config.tuning, error, halfway=thin)
+    return Proposed(found, loop, load, others)
 
 
 def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Config) -> Proposed:

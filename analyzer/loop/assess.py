@@ -220,7 +220,8 @@ def _judge_stretch(prepared: Prepared, stretch: Stretch, config: Config, kind: s
         scale = time_scale(part.record, counting(found), stated)
         settings = differing(part.record, stated, scale, config.settings)
     found, verdict = judged_where(part, found, span, settings or stated, config, kind)
-    if _hours_in(part.record) < config.advice.least_h or too_thin(record.dt_s, settings or stated, config):
+    thin = None if verdict.rings else too_thin(record.dt_s, settings or stated, config)
+    if _hours_in(part.record) < config.advice.least_h or thin is not None:
         verdict = as_hint(verdict, config.advice.hint_pct)
     return _Judged(part, found if whole else of_all, found, verdict, settings)
 

@@ -84,6 +84,11 @@ class Verdict:
         return m.stick_slip if self.fault is Fault.STICTION and m.stick_slip is not None else m.play
 
     @property
+    def rings(self) -> bool:
+        """Whether the identified loop makes the cycle: then the record, whatever its sampling, has told the loop."""
+        return self.cause is Cause.TUNING and any(s.kind is SignKind.RINGING for s in self.signs)
+
+    @property
     def for_settings(self) -> Verdict:
         """The verdict on whose model settings are sought: that of one friction for all slips."""
         return self if self.steady is None or self.cause is not Cause.VALVE else self.steady

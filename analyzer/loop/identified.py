@@ -141,7 +141,8 @@ def _drawn(draw: Floats, fit: Fit, loop: Loop) -> Loop:
     off = draw[3] - draw[0] - math.log(abs(fit.slope))
     slope = fit.slope * math.exp(min(max(off, -math.log(3.0)), math.log(3.0)))
     longest = 3.0 * max(loop.process.dead_time_s, loop.controller.scan_s)
-    dead, t = min(max(float(draw[1]), 0.0), longest), math.exp(log_t)
+    between = loop.process.dead_time_s - fit.process.dead_time_s  # of a controller that acts between samples
+    dead, t = min(max(float(draw[1]) + between, 0.0), longest), math.exp(log_t)
     is_ramp = isinstance(loop.process, Integrator)
     process: Process = Integrator(slope, dead) if is_ramp else Fopdt(slope * t, t, dead)
     factor = max(float(draw[2]), 0.2 * fit.valve.stickband) / max(fit.valve.stickband, 1e-9)

@@ -292,3 +292,14 @@ def test_extremes_do_not_raise():
             p = recommend(Loop(process, Pid(kp, 20, scan_s=2.0), Stiction(1.5, 0.9)), "valve")
             assert p.reason
             assert (p.controller is not None) == (p.action == "retune")
+
+
+def test_a_step_halfway_is_between_present_and_robust_settings():
+    """Where the dead time is unsure, the proposal lies between the present settings and the robust ones."""
+    process = Fopdt(1.5, 100, 8)
+    nominal = simc(process, scan_s=1.0)
+    loop = Loop(process, replace(nominal, kp=3 * nominal.kp, ti_s=0.4 * nominal.ti_s))
+    lively = load(np.random.default_rng(3), 6000, 1.0, 10.0, 0.02)
+    robust, half = (recommend(loop, "tuning", load=lively, halfway=h).controller for h in (False, True))
+    assert robust.kp < half.kp < loop.controller.kp
+    assert loop.controller.ti_s < half.ti_s < robust.ti_s
