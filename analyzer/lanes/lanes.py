@@ -79,12 +79,16 @@ def _lasting(found: Finding) -> str:
 
 def _slow(found: Finding, limits: LaneLimits) -> bool:
     """Whether errors last long; shorter where the process bears more gain."""
+    if found.remedy.action is Action.RETUNE and found.cause is Cause.NONE:
+        return True
     memory, room = found.number("error_memory_ti"), found.number("gain_room")
     small = memory > limits.small_gain_memory_ti and room > limits.small_gain_room
     return memory > limits.error_memory_ti or small
 
 
 def _sluggish(found: Finding) -> str:
+    if found.remedy.action is Action.RETUNE:
+        return found.remedy.text
     text = f"sluggish: errors last {found.number('error_memory_ti'):.2g} integral times, the gain is small"
     room = found.number("gain_room")
     return text if room < 2.0 else f"{text}; the process bears about {room:.1g} times as much"

@@ -13,8 +13,10 @@ from analyzer.loop.decisions import Action, Cause, Due, Lack, Need, Needs
 from analyzer.loop.fitness import too_thin
 from analyzer.loop.identified import cautious, load_of, recorded_error, tuned, uncertain
 from analyzer.loop.oscillation import counting
+from analyzer.loop.quality import Prepared
 from analyzer.loop.ringing import between_samples
 from analyzer.loop.settings_side_by_side import Comparison, compared
+from analyzer.loop.sluggish import faster
 from analyzer.loops.slips import slip
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
@@ -105,6 +107,23 @@ def advise(
         known = proposed.loop, proposed.load, held or proposal.new, oscillation.period_s, pv_span
         beside = compared(*known, config.tuning, proposed.others)
     return replace(_as_advice(proposal, spec, pv_span), compared=beside)
+
+
+def quickened(
+    found: Assessment, advice: Advice, prepared: Prepared, spec: LoopSpec, controller: Pid, config: Config
+) -> Advice:
+    """The advice on a calm loop of which nothing else is to be said: faster settings where it is sluggish."""
+    calm = counting(found.oscillations) is None and found.verdict.cause is Cause.NONE
+    if advice.action is not Action.NONE or not calm or found.outdated or found.settings is not None:
+        return advice
+    if not (prepared.op_known and prepared.op_scaled):
+        return advice
+    slow = faster(prepared.record, controller, spec.type, config)
+    if slow is None:
+        return advice
+    kp, ti = as_stated(slow.new, spec, prepared.scale.span)
+    reason = SAID["sluggish"].format(slow.times, 100.0 * slow.change)
+    return Advice(Action.RETUNE, reason, rounded(kp), rounded(ti))
 
 
 def _unscaled(kept: Advice | None, needs: Needs) -> Advice:

@@ -50,11 +50,15 @@ def first_things(rows: Sequence[words.Row], groups: Sequence[GroupView] = ()) ->
     return tuple(text for _, text in ordered[: PAGES.sentences]) or (CALM,)
 
 
+RETUNED = {Cause.VALVE: "retune a worn valve's loop", Cause.NONE: "retune a sluggish loop"}
+"""Kinds of work that new settings are, by the cause; of others the loop is too tight."""
+
+
 def _work(row: words.Row) -> set[str]:
     """The kinds of work that a row asks for."""
     tuning = row["cause"] == Cause.TUNING
     kinds = {
-        Action.RETUNE: "retune a worn valve's loop" if row["cause"] == Cause.VALVE else "retune",
+        Action.RETUNE: RETUNED.get(row["cause"], "retune"),
         Action.REPAIR_VALVE: "shutdown" if row["due"] == Due.SHUTDOWN else "stroke",
         Action.CHECK_MEASUREMENT: "measurement",
         Action.CHECK_SETTINGS: "unstated" if None in (row["kp"], row["ti"]) else "settings",

@@ -64,6 +64,8 @@ def _expected(row: Row) -> str:
         return f"a cycle of {duration(row['expected_period_s'])} and {swing}: the valve stays as it is"
     if row["cause"] == Cause.VALVE:
         return "the cycle comes to rest, by simulation, though the valve stays as it is"
+    if row["cause"] == Cause.NONE:
+        return "PV comes back to its set point several times sooner, and OP moves more"
     return "the swing dies away within a few periods"
 
 

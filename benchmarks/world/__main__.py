@@ -77,6 +77,8 @@ def told(loops: list[Drawn], records: dict[str, Recording], jobs: int) -> dict[s
 
 def right(d: Drawn, row: dict[str, Any]) -> bool:
     """Whether cause and fault are those of the truth."""
+    if d.kind == "sluggish":
+        return row["cause"] == "none" and row["action"] == "retune"
     if d.kind == "healthy":
         return row["valve_fault"] in ("none", None) and row["cause"] == "none"
     if d.kind in ("backlash", "stiction"):

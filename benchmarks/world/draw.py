@@ -22,7 +22,7 @@ from benchmarks.world.simulate import (
     simulate,
 )
 
-KINDS = ("backlash", "stiction", "tight", "load", "healthy", "worn-sine")
+KINDS = ("backlash", "stiction", "tight", "load", "healthy", "worn-sine", "sluggish")
 HOURS = 24
 SWELL = 1.5
 """Spread of the error over that without the fault from which a loop shows it."""
@@ -49,9 +49,8 @@ class Drawn:
     @property
     def cause(self) -> str:
         """What `cause` should say."""
-        return {"backlash": "valve", "stiction": "valve", "tight": "tuning", "healthy": "none"}.get(
-            self.kind, "load"
-        )
+        causes = {"backlash": "valve", "stiction": "valve", "tight": "tuning"}
+        return causes.get(self.kind, "none" if self.kind in ("healthy", "sluggish") else "load")
 
     @property
     def fault(self) -> str:
@@ -102,6 +101,8 @@ def _settings(rng: np.random.Generator, kind: str, p: Process) -> Controller | N
         )
         ms = sensitivity(p, c)[0]
         return c if 3.8 <= ms <= 9 else None
+    if kind == "sluggish":
+        return Controller(kp * rng.uniform(0.04, 0.2), ti * rng.uniform(1.0, 6.0), scan)
     if kind in ("backlash", "stiction"):
         c = Controller(kp * rng.uniform(0.5, 1.1), ti * rng.uniform(0.15, 1.0), scan)
     else:
@@ -198,11 +199,11 @@ def one(seed: int, kind: str, name: str) -> Drawn | None:
         return None
     ms, resonance = sensitivity(p, c)
     valve = _valve(rng, kind)
-    moves = float(rng.choice([0, 0, 2, 8]))
+    moves = float(rng.choice([4, 8, 16] if kind == "sluggish" else [0, 0, 2, 8]))
     d = Drawn(name, kind, p, c, valve, seed, ms, resonance, 1.0, moves)
     if kind in ("load", "worn-sine"):
         d = replace(d, period_s=float(resonance * np.exp(rng.uniform(math.log(0.8), math.log(6)))))
-    if kind == "healthy":
+    if kind in ("healthy", "sluggish"):
         return replace(d, period_s=0.0)
     ours = run(d)
     e = ours.pv - ours.sp

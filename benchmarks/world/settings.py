@@ -24,8 +24,10 @@ def outcome(d: Drawn, new: Controller) -> tuple[float, float, float, float]:
     return error[1] / error[0], travel[1] / max(travel[0], 1e-9), d.ms, sensitivity(d.process, new)[0]
 
 
-def verdict(error: float, travel: float) -> str:
-    """Cured, better, none or harm: cured where travel or error falls by 30 % and neither rises by 15 %."""
+def verdict(error: float, travel: float, kind: str = "") -> str:
+    """Cured, better, none or harm: cured where travel or error falls by 30 % and neither rises by 15 %; of a sluggish
+    loop, whose valve is to move more, by its error alone."""
+    travel = error if kind == "sluggish" else travel
     if max(error, travel) > 1.15:
         return "harm"
     return "cured" if min(error, travel) <= 0.7 else "better" if min(error, travel) <= 0.95 else "none"
@@ -40,7 +42,7 @@ def line(d: Drawn, row: dict[str, Any], found: tuple[float, ...] | None) -> str:
         return f"{what}: {row['cause']} {row['action']} {row['reason']} | {row['advice']}"
     error, travel, _, ms = found
     new = f"{row['kp_new']:.3g} {row['ti_new']:.0f}"
-    return f"{what}: {new} error {error:.2f} travel {travel:.2f} Ms {ms:.2f} {verdict(error, travel)}"
+    return f"{what}: {new} error {error:.2f} travel {travel:.2f} Ms {ms:.2f} {verdict(error, travel, d.kind)}"
 
 
 def main() -> None:
@@ -59,7 +61,7 @@ def main() -> None:
                     found.append(came)
                 if asked.show:
                     print(line(d, row, came), file=sys.stderr)
-        said = [verdict(e, t) for e, t, *_ in found]
+        said = [verdict(e, t, kind) for e, t, *_ in found]
         a = np.array(found).reshape(-1, 4)
         middle = [f"{100 * (np.median(a[:, k]) - 1):+.0f}" if found else "" for k in (0, 1)]
         worst = f"{100 * (a[:, 0].max() - 1):+.0f}" if found else ""

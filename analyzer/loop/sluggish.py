@@ -1,0 +1,109 @@
+"""Settings for a calm loop that answers far more slowly than its process allows.
+
+Moves of the set point make its process known, at a finer clock than its own slow settings ask for. Where SIMC's
+settings for every process that the record allows reject loads several times faster, and take a fair part of the error
+off by simulation, they are advised.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from itertools import product
+
+from scipy.signal import detrend
+
+from analyzer.config import Config
+from analyzer.lanes.standing import AVERAGING
+from analyzer.loop.identified import intervals, load_of, tuned
+from analyzer.loop.measure import time_scale, window_of
+from analyzer.loop.ringing import between_samples
+from identification.errors import NotAssessedError
+from identification.estimation.backlash_stiction import fit_linear
+from identification.estimation.window import Fit
+from identification.models import Estimate, Integrator, Loop, Pid, Process
+from identification.record import LoopRecord
+from tuning.forecast import in_digits
+from tuning.from_test import settings_from
+from tuning.search import mean_error, rounded
+
+
+@dataclass(frozen=True, slots=True)
+class Faster:
+    """New settings [%, s] of a sluggish loop, how many times faster they reject a load (Kp/Ti over the present one)
+    [-], and the change of the average absolute error that simulation finds [-]."""
+
+    new: Pid
+    times: float
+    change: float
+
+
+def faster(record: LoopRecord, controller: Pid | None, kind: str, config: Config) -> Faster | None:
+    """Settings for a loop without a cycle; None where it is not sluggish, is slow on purpose as levels are, or its
+    process is not known well enough. controller, its present settings [%, s]; kind, its type."""
+    if controller is None or kind.strip().lower() == AVERAGING or record.sp_estimated:
+        return None
+    if not math.isfinite(controller.ti_s) or controller.kp == 0.0 or controller.td_s > 0.0:
+        return None
+    fit = _known_fit(record, controller, kind, config)
+    if fit is None:
+        return None
+    known = intervals(fit, False, config.advice)
+    process = between_samples(tuned(fit, False, config.advice), fit.window, controller)
+    return _proposed(fit, process, _allowed(process, known), controller, config)
+
+
+def _known_fit(record: LoopRecord, controller: Pid, kind: str, config: Config) -> Fit | None:
+    """The fit behind an ideal valve on the first clock that is fine enough for its dead time; None where slope or
+    dead time stay unsure on each."""
+    limits, scale_s = config.lanes, time_scale(record, None, controller)
+    for finer in limits.sluggish_clocks:
+        try:
+            window = window_of(record, scale_s / finer, config.cause, kind, calm=True)
+            fit = fit_linear(window, scale_s / finer)
+        except (NotAssessedError, ArithmeticError, ValueError):
+            continue
+        if window.sp is None or fit.slope * controller.kp <= 0.0:
+            continue
+        known = intervals(fit, False, config.advice)
+        slope, dead = known["slope_pct_per_s"], known["dead_time_s"]
+        sure = half_width(slope) <= limits.sluggish_unsure * abs(slope.value)
+        late = dead.high <= dead.low * limits.sluggish_late + window.dt_s
+        if sure and late:
+            return fit
+    return None
+
+
+def half_width(e: Estimate) -> float:
+    """Half of an interval."""
+    return 0.5 * abs(e.high - e.low)
+
+
+def _allowed(process: Process, known: dict[str, Estimate]) -> tuple[Process, ...]:
+    """The process, and those at the ends of what the record leaves open of slope and dead time."""
+    slope, dead = known["slope_pct_per_s"], known["dead_time_s"]
+    late = [max(process.dead_time_s + end - dead.value, 0.0) for end in (dead.low, dead.high)]
+    ends = product((slope.low, slope.high), late)
+    if isinstance(process, Integrator):
+        return process, *(Integrator(s, d) for s, d in ends)
+    return process, *(replace(process, gain=process.gain * s / slope.value, dead_time_s=d) for s, d in ends)
+
+
+def _proposed(
+    fit: Fit, process: Process, allowed: tuple[Process, ...], present: Pid, config: Config
+) -> Faster | None:
+    limits = config.lanes
+    try:
+        robust = settings_from(process, allowed, present.scan_s).robust
+    except ValueError:  # no delay to speak of
+        return None
+    most = limits.sluggish_most * abs(present.kp)
+    kp = math.copysign(min(abs(robust.kp), most), present.kp)
+    new = replace(present, kp=rounded(kp), ti_s=rounded(robust.ti_s))
+    times = new.kp / new.ti_s / (present.kp / present.ti_s)
+    if times < limits.sluggish_times:
+        return None
+    load = in_digits(detrend(load_of(fit, present)))  # a loop at work has long answered what stays, or drifts
+    loop = Loop(between_samples(fit.process, fit.window, present), present)  # the one that leaves this load
+    change = mean_error((loop,), new, load) / max(mean_error((loop,), present, load), 1e-9) - 1.0
+    return Faster(new, times, change) if change <= -limits.sluggish_gain else None
