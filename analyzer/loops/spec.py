@@ -28,7 +28,8 @@ NUMBERS: Mapping[str, tuple[float, float]] = CELLS["numbers"]
 CHOICES: Mapping[str, Sequence[str]] = CELLS["choices"]
 VALID_FROM = "valid_from"
 COLUMNS = (*CELLS["texts"], *ROLES, *NUMBERS, *CHOICES, VALID_FROM)
-OWN_COLUMNS = ("op_unit", "sp_unit")  # near to a known name, and yet none misspelt
+OWN_COLUMNS = ("op_unit", "sp_unit", "ranges", "found_by", "sure_pct", "says")
+"""Near to a known name, and yet none misspelt; and what `triage loops` writes beside a row."""
 OTHER_NAMES = {other: ours for ours, others in STATED["other_names"].items() for other in others}
 
 
@@ -176,7 +177,7 @@ def csv_table(path: Path, of: str) -> tuple[list[str], list[tuple[int, dict[str,
     text = data.decode(detect_encoding(data), errors="replace").lstrip("\ufeff")
     if max(map(len, text.split("\n"))) > csv.field_size_limit():
         raise InputError(f"{path}: a line of more than 128 kB", f"one row a {of}", "correct the file")
-    first = next((line for line in text.splitlines() if line.strip()), "")
+    first = next((line for line in text.splitlines() if line.strip() and line[:1] != "#"), "")
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=max(",;\t", key=first.count))
     rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
     rows = [(row, cells) for row, cells in rows if any(cells) and not cells[0].startswith("#")]

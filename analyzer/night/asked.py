@@ -12,6 +12,7 @@ from typing import Any
 from weakref import finalize
 
 from analyzer.config import Config, WorkerLimits
+from analyzer.finder.draft import Row, draft, found_told
 from analyzer.history.export import Export, ReadOptions, open_export
 from analyzer.history.files import own_scratch
 from analyzer.history.plant_clock import utc_seconds, zone_of
@@ -33,7 +34,7 @@ class Asked:
     """Files, loops.csv, changes of settings, span of time [s since 1970-01-01 UTC] and limits.
 
     zone : the plant's time zone, of nights, pages and options; reading : how text exports are read, as in
-    analyzer.history.table.
+    analyzer.history.table; finding : whether, without loops.csv, loops are looked for in the data as well.
     """
 
     export: tuple[Path, ...]
@@ -43,13 +44,18 @@ class Asked:
     config: Config
     zone: str
     reading: Mapping[str, Any]
+    finding: bool = False
 
     def opened(self) -> Plant:
         """The export and its loops, found by their tags' endings where no loops.csv is given, and what there is to
         say of them and of the changes."""
         source = open_export(list(self.export), ReadOptions(**self.reading))
         notes: tuple[str, ...] = ()
-        if self.loops is None:
+        if self.loops is None and self.finding:
+            rows = draft(source, (), self.span)
+            specs = tuple(row.as_run for row in rows if row.sure)
+            notes = found_told(rows)
+        elif self.loops is None:
             specs = find_loops(source.tags)
         else:
             stated = read_loops(self.loops, self.zone, self.reading.get("day_first"))
@@ -69,6 +75,7 @@ def asked_of(
     config: Config,
     since: datetime | None = None,
     until: datetime | None = None,
+    finding: bool = False,
     **reading: Any,
 ) -> Asked:
     """What a command line or a notebook asks; times that state no zone are of the plant's clock."""
@@ -80,7 +87,14 @@ def asked_of(
     last = last if until is None else utc_seconds(until, zone)
     if last <= first:
         raise InputError(f"--since {since} --until {until}", "an end after the start", "swap them")
-    return Asked(tuple(export), loops, dated, (first, last), config, zone, reading)
+    return Asked(tuple(export), loops, dated, (first, last), config, zone, reading, finding)
+
+
+def drafted(asked: Asked, told: Callable[[int, int], None]) -> list[Row]:
+    """The rows of a draft of loops.csv, those of a given one first; `told` is told of tags read, and of all. Raises
+    InputError where the export cannot be used."""
+    plant = guarded(asked)
+    return draft(plant.export, () if asked.loops is None else plant.specs, asked.span, told)
 
 
 def _of_no_loop(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> tuple[str, ...]:
