@@ -4,69 +4,23 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from analyzer.loops.spec import ROLES, STATED, LoopSpec, Output, read_loops
+from analyzer.loops.names import loops_of
+from analyzer.loops.spec import ROLES, LoopSpec, Output, read_loops
 from identification.errors import InputError
 from identification.models import Form, Pid
 
-ENDINGS: Mapping[str, Mapping[str, Sequence[str]]] = STATED["endings"]
-"""By control system and role."""
-_KNOWN = {ending for roles in ENDINGS.values() for endings in roles.values() for ending in endings}
-_ENDINGS = "|".join(re.escape(ending) for ending in sorted(_KNOWN))
-_SPLIT = re.compile(rf"^(?P<loop>.+?)(?:[._:/]| (?=\w{{4,}}$))(?P<ending>{_ENDINGS})$", re.IGNORECASE)
-_BLOCK = re.compile(r"^(?P<module>.+)/[^/]+$")
 UNNAMED = re.compile(r"column \d+")
 """Name of a column of a table without a header."""
 __all__ = ["LoopSpec", "as_stated", "controller", "find_loops", "match", "no_loops", "read_loops"]
 
 
 def find_loops(tags: Iterable[str]) -> tuple[LoopSpec, ...]:
-    """Loops with at least a PV, found by the endings of the tags."""
+    """Loops with at least a PV, found by the names of the tags."""
     return tuple(LoopSpec(loop, **tags_of) for loop, tags_of in loops_of(tags).items())  # type: ignore[arg-type]
-
-
-def loops_of(tags: Iterable[str]) -> dict[str, dict[str, str]]:
-    """Loops with at least a PV: name to the tag of each role ('sp', 'pv', 'op', 'mode', 'position').
-
-    A function block is left out of the name where its module has no other: FIC1/PID1/PV.CV is of loop FIC1.
-    """
-    groups: dict[str, dict[str, str]] = {}
-    for tag in tags:
-        split = _SPLIT.match(tag)
-        if split:
-            groups.setdefault(split["loop"], {}).setdefault(split["ending"].upper(), tag)
-    found = {loop: _roles(endings) for loop, endings in groups.items()}
-    return _without_blocks({loop: roles for loop, roles in found.items() if "pv" in roles})
-
-
-def _roles(endings: Mapping[str, str]) -> dict[str, str]:
-    """Tags by role, as the control system has it that explains most endings."""
-    readings = [
-        {
-            role: next(endings[e] for e in system[role] if e in endings)
-            for role in ROLES
-            if not endings.keys().isdisjoint(system.get(role, ()))
-        }
-        for system in ENDINGS.values()
-    ]
-    roles = max(readings, key=lambda roles: ("pv" in roles, len(roles)))
-    for role in ("sp", "op"):
-        others = (ending for system in ENDINGS.values() for ending in system.get(role, ()))
-        free = (endings[e] for e in others if e in endings and endings[e] not in roles.values())
-        if role not in roles and (tag := next(free, None)) is not None:
-            roles[role] = tag
-    return roles
-
-
-def _without_blocks(loops: dict[str, dict[str, str]]) -> dict[str, dict[str, str]]:
-    modules = {loop: match["module"] for loop in loops if (match := _BLOCK.match(loop))}
-    blocks = Counter(modules.values())
-    single = {loop: module for loop, module in modules.items() if blocks[module] == 1}
-    return {single.get(loop, loop) if single.get(loop) not in loops else loop: loops[loop] for loop in loops}
 
 
 def no_loops(tags: Sequence[str]) -> InputError:
