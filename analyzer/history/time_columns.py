@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from analyzer.history import stamps
 from analyzer.history.clock import (
     ELAPSED,
+    OF_DAY,
     SINCE_START,
     WITHOUT_LEAP,
     Clock,
@@ -246,7 +247,7 @@ def _is_doubtful(
     if is_stamp(table.names[chosen]):
         return False
     unread = [i for i, head in heads.items() if kinds[i] == "" and head.null_count < len(head)]
-    if any(is_stamp(table.names[i]) for i in unread) or clock.scale in (None, ELAPSED):
+    if any(is_stamp(table.names[i]) for i in unread) or clock.scale in (None, ELAPSED, OF_DAY):
         return any(is_stamp(table.names[i]) for i in unread)
     number = numbers(heads[chosen])
     return number.size > 1 and bool((np.diff(number) == 1).all()) and number[0] in (0.0, 1.0)
@@ -314,7 +315,7 @@ def _chosen(
         known = second[np.isfinite(second)]
         if known.size and (known[0] < 60.0 or known.max() > 86400.0):
             return replace(clock, columns=(i,), scale=ELAPSED)
-    return None
+    return replace(clock, columns=(times[0],), scale=OF_DAY) if times else None
 
 
 def _by_name(table: Table, columns: Sequence[int]) -> list[int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -84,12 +85,20 @@ def test_many_columns_are_asked_at_once_whether_they_hold_stamps(
     assert met[0] == met[1] > 0
 
 
-def test_a_time_of_day_without_a_date_is_refused(tmp_path: Path) -> None:
-    """Of what day eight o'clock was nobody knows."""
-    rows = [f"08:00:{k:02d},{k}" for k in range(60)]
-    (tmp_path / "x.csv").write_text("\n".join(["Time,a.PV", *rows]) + "\n")
-    with pytest.raises(InputError, match="no time stamp that is known"):
-        open_export([tmp_path / "x.csv"])
+@pytest.mark.parametrize("form", ["%H:%M:%S", "%I:%M:%S %p"])
+@pytest.mark.parametrize("blocks", [False, True])
+def test_a_time_of_day_without_a_date_is_read(tmp_path: Path, form: str, blocks: bool) -> None:
+    """Times from 23:00 to 01:00 of the second day run on over both midnights, and that no date is stated is told;
+    in a table of one tag after another too."""
+    at = pd.date_range("1970-01-01 23:00", "1970-01-03 01:00", freq="60s")
+    rows = [f"{t.strftime(form)},{k}" for k, t in enumerate(at)]
+    if blocks:
+        rows = [f"{tag},{row}" for tag in ("a.PV", "a.OP") for row in rows]
+    head = "tag,Time,value" if blocks else "Time,a.PV"
+    (tmp_path / "x.csv").write_text("\n".join([head, *rows]) + "\n")
+    export = pickle.loads(pickle.dumps(open_export([tmp_path / "x.csv"])))
+    np.testing.assert_array_equal(export.read(["a.PV"])["a.PV"].stamp_s, 82800.0 + 60.0 * np.arange(len(at)))
+    assert any("no date" in note for note in export.notes)
 
 
 @pytest.mark.parametrize("long", [False, True])
