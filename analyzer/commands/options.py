@@ -187,6 +187,7 @@ READING = {
     "--encoding": "Encoding of text exports. Default: detected.",
     "--day-first/--month-first": "Order in dates such as 03/04/2026.",
     "--date-format": "Format of the stamps, e.g. '%d-%b-%y %H:%M:%S'.",
+    "--interval": "Time between rows, e.g. 30s, of an export whose stamps do not advance.",
     "--time-column": "Name of the column of stamps. Default: detected.",
     "--quality-column": "Name of a long export's column of quality codes. Default: detected.",
     "--good-quality": "Quality code or text that means good; may be repeated.",

@@ -106,6 +106,8 @@ class Clock:
         Offset of the stated zone's winter time [s east of Greenwich] where the clock keeps it all the year.
     doubt : str
         What of the zone is not known, for the notes.
+    every_s : float
+        Stated time between rows whose stamps do not advance [s]; 0 where they do.
     """
 
     columns: tuple[int, ...]
@@ -118,13 +120,17 @@ class Clock:
     offset_s: float | None = None
     winter_s: float | None = None
     doubt: str = ""
+    every_s: float = 0.0
 
     def seconds(self, arrays: Sequence[pa.Array]) -> tuple[NDArray[np.float64], bool]:
         """Seconds since 1970-01-01 on the file's clock, NaN where unreadable; True where that is local."""
         second, local = self._seconds(arrays)
         with np.errstate(invalid="ignore"):
             known = (second >= HISTORY.earliest_s) & (second < HISTORY.latest_s)
-            return np.where(known, second, np.nan), local
+        second = np.where(known, second, np.nan)
+        if self.every_s and known.any():
+            second = second[known][0] + self.every_s * np.arange(len(second))
+        return second, local
 
     def _seconds(self, arrays: Sequence[pa.Array]) -> tuple[NDArray[np.float64], bool]:
         if self.below_s > 0:
@@ -158,6 +164,8 @@ class Clock:
     def notes(self) -> tuple[str, ...]:
         """How the stamps are read, where that is not plain from their writing."""
         notes = [] if self.scale is None else [self.scale.note]
+        if self.every_s:
+            notes.append(f"stamps do not advance: rows are taken as {self.every_s:g} s apart, as stated")
         if self.order is not None:
             notes.append(f"dates are read {self.order.first} first: {self.order.why}")
         if self.local and self.offset_s is not None:

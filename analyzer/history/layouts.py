@@ -139,9 +139,13 @@ class Source:
         second, local = self.clock.seconds([arrays[i] for i in self.clock.columns])
         rows = _rows_of(arrays[self.tag], list(wanted))
         return {
-            tag: self._samples(c, arrays, self.clock.utc(second[rows[tag]], local), rows[tag])
+            tag: self._samples(c, arrays, self.clock.utc(second[self._stamped(rows[tag])], local), rows[tag])
             for tag, c in wanted.items()
         }
+
+    def _stamped(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The rows whose stamps those of a tag of a long table have: its own, or the first where none advances."""
+        return np.arange(len(rows)) if self.clock.every_s else rows
 
     def span(self) -> MainSpan:
         """Where the samples lie in time, stray ones apart [s since 1970-01-01 UTC]."""
@@ -151,6 +155,8 @@ class Source:
         for arrays in self.table.each(needed):
             held = dict(zip(needed, arrays, strict=True))
             stamp_s = [c.utc(*c.seconds([held[i] for i in c.columns]))[0] for c in clocks]
+            if self.tag >= 0 and self.clock.every_s:
+                stamp_s = [s[: max(len(s) // len(self.tags), 1)] for s in stamp_s]
             if np.isfinite(joined := np.concatenate(stamp_s)).any():
                 spans.append(main_span(joined))
         if not spans:

@@ -11,6 +11,7 @@ import pytest
 
 from analyzer.history import stamps
 from analyzer.history.export import open_export
+from analyzer.history.table import ReadOptions
 from identification.errors import InputError
 
 MOMENTS = pd.date_range("2024-11-21 08:00", periods=60, freq="5s", tz="UTC")
@@ -119,3 +120,40 @@ def test_stamps_that_lost_their_seconds(tmp_path: Path, long: bool, form: str, s
     else:
         export = open_export([tmp_path / "x.csv"])
         assert export.read([export.tags[0]])[export.tags[0]].stamp_s.size == 120
+
+
+@pytest.mark.parametrize("mark", [",", ";", "\t"])
+def test_a_name_split_over_columns_is_one_tag(tmp_path: Path, mark: str) -> None:
+    """Area, loop and parameter in columns of their own name a tag together."""
+    rows = [("time", "area", "loop", "parameter", "value")]
+    for k, at in enumerate(MOMENTS):
+        rows += [
+            (f"{at:%Y-%m-%d %H:%M:%S}", "A1", loop, p, k + i)
+            for loop in "FG"
+            for i, p in enumerate(("PV", "OP"))
+        ]
+    (tmp_path / "x.csv").write_text("\n".join(mark.join(map(str, row)) for row in rows) + "\n")
+    export = open_export([tmp_path / "x.csv"])
+    assert export.tags == ("A1/F.PV", "A1/F.OP", "A1/G.PV", "A1/G.OP")
+    np.testing.assert_array_equal(export.read(["A1/G.OP"])["A1/G.OP"].value, np.arange(60) + 1)
+
+
+@pytest.mark.parametrize("long", [False, True])
+def test_rows_of_one_stamp_need_their_interval(tmp_path: Path, long: bool) -> None:
+    """Where no stamp advances one line says what to state, and with the interval stated the rows are read."""
+    rows = [f"Aug-04-07 20:47:20,{k}" for k in range(60)]
+    if long:
+        rows = [f"{tag},{row}" for row in rows for tag in ("a.PV", "a.OP")]
+    head = "tag,Time,value" if long else "Time,a.PV"
+    (tmp_path / "x.csv").write_text("\n".join([head, *rows]) + "\n")
+    with pytest.raises(InputError, match=r"the time column 'Time' does not advance.*--interval 30s"):
+        open_export([tmp_path / "x.csv"])
+    for stated in ("30s", "0.5 min", "30000 ms", "30"):
+        export = open_export([tmp_path / "x.csv"], ReadOptions(interval=stated))
+        stamp_s = export.read(["a.PV"])["a.PV"].stamp_s
+        np.testing.assert_allclose(np.diff(stamp_s), 30.0)
+        assert len(stamp_s) == 60
+        assert export.span() == (stamp_s[0], stamp_s[-1])
+    for wrong in ("soon", "-3s", "0", "30 parsecs"):
+        with pytest.raises(InputError, match="--interval"):
+            open_export([tmp_path / "x.csv"], ReadOptions(interval=wrong))
