@@ -17,6 +17,7 @@ from analyzer.history.export import Export, ReadOptions, open_export
 from analyzer.history.files import own_scratch
 from analyzer.history.plant_clock import utc_seconds, zone_of
 from analyzer.history.series import Series
+from analyzer.limits import HISTORY
 from analyzer.loops.changes import TuningChange, read_changes
 from analyzer.loops.spec import LoopSpec, unknown_columns
 from analyzer.loops.tags import find_loops, match, read_loops
@@ -64,7 +65,8 @@ class Asked:
             if own:
                 kept = f"{self.loops}: columns {', '.join(own)} mean nothing here and are kept as the plant's own"
                 notes = (kept, *notes)
-        notes = (*notes, *_of_no_loop(self.changes, specs))
+        specs, currents = in_milliamperes(source, specs)
+        notes = (*notes, *currents, *_of_no_loop(self.changes, specs))
         return Plant(source, specs, self.config, self.span, self.changes, self.zone, notes)
 
 
@@ -95,6 +97,33 @@ def drafted(asked: Asked, told: Callable[[int, int], None]) -> list[Row]:
     InputError where the export cannot be used."""
     plant = guarded(asked)
     return draft(plant.export, () if asked.loops is None else plant.specs, asked.span, told)
+
+
+def in_milliamperes(
+    source: Export, specs: tuple[LoopSpec, ...]
+) -> tuple[tuple[LoopSpec, ...], tuple[str, ...]]:
+    """The loops, marked where their OPs look like currents, and a note on that: where no range of OP is stated, of
+    two or more loops, and each OP that is looked at lies within the range of a signal of 4 to 20 mA."""
+    unstated = [
+        s for s in specs if s.op and s.pv and s.stated.isdisjoint(("op_lo", "op_hi")) and s.op_hi == 100.0
+    ]
+    looked_at = unstated[: HISTORY.ma_loops]
+    if len(unstated) < 2 or not all(
+        _lies_within(source, str(s.op), HISTORY.ma_low, HISTORY.ma_high) for s in looked_at
+    ):
+        return specs, ()
+    said = f"OP of {len(unstated)} loops lies between 4 and 20, like mA: nothing is told in % of OP; state "
+    marked = tuple(replace(s, in_ma=True) if s in unstated else s for s in specs)
+    return marked, (f"{said}op_lo 4 and op_hi 20 in loops.csv, or 0 and 100 where it is percent",)
+
+
+def _lies_within(source: Export, tag: str, low: float, high: float) -> bool:
+    """Whether all good values of a tag lie between two others."""
+    with suppress(InputError):  # a damaged file is told of where its loop is assessed
+        series = source.read([tag])[tag]
+        value = series.value[~series.bad]
+        return value.size > 0 and bool(low <= value.min() and value.max() <= high)
+    return False
 
 
 def _of_no_loop(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> tuple[str, ...]:
