@@ -53,6 +53,7 @@ class LoopSpec:
     or tag that acts on OP beside the error, `feed` its tag where the export has it. `kp`, `ti`, `td` are as stated,
     in `gain_unit`, `ti_unit` and `form`; `pv_lo`, `pv_hi` and `gap` in the PV's own unit, `op_lo`, `op_hi`, the
     limits of OP and of its rate (a second) in the OP's. `kp` is 0 where the integral acts alone.
+    `upstream` is the loop (its PV) or tag that is this loop's measured load, `load` its tag where the export has it.
     `in_ma` is True where OP looks like a current of 4 to 20 mA and no range of it is stated.
     `extra` holds columns of the plant's own, `stated` the names of the columns that the row fills. `valid_from_s` is
     when the row's settings came into force [s since 1970-01-01 UTC], None where it does not say; `earlier` holds the
@@ -68,6 +69,7 @@ class LoopSpec:
     split_of: str = ""
     override_with: str = ""
     feedforward: str = ""
+    upstream: str = ""
     sp: str | None = None
     pv: str | None = None
     op: str | None = None
@@ -102,6 +104,7 @@ class LoopSpec:
     earlier: tuple[LoopSpec, ...] = ()
     beside: Output | None = None
     feed: str | None = None
+    load: str | None = None
     in_ma: bool = False
 
     @property

@@ -80,12 +80,17 @@ def _matched(spec: LoopSpec, known: Mapping[str, None], found: Mapping[str, str]
 
 
 def _with_tags_beside(spec: LoopSpec, by_loop: Mapping[str, LoopSpec], known: Mapping[str, None]) -> LoopSpec:
-    """A loop with the tags of those that it is judged beside, where the export has them."""
+    """A loop with the tags of those that it is judged beside or loaded by, where the export has them."""
     beside = spec.override_with or spec.split_of
-    other, fed = by_loop.get(beside) if beside != spec.loop else None, by_loop.get(spec.feedforward)
-    feed = fed.pv if fed is not None else spec.feedforward if spec.feedforward in known else None
+    other = by_loop.get(beside) if beside != spec.loop else None
+    feed, load = (_tag_of(name, by_loop, known) for name in (spec.feedforward, spec.upstream))
     output = Output(other.op, other.op_lo, other.op_hi) if other is not None and other.op else None
-    return spec if (output, feed) == (None, None) else replace(spec, beside=output, feed=feed)
+    return replace(spec, beside=output, feed=feed, load=load) if output or feed or load else spec
+
+
+def _tag_of(name: str, by_loop: Mapping[str, LoopSpec], known: Mapping[str, None]) -> str | None:
+    """The PV of a loop, or a tag, of this name; None where the export has neither."""
+    return by_loop[name].pv if name in by_loop else name if name in known else None
 
 
 def _missing(before: LoopSpec, after: LoopSpec) -> list[str]:
@@ -97,6 +102,8 @@ def _missing(before: LoopSpec, after: LoopSpec) -> list[str]:
         notes.append(f"{after.loop}: no OP of {beside} in the export, judged alone")
     if feed and after.feed is None:
         notes.append(f"{after.loop}: feedforward {feed} is neither a loop nor a tag of the export")
+    if after.upstream and after.load is None:
+        notes.append(f"{after.loop}: upstream {after.upstream} is neither a loop nor a tag of the export")
     return notes + [f"{after.loop}: {role.upper()} tag {tag} is not in the export" for role, tag in lost]
 
 
