@@ -21,6 +21,12 @@ class Sampled:
     values: NDArray[np.float64]
     dt_s: float
 
+    def of(self, tags: Sequence[str]) -> Sampled:
+        """Some of the tags, as far as they are held, in the order asked for."""
+        place = {tag: k for k, tag in enumerate(self.tags)}
+        known = [tag for tag in tags if tag in place]
+        return Sampled(tuple(known), self.values[:, [place[tag] for tag in known]], self.dt_s)
+
 
 def sampled(
     export: Export,

@@ -8,14 +8,15 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from analyzer.finder.clock import Sampled, sampled
-from analyzer.finder.pairs import Pair, found_pairs
+from analyzer.finder.pairs import Pair, found_pairs, known_pair
 from analyzer.history.export import Export
 from analyzer.limits import FINDER
-from analyzer.loops.spec import ROLES, STATED, LoopSpec
+from analyzer.loops.spec import RECORDED, ROLES, STATED, LoopSpec
 from analyzer.loops.tags import find_loops
 
 COLUMNS = (
@@ -42,6 +43,8 @@ HEAD = (
 
 
 ISA_NAME = re.compile(rf"(?<![A-Za-z])([{''.join(STATED['types'])}])(?:D?[IRT]?C[AV]?|[IT]{{1,2}})[-_ ]?\d")
+WITHIN_PCT = 5.0
+"""How far an OP in percent may lie beyond 0 and 100."""
 MOST_NAMES = 5
 """Loops that are named in a note."""
 
@@ -64,7 +67,7 @@ class Row:
     @property
     def as_run(self) -> LoopSpec:
         """The loop as a night has it: a range that is only recorded is none that is stated."""
-        return self.spec if self.found_by != "data" else replace(self.spec, pv_lo=None, pv_hi=None)
+        return replace(self.spec, pv_lo=None, pv_hi=None)
 
 
 def draft(
@@ -84,14 +87,26 @@ def draft(
         s for s in find_loops(export.tags) if s.pv not in taken and s.loop not in {r.spec.loop for r in rows}
     ]
     whole = [spec for spec in named if spec.op is not None]
-    rows += [
-        Row(spec, "names", FINDER.surest_pct, f"tags of one name: {', '.join(spec.tags)}") for spec in whole
-    ]
     taken |= {tag for spec in whole for tag in spec.tags}
     free = [tag for tag in export.tags if tag not in taken]
-    found = by_data(sampled(export, free, span, told)) if len(free) > 1 else []
+    held = sampled(export, [*free, *(tag for spec in whole for tag in spec.tags)], span, told)
+    rows += [_named(held, spec) for spec in whole]
+    found = by_data(held.of(free))
     rows += _joined(found, [spec for spec in named if spec.op is None])
     return rows
+
+
+def _named(held: Sampled, spec: LoopSpec) -> Row:
+    """A loop of names, with what its data show of type, ranges and settings."""
+    said = f"tags of one name: {', '.join(spec.tags)}"
+    known = [tag for tag in (spec.pv, spec.op, spec.sp) if tag in held.tags]
+    if known[:2] != [spec.pv, spec.op] or len(held.values) < FINDER.least_blocks:
+        return Row(spec, "names", FINDER.surest_pct, said)
+    own = held.of(known)
+    pair = known_pair(own.values)
+    shown = _shown(own, pair)
+    law = f"; {_law(own, pair)}" if pair.told >= FINDER.law_told and pair.kp else ""
+    return Row(replace(spec, type=type_of(spec.loop), **shown), "names", FINDER.surest_pct, said + law)
 
 
 def found_told(rows: Sequence[Row]) -> tuple[str, ...]:
@@ -112,45 +127,49 @@ def by_data(held: Sampled) -> list[Row]:
     """Loops that the data of tags show."""
     pairs = found_pairs(held.values)
     outputs = {
-        held.values[:, p.op].tobytes(): held.tags[p.pv] for p in pairs if p.sure_pct >= FINDER.sure_pct
+        held.values[:, p.op].tobytes(): _name(held.tags[p.pv], held.tags[p.op])
+        for p in pairs
+        if p.sure_pct >= FINDER.sure_pct
     }
     return [_row(held, pair, outputs) for pair in pairs]
 
 
 def _row(held: Sampled, pair: Pair, outputs: dict[bytes, str]) -> Row:
-    pv, op = (held.values[:, k] for k in (pair.pv, pair.op))
+    name = _name(held.tags[pair.pv], held.tags[pair.op])
     master = "" if pair.sp is None else outputs.get(held.values[:, pair.sp].tobytes(), "")
-    low, high = _extremes(pv)
-    bounds = (0.0, 100.0) if op.min() >= -5.0 and op.max() <= 105.0 else _extremes(op)
-    ti = pair.ti_samples
-    told = pair.told >= FINDER.law_told
     spec = LoopSpec(
-        _name(held.tags[pair.pv], held.tags[pair.op]),
+        name,
         type=type_of(held.tags[pair.pv]),
-        master="" if master == held.tags[pair.pv] else master,
+        master="" if master == name else master,
         sp=None if pair.sp is None else held.tags[pair.sp],
         pv=held.tags[pair.pv],
         op=held.tags[pair.op],
-        pv_lo=low,
-        pv_hi=high,
-        op_lo=bounds[0],
-        op_hi=bounds[1],
-        kp=pair.kp if told and pair.kp else None,
-        ti=None if ti is None or not told else 0.0 if math.isinf(ti) else ti * held.dt_s,
-        gain_unit="engineering",
-        scan_s=None,
     )
-    return Row(spec, "data", pair.sure_pct, _says(held, pair))
+    says = f"{_law(held, pair)}; {100 * pair.noise:.0f} % of their noise is one; next best tag "
+    says += f"{100 * pair.runner_up / max(pair.weight, 1e-9):.0f} % as like"
+    says += "" if pair.sp is None else f"; {spec.sp} is where PV is held"
+    return Row(replace(spec, **_shown(held, pair)), "data", pair.sure_pct, says)
 
 
-def _says(held: Sampled, pair: Pair) -> str:
-    """What speaks for a pair, in one sentence."""
+def _shown(held: Sampled, pair: Pair) -> dict[str, Any]:
+    """Columns of loops.csv that the data of a loop show: recorded ranges, and the settings where the law is plain."""
+    pv, op = (held.values[:, k] for k in (pair.pv, pair.op))
+    (pv_lo, pv_hi), (op_lo, op_hi) = _extremes(pv), _extremes(op)
+    if op.min() >= -WITHIN_PCT and op.max() <= 100.0 + WITHIN_PCT:
+        op_lo, op_hi = 0.0, 100.0
+    shown: dict[str, Any] = {"pv_lo": pv_lo, "pv_hi": pv_hi, "op_lo": op_lo, "op_hi": op_hi}
+    if pair.told < FINDER.law_told or not pair.kp or pair.ti_samples is None:
+        return shown
+    ti = 0.0 if math.isinf(pair.ti_samples) else pair.ti_samples * held.dt_s
+    return {**shown, "kp": pair.kp, "ti": ti, "gain_unit": "engineering"}
+
+
+def _law(held: Sampled, pair: Pair) -> str:
+    """The law of a pair, in words."""
     way = "direct" if pair.kp < 0 else "reverse"
     law = "P alone" if pair.ti_samples == math.inf else "PI"
-    said = f"{held.tags[pair.op]} follows {held.tags[pair.pv]} by a law ({law}, {way} acting) that explains "
-    said += f"{100 * pair.law:.0f} % of its moves; {100 * pair.noise:.0f} % of their noise is one"
-    said += f"; next best tag {100 * pair.runner_up / max(pair.weight, 1e-9):.0f} % as like"
-    return said + ("" if pair.sp is None else f"; {held.tags[pair.sp]} is where PV is held")
+    shown = f"explains {100 * pair.law:.0f} % of its moves"
+    return f"{held.tags[pair.op]} follows {held.tags[pair.pv]} by a law ({law}, {way} acting) that {shown}"
 
 
 def _joined(found: Sequence[Row], open_loops: Sequence[LoopSpec]) -> list[Row]:
@@ -205,7 +224,7 @@ def as_csv(rows: Sequence[Row]) -> str:
 
 def _cell(row: Row, column: str) -> str:
     own = {
-        "ranges": "recorded" if row.found_by == "data" else "",
+        "ranges": RECORDED if row.found_by != "stated" and row.spec.has_pv_range else "",
         "found_by": row.found_by,
         "sure_pct": f"{row.sure_pct:.0f}",
         "says": row.says,
@@ -213,7 +232,9 @@ def _cell(row: Row, column: str) -> str:
     if column in own:
         return own[column]
     value = getattr(row.spec, column)
-    spoken = row.found_by == "data" or column in row.spec.stated or column in ("loop", *ROLES)
+    settings = column in ("kp", "ti", "gain_unit", "ti_unit")
+    seen = row.spec.kp is not None if settings else row.spec.has_pv_range or column in ("type", "master")
+    spoken = (row.found_by != "stated" and seen) or column in row.spec.stated or column in ("loop", *ROLES)
     if value is None or not spoken:
         return ""
     return f"{value:.4g}" if isinstance(value, float) else str(value)

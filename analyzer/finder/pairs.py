@@ -119,12 +119,12 @@ def errors(bag: Bag) -> list[Cause]:
     whole = len(bag.values) // width * width
     slow = bag.values[:whole, moving].reshape(-1, width, len(moving)).mean(axis=1)
     mean, spread = slow.mean(axis=0), np.maximum(slow.std(axis=0), 1e-9)
-    unit = (slow - mean) / spread
+    unit, twice = (slow - mean) / spread, np.array([bag.twice(k) for k in moving])
     found: set[Cause] = set()
     for i in np.flatnonzero(np.isin(moving, bag.live)):
         alike = unit.T @ unit[:, i] / len(unit)
         away = np.abs(mean - mean[i]) / np.maximum(spread, spread[i])
-        may = (alike > FINDER.follows) | np.array([bag.twice(k) for k in moving])
+        may = (alike > FINDER.follows) | twice
         near = np.flatnonzero(may & (away < FINDER.about) & (np.arange(len(mean)) != i))
         for k in near[np.argsort(-alike[near])][: FINDER.set_points if len(bag.live) < FINDER.many else 1]:
             pair = int(moving[i]), int(moving[k])
@@ -143,10 +143,9 @@ class Scores:
     moves: Sequence[Moves]
     widths: Sequence[int]
 
-    @property
-    def weight(self) -> NDArray[np.float32]:
-        """Shape (widths, causes, tags)."""
-        return np.asarray(self.law * np.sqrt(self.noise))
+    def weight(self, *at: slice | int | NDArray[np.int64]) -> NDArray[np.float32]:
+        """How much like a controller's, at places of (widths, causes, tags)."""
+        return np.asarray(self.law[at] * np.sqrt(self.noise[at]))
 
 
 def scored(bag: Bag) -> Scores:
@@ -202,13 +201,14 @@ def _one_to_one(bag: Bag, scores: Scores) -> list[tuple[int, int]]:
 def _preferred(bag: Bag, scores: Scores) -> Matrix:
     """Weights of causes and tags, shape (causes, tags): a set point beside PV comes first where the law is better for
     it than by either alone, and then is neither PV nor OP itself."""
-    weight = scores.weight.max(axis=0)
+    weight = np.max([scores.weight(w) for w in range(len(scores.widths))], axis=0)
     alone = {cause[0]: c for c, cause in enumerate(scores.causes) if len(cause) == 1}
     set_points = set()
     for c, cause in enumerate(scores.causes):
         if len(cause) > 1:
             each = np.max([scores.law[:, alone[k]] for k in cause], axis=0)
-            near = scores.weight[:, c] >= FINDER.likely * scores.weight[:, c].max(axis=0)
+            own = scores.weight(slice(None), c)
+            near = own >= FINDER.likely * own.max(axis=0)
             better = ((1 - scores.law[:, c] < FINDER.better * (1 - each)) & near).any(axis=0)
             weight[c] = np.where(
                 better, np.maximum(weight[c], weight[[alone[k] for k in cause]].max(axis=0)), 0.0
@@ -226,11 +226,11 @@ def _preferred(bag: Bag, scores: Scores) -> Matrix:
 def _pair(bag: Bag, scores: Scores, c: int, j: int) -> Pair:
     """The pair of a cause and a tag at the width where it shows most; one of a PV alone at the finest, for in longer
     blocks all that shares a wave looks like a law."""
-    cause, tag, weight = scores.causes[c], bag.live[j], scores.weight
+    cause, tag, weight = scores.causes[c], bag.live[j], scores.weight(slice(None), c, j)
     asked = np.array([FINDER.weights[FINDER.widths.index(width)] for width in scores.widths])
     pv, sp = _pv_and_sp(bag, cause, tag) if len(cause) > 1 else (cause[0], None)
-    w = int(np.argmax(weight[:, c, j] / asked)) if sp is not None else 0
-    others = [k for k, other in enumerate(scores.causes[: len(bag.live)]) if other[0] not in (*cause, tag)]
+    w = int(np.argmax(weight / asked)) if sp is not None else 0
+    others = np.flatnonzero(~np.isin(bag.live, (*cause, tag)))
     law = scores.law[:, c, j]
     told = int(np.argmax(law >= min(FINDER.law_told, law.max())))
     acts = sp is not None and _acts(bag, (pv, sp, tag), scores.widths[told])
@@ -242,7 +242,7 @@ def _pair(bag: Bag, scores: Scores, c: int, j: int) -> Pair:
         noise=float(scores.noise[w, c, j]),
         width=scores.widths[w],
         asked=float(asked[w]),
-        runner_up=float(weight[w, others, j].max(initial=0.0)),
+        runner_up=float(scores.weight(w, others, j).max(initial=0.0)),
         towards=FINDER.certain if acts else _towards(bag, scores, c, j),
         shared=any(map(bag.twice, (pv, tag))),
         told=float(scores.law[told, c, j]),
@@ -303,6 +303,19 @@ def _with_set_points(bag: Bag, pairs: Sequence[Pair]) -> list[Pair]:
     loose = [k for k in range(len(free)) if k not in claimed]
     out = [_with_set_point(pair, gap[i], held.get(i), free, loose) for i, pair in enumerate(pairs)]
     return sorted((_with_settings(bag, p) for p in out), key=lambda p: -p.weight)
+
+
+def known_pair(values: Matrix) -> Pair:
+    """The law of a loop whose tags are known: PV, OP and, where there is one, SP, shape (n, 2) or (n, 3)."""
+    sp = 2 if values.shape[1] > 2 else None
+    error = values[:, 0] - (0.0 if sp is None else values[:, 2])
+    columns, each = np.column_stack([error, values[:, 1]]), widths(len(values))
+    moves = [Moves.of(columns, width) for width in each]
+    law = np.array([explained(m, m)[0, 1] for m in moves])
+    told = int(np.argmax(law >= min(FINDER.law_told, law.max())))
+    noise = float(shared_noise(moves[told], moves[told])[0, 1])
+    found = Pair(0, 1, sp, float(law[told]), noise, each[told], 1.0, 0.0)
+    return _with_settings(Bag.of(values), replace(found, told=float(law[told]), told_width=each[told]))
 
 
 def _with_settings(bag: Bag, pair: Pair) -> Pair:

@@ -27,6 +27,8 @@ CELLS: Mapping[str, Any] = STATED["cells"]
 NUMBERS: Mapping[str, tuple[float, float]] = CELLS["numbers"]
 CHOICES: Mapping[str, Sequence[str]] = CELLS["choices"]
 VALID_FROM = "valid_from"
+RECORDED = "recorded"
+"""What a draft writes into the column `ranges` of a row whose PV range is what was recorded: none that is stated."""
 COLUMNS = (*CELLS["texts"], *ROLES, *NUMBERS, *CHOICES, VALID_FROM)
 OWN_COLUMNS = ("op_unit", "sp_unit", "ranges", "found_by", "sure_pct", "says")
 """Near to a known name, and yet none misspelt; and what `triage loops` writes beside a row."""
@@ -239,7 +241,8 @@ def _spec(where: str, cells: Mapping[str, str], zone: str, day_first: bool | Non
         if low is None or high is None or not high - low > 1e-9 * max(abs(low), abs(high), 1.0):
             seen = f"{where}: {signal}_lo {low} and {signal}_hi {high}"
             raise InputError(seen, f"{signal}_hi above {signal}_lo, both or neither", "correct the range")
-    return spec
+    drafted = extra.get("ranges", "").lower() == RECORDED
+    return replace(spec, pv_lo=None, pv_hi=None, stated=spec.stated - {"pv_lo", "pv_hi"}) if drafted else spec
 
 
 def _number_in_bounds(where: str, name: str, cell: str) -> float:

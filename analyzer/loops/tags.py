@@ -26,7 +26,8 @@ def find_loops(tags: Iterable[str]) -> tuple[LoopSpec, ...]:
 def no_loops(tags: Sequence[str]) -> InputError:
     """What is said of an export whose tags name no loop."""
     seen = f"no loops in the export, whose tags are {', '.join(tags[:8])}{', ...' if len(tags) > 8 else ''}"
-    return InputError(seen, "tags such as LOOP.PV", "state them with --loops loops.csv")
+    remedy = "let 'triage loops' look for them in the data, or state them with --loops loops.csv"
+    return InputError(seen, "tags such as LOOP.PV", remedy)
 
 
 def match(specs: Sequence[LoopSpec], tags: Iterable[str]) -> tuple[tuple[LoopSpec, ...], tuple[str, ...]]:
