@@ -167,9 +167,13 @@ def _shown(held: Sampled, pair: Pair) -> dict[str, Any]:
 def _law(held: Sampled, pair: Pair) -> str:
     """The law of a pair, in words."""
     way = "direct" if pair.kp < 0 else "reverse"
-    law = "P alone" if pair.ti_samples == math.inf else "PI"
+    law = (
+        f"{'P alone' if pair.ti_samples == math.inf else 'PI'}, {way} acting"
+        if pair.told
+        else "of unknown sign"
+    )
     shown = f"explains {100 * pair.law:.0f} % of its moves"
-    return f"{held.tags[pair.op]} follows {held.tags[pair.pv]} by a law ({law}, {way} acting) that {shown}"
+    return f"{held.tags[pair.op]} follows {held.tags[pair.pv]} by a law ({law}) that {shown}"
 
 
 def _joined(found: Sequence[Row], open_loops: Sequence[LoopSpec]) -> list[Row]:

@@ -35,9 +35,9 @@ class Pair:
     innovations of OP and PV that is one; asked : weight from which a pair counts at this width; runner_up : weight of
     the next best tag; towards : how much more the law holds from PV to OP than back; nearer : how much nearer SP lies
     to the mean of PV than to that of OP; own : how near a set point of no other pair lies to OP, 1 where far;
-    shared : whether OP or PV is another loop's set point as well; told : share that the law
-    explains in blocks of `told_width`, the shortest in which it holds; kp : gain, in units of OP per unit of PV,
-    negative where OP rises with PV; ti_samples : integral time, inf where no integral acts, None where two
+    shared : whether OP or PV is another loop's set point as well; acts : whether SP moves OP as PV does; told : share
+    that the law explains in blocks of `told_width`, the shortest in which it holds; kp : gain, in units of OP per
+    unit of PV, negative where OP rises with PV; ti_samples : integral time, inf where none acts, None where two
     ways to it disagree: noise of PV between its samples hides it from the one, not from the other, which asks the
     samples beside.
     """
@@ -54,6 +54,7 @@ class Pair:
     nearer: float = 0.0
     own: float = 1.0
     shared: bool = False
+    acts: bool = False
     told: float = 0.0
     told_width: int = 1
     kp: float = 0.0
@@ -66,15 +67,17 @@ class Pair:
 
     @property
     def sure_pct(self) -> float:
-        """How sure the pair is [%], by the weakest of its signs: the weight, the runner-up, which of both is OP."""
+        """How sure the pair is [%], by the weakest of its signs: the weight, the runner-up, which of both is OP;
+        and an OP that rises with PV, where nothing tells which is which, may be the PV of a follower."""
         signs = (
-            self.weight / self.asked,
-            self.noise / FINDER.least_noise,
+            self.weight / (self.asked * (FINDER.acting if self.acts else 1.0)),
+            self.noise / (FINDER.least_noise * (FINDER.acting if self.acts else 1.0)),
             (FINDER.second_shared if self.shared else FINDER.second)
             * self.weight
             / max(self.runner_up, 1e-9),
             (self.towards + self.nearer) / FINDER.turned,
             self.own / FINDER.own if self.weight < FINDER.plain else np.inf,
+            np.inf if self.kp >= 0.0 or self.towards >= 1.0 else FINDER.direct,
         )
         odds = FINDER.sure_pct / (100.0 - FINDER.sure_pct) * max(min(signs), 0.0) ** 2
         return float(min(100.0 * odds / (1.0 + odds), FINDER.surest_pct))
@@ -179,13 +182,25 @@ def found_pairs(values: Matrix) -> list[Pair]:
     if len(bag.live) < 2 or len(values) < FINDER.least_blocks:
         return []
     scores = scored(bag)
-    chosen = _one_to_one(bag, scores)
-    return _with_set_points(bag, [_pair(bag, scores, c, j) for c, j in chosen])
+    weight, set_points = _preferred(bag, scores)
+    chosen = _one_to_one(bag, scores, weight)
+    taken = _taken(bag, scores, chosen, set_points)
+    return _with_set_points(bag, [_pair(bag, scores, c, j, taken) for c, j in chosen])
 
 
-def _one_to_one(bag: Bag, scores: Scores) -> list[tuple[int, int]]:
+def _taken(
+    bag: Bag, scores: Scores, chosen: Sequence[tuple[int, int]], set_points: set[int]
+) -> NDArray[np.float64]:
+    """The weight of the pair in which each live tag is, 0 where it is in none, inf for set points; shape (tags,)."""
+    weight = np.where(np.isin(bag.live, list(set_points)), np.inf, 0.0)
+    for c, j in chosen:
+        own = np.isin(bag.live, (*scores.causes[c], bag.live[j]))
+        weight[own] = np.maximum(weight[own], scores.weight(slice(None), c, j).max())
+    return weight
+
+
+def _one_to_one(bag: Bag, scores: Scores, weight: NDArray[np.float32]) -> list[tuple[int, int]]:
     """Causes and tags, each tag in one pair at most: the likest first. A set point stands for itself no more."""
-    weight = _preferred(bag, scores)
     taken: set[int] = set()
     chosen = []
     likely = np.flatnonzero(weight >= FINDER.least_weight)
@@ -198,9 +213,9 @@ def _one_to_one(bag: Bag, scores: Scores) -> list[tuple[int, int]]:
     return chosen
 
 
-def _preferred(bag: Bag, scores: Scores) -> Matrix:
-    """Weights of causes and tags, shape (causes, tags): a set point beside PV comes first where the law is better for
-    it than by either alone, and then is neither PV nor OP itself."""
+def _preferred(bag: Bag, scores: Scores) -> tuple[NDArray[np.float32], set[int]]:
+    """Weights of causes and tags, shape (causes, tags), and the set points: one beside PV comes first where the law
+    is better for it than by either alone, and then is neither PV nor OP itself."""
     weight = np.max([scores.weight(w) for w in range(len(scores.widths))], axis=0)
     alone = {cause[0]: c for c, cause in enumerate(scores.causes) if len(cause) == 1}
     set_points = set()
@@ -214,23 +229,28 @@ def _preferred(bag: Bag, scores: Scores) -> Matrix:
                 better, np.maximum(weight[c], weight[[alone[k] for k in cause]].max(axis=0)), 0.0
             )
             j = int(np.argmax(weight[c]))
-            sp = _pv_and_sp(bag, cause, bag.live[j])[1]
+            sp = _pv_and_sp(bag, scores, cause, bag.live[j])[1]
             if not bag.twice(sp) and weight[c, j] > FINDER.likely:
                 set_points.add(sp)
     single = [c for c, cause in enumerate(scores.causes) if len(cause) == 1]
     weight[[c for c in single if scores.causes[c][0] in set_points or c >= len(bag.live)]] = 0.0
     weight[:, np.isin(bag.live, list(set_points))] = 0.0
-    return weight
+    return weight, set_points
 
 
-def _pair(bag: Bag, scores: Scores, c: int, j: int) -> Pair:
-    """The pair of a cause and a tag at the width where it shows most; one of a PV alone at the finest, for in longer
-    blocks all that shares a wave looks like a law."""
+def _pair(bag: Bag, scores: Scores, c: int, j: int, taken: NDArray[np.float64]) -> Pair:
+    """The pair of a cause and a tag at the width where it shows most; one of a PV alone in samples, or in blocks so
+    long that no wave is left in them, for between these all that shares a wave looks like a law.
+
+    taken : weight of the pair of each live tag; one that is surer of another pair is no runner-up.
+    """
     cause, tag, weight = scores.causes[c], bag.live[j], scores.weight(slice(None), c, j)
     asked = np.array([FINDER.weights[FINDER.widths.index(width)] for width in scores.widths])
-    pv, sp = _pv_and_sp(bag, cause, tag) if len(cause) > 1 else (cause[0], None)
-    w = int(np.argmax(weight / asked)) if sp is not None else 0
+    pv, sp = _pv_and_sp(bag, scores, cause, tag) if len(cause) > 1 else (cause[0], None)
+    may = [True, *(sp is not None or width >= FINDER.longest for width in scores.widths[1:])]
+    w = int(np.argmax(np.where(may, weight / asked, 0.0)))
     others = np.flatnonzero(~np.isin(bag.live, (*cause, tag)))
+    rivals = scores.weight(w, others, j)
     law = scores.law[:, c, j]
     told = int(np.argmax(law >= min(FINDER.law_told, law.max())))
     acts = sp is not None and _acts(bag, (pv, sp, tag), scores.widths[told])
@@ -242,10 +262,11 @@ def _pair(bag: Bag, scores: Scores, c: int, j: int) -> Pair:
         noise=float(scores.noise[w, c, j]),
         width=scores.widths[w],
         asked=float(asked[w]),
-        runner_up=float(scores.weight(w, others, j).max(initial=0.0)),
+        runner_up=float(np.max(rivals, where=rivals > FINDER.second * taken[others], initial=0.0)),
         towards=FINDER.certain if acts else _towards(bag, scores, c, j),
+        acts=acts,
         shared=any(map(bag.twice, (pv, tag))),
-        told=float(scores.law[told, c, j]),
+        told=float(law[told]) if sp is not None or w == 0 else 0.0,  # SP may have moved both
         told_width=scores.widths[told],
     )
 
@@ -271,20 +292,30 @@ def _towards(bag: Bag, scores: Scores, c: int, j: int) -> float:
     return float(np.clip(max(found, key=abs) / FINDER.errors, -FINDER.certain, FINDER.certain))
 
 
-def _pv_and_sp(bag: Bag, cause: Cause, op: int) -> tuple[int, int]:
-    """Which of two tags that follow one another is PV, and which SP: what another holds too, or moves seldom; else SP
-    is the one that does not follow OP a few samples later."""
+def _pv_and_sp(bag: Bag, scores: Scores, cause: Cause, op: int) -> tuple[int, int]:
+    """Which of two tags that follow one another is PV, and which SP: what another tag holds too, in its own scale
+    (the output of a master, the PV of a leader), or what moves seldom; else SP does not follow OP later."""
     pv, sp = cause
     moved = [int((np.diff(bag.values[:, k]) != 0).sum()) for k in cause]
-    if bag.twice(pv) != bag.twice(sp):
-        swap = bag.twice(pv)
-    elif min(moved) < FINDER.seldom * max(moved):
+    held = [_held_elsewhere(bag, scores, k, (*cause, op)) for k in cause]
+    seldom = min(moved) < FINDER.seldom * max(moved)
+    if held[0] != held[1] and min(moved) > FINDER.steps * max(moved):
+        swap = held[0]
+    elif seldom:
         swap = moved[0] < moved[1]
     else:
         left = innovations(np.diff(bag.values[:, [*cause, op]], axis=0))
         after = [[np.dot(left[:-k, 2], left[k:, i]) ** 2 for k in range(1, FINDER.later)] for i in (0, 1)]
         swap = sum(after[0]) / np.dot(left[:, 0], left[:, 0]) < sum(after[1]) / np.dot(left[:, 1], left[:, 1])
     return (sp, pv) if swap else (pv, sp)
+
+
+def _held_elsewhere(bag: Bag, scores: Scores, tag: int, own: Cause) -> bool:
+    """Whether a tag's innovations are those of another tag that is none of its `own` loop."""
+    if bag.twice(tag) or tag not in bag.live:
+        return bag.twice(tag)
+    others = np.flatnonzero(~np.isin(bag.live, own))
+    return bool(scores.noise[0, bag.live.index(tag), others].max(initial=0.0) > FINDER.copied)
 
 
 def _with_set_points(bag: Bag, pairs: Sequence[Pair]) -> list[Pair]:
