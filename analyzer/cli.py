@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands import explain, options, report, run, store, test_plan
+from analyzer.commands import explain, loops, options, report, run, store, test_plan
 from analyzer.commands.options import say
 from analyzer.loop.decisions import Lane
 from reports.texts import visible
@@ -39,6 +39,7 @@ def main() -> None:
 
 
 @main.command()
+@options.finding
 @options.export_options
 def check(asked: Asked) -> None:
     """What was read: loops, tags, gaps, quality, and which questions it is fit for.
@@ -139,7 +140,7 @@ def config() -> None:
 
 
 for command in (
-    *(run.run, report.report, report.pages, store.note, store.summary, store.store),
+    *(loops.loops, run.run, report.report, report.pages, store.note, store.summary, store.store),
     *(explain.explain, explain.simulate, test_plan.test_plan),
 ):
     main.add_command(command)

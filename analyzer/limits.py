@@ -9,6 +9,10 @@ class HistoryLimits(Limits, section="history"):
     """How exports are read: what their columns, clocks and names are known by, and what is too much to read."""
 
 
+class FinderLimits(Limits, section="finder"):
+    """What tags must show before they are taken as a loop (analyzer/finder)."""
+
+
 class WaveLimits(Limits, section="waves"):
     """What is kept of a loop's waves and moves, and when those of two loops can be compared: alike in all nights."""
 
@@ -37,6 +41,6 @@ class PageLimits(Limits, section="pages"):
     """How much pages tell."""
 
 
-HISTORY, WAVES, LOOP = HistoryLimits(), WaveLimits(), LoopLimits()
+HISTORY, FINDER, WAVES, LOOP = HistoryLimits(), FinderLimits(), WaveLimits(), LoopLimits()
 EXPLAIN, STORE, PAGES = ExplainingLimits(), StoreLimits(), PageLimits()
 CLUSTER, STORAGE = ClusterLimits(), StorageLimits()

@@ -135,3 +135,18 @@ def test_the_table_of_faults_names_tests_that_exist():
         assert (ROOT / path).exists(), path
     for module in re.findall(r"python -m (tests\.[\w.]+)", page):
         assert (ROOT / (module.replace(".", "/") + ".py")).exists(), module
+
+
+def test_the_first_evening_goes_as_it_stands(tmp_path, monkeypatch):
+    """The five commands of docs/first-evening.md lead from an export without loops.csv to a list and pages."""
+    page = (ROOT / "docs" / "first-evening.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```sh\n(.*?)```", page, flags=re.DOTALL)
+    commands = [line.split()[1:] for line in block.splitlines()]
+    assert [command[0] for command in commands] == ["loops", "check", "run", "rank", "pages"]
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sample_data").symlink_to(ROOT / "sample_data")
+    done = [CliRunner().invoke(main, command, catch_exceptions=False) for command in commands]
+    assert [d.exit_code for d in done] == [0, 1, 0, 0, 0]  # of one loop nothing is recorded: check says so
+    assert "21 of 22 loops assessed" in done[2].output
+    assert "FIC2110" in done[3].output
+    assert (tmp_path / "evening" / "pages" / "index.html").exists()

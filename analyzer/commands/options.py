@@ -174,6 +174,12 @@ TIMES = ("%Y-%m-%d", *(f"%Y-%m-%d{between}%H:%M{end}" for between in "T " for en
 """How --since and --until may be written."""
 
 
+def finding(command: Command) -> Command:
+    """--find-loops, of commands that take their loops from the export where no loops.csv is given."""
+    said = "Without --loops: look for loops in the data too, where the tags' names tell none."
+    return click.option("--find-loops", "finding", is_flag=True, help=said)(command)
+
+
 def of_loop(text: str) -> Callable[[Command], Command]:
     """--loop, which names the one loop that a command is about."""
     return click.option("--loop", "tag", required=True, help=text)
@@ -206,6 +212,7 @@ READING = {
     "--encoding": "Encoding of text exports. Default: detected.",
     "--day-first/--month-first": "Order in dates such as 03/04/2026.",
     "--date-format": "Format of the stamps, e.g. '%d-%b-%y %H:%M:%S'.",
+    "--interval": "Time between rows, e.g. 30s, of an export whose stamps do not advance.",
     "--time-column": "Name of the column of stamps. Default: detected.",
     "--quality-column": "Name of a long export's column of quality codes. Default: detected.",
     "--good-quality": "Quality code or text that means good; may be repeated.",
@@ -231,6 +238,7 @@ def export_options(command: Command) -> Command:
         from analyzer.night.asked import asked_of
 
         reading = {name: given.pop(name) for name in ("since", "until", *names)}
+        reading["finding"] = given.pop("finding", False)
         return command(asked=asked_of(export, loops, changes, read_config(config), **reading), **given)
 
     reads = [click.option(name, help=text, **KINDS.get(name, {})) for name, text in READING.items()]

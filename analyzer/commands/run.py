@@ -29,6 +29,7 @@ from analyzer.commands.options import (
     age_told,
     bar,
     export_options,
+    finding,
     say,
     unforeseen,
     what_failed,
@@ -121,6 +122,7 @@ def stoppable() -> Iterator[None]:
 
 
 @click.command()
+@finding
 @export_options
 @click.option(
     "--store", required=True, type=PLACE, help="Directory, or URL of shared storage, that keeps the results."

@@ -55,9 +55,10 @@ class Case:
 
 
 def tags_of(spec: LoopSpec, specs: Sequence[LoopSpec]) -> list[str]:
-    """Tags that explaining a loop reads: its own, and the OPs of some other loops."""
+    """Tags that explaining a loop reads: its own, its measured load, and the OPs of some other loops."""
     others = [s.op for s in specs if s.loop != spec.loop and s.op]
-    return list(dict.fromkeys([*spec.tags, *others[: EXPLAIN.neighbours]]))
+    load = [] if spec.load is None else [spec.load]
+    return list(dict.fromkeys([*spec.tags, *load, *others[: EXPLAIN.neighbours]]))
 
 
 def stated_law(spec: LoopSpec, prepared: Prepared) -> StatedSettings | None:
@@ -72,15 +73,17 @@ def stated_law(spec: LoopSpec, prepared: Prepared) -> StatedSettings | None:
 def ops_beside(
     spec: LoopSpec, specs: tuple[LoopSpec, ...], series: Mapping[str, Series], p: Prepared, config: Config
 ) -> tuple[Floats, ...]:
-    """OPs of the export's other loops on this loop's clock."""
+    """The measured load that loops.csv states [% of its recorded range], and OPs of the export's other loops, on this
+    loop's clock."""
     r = p.record
     clock = r.start_s + r.time_s
+    beside = dict.fromkeys([spec.load, *(s.op for s in specs if s.loop != spec.loop)])
     out = []
-    for other in specs:
-        if other.loop != spec.loop and other.op and other.op in series:
-            op, gap = onto_clock(series[other.op], clock, r.dt_s, config.quality)
-            if not gap.all() and float(np.ptp(op)) > 0:
-                out.append(op)
+    for tag in beside:
+        if tag and tag in series:
+            value, gap = onto_clock(series[tag], clock, r.dt_s, config.quality)
+            if not gap.all() and float(np.ptp(value)) > 0:
+                out.append(100.0 * (value - value.min()) / np.ptp(value) if tag == spec.load else value)
     return tuple(out)
 
 

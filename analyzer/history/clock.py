@@ -37,7 +37,9 @@ class TimeScale:
     @property
     def note(self) -> str:
         """How stamps of this scale are read."""
-        said = f"stamps are {'texts' if self is ELAPSED else 'numbers'}, read as {self.name}"
+        if self == OF_DAY:
+            return f"stamps are {self.name}; export the date too, so that the night has its own"
+        said = f"stamps are {'texts' if self == ELAPSED else 'numbers'}, read as {self.name}"
         another = (
             ", from 1970 on; state the unit in the column's name, as in 'Time (ms)', where it is another"
         )
@@ -51,6 +53,8 @@ SINCE_START = {unit: TimeScale(**scale) for unit, scale in WORDS["since_start"].
 """Clocks that count from the start, by the unit that the column's name states."""
 ELAPSED = TimeScale("hours, minutes and seconds since the start", 0, 0, 1.0)
 """A clock in text that counts from the start, such as 25:10:03."""
+OF_DAY = TimeScale("times of day with no date, from 1970-01-01 on, a day more at each midnight", 0, 0, 1.0)
+"""A clock in text that states no date, such as 23:00:00."""
 WITHOUT_LEAP = "so read, the stamps run without a leap"
 MIDNIGHT = r"[ T]0?0:00:00(?:\.0+)?$"
 COUNTED = r"^\s*(?P<h>\d{1,5}):(?P<m>[0-5]\d):(?P<s>[0-5]\d(?:[.,]\d+)?)\s*$"
@@ -102,6 +106,8 @@ class Clock:
         Offset of the stated zone's winter time [s east of Greenwich] where the clock keeps it all the year.
     doubt : str
         What of the zone is not known, for the notes.
+    every_s : float
+        Stated time between rows whose stamps do not advance [s]; 0 where they do.
     """
 
     columns: tuple[int, ...]
@@ -114,21 +120,27 @@ class Clock:
     offset_s: float | None = None
     winter_s: float | None = None
     doubt: str = ""
+    every_s: float = 0.0
 
     def seconds(self, arrays: Sequence[pa.Array]) -> tuple[NDArray[np.float64], bool]:
         """Seconds since 1970-01-01 on the file's clock, NaN where unreadable; True where that is local."""
         second, local = self._seconds(arrays)
         with np.errstate(invalid="ignore"):
             known = (second >= HISTORY.earliest_s) & (second < HISTORY.latest_s)
-            return np.where(known, second, np.nan), local
+        second = np.where(known, second, np.nan)
+        if self.every_s and known.any():
+            second = second[known][0] + self.every_s * np.arange(len(second))
+        return second, local
 
     def _seconds(self, arrays: Sequence[pa.Array]) -> tuple[NDArray[np.float64], bool]:
         if self.below_s > 0:
             second, local = replace(self, below_s=0.0).seconds(arrays[:-1])
             return second + numbers(pc.fill_null(arrays[-1], 0)) * self.below_s, local
         column, scale = date_and_time(arrays), self.scale
-        if scale is ELAPSED:
+        if scale == ELAPSED:
             return counted_s(as_text(column)), False
+        if scale == OF_DAY:
+            return of_day_s(as_text(column)), False
         if pa.types.is_date(column.type):
             column = pc.cast(column, pa.timestamp("s"))
         if pa.types.is_timestamp(column.type):
@@ -152,6 +164,8 @@ class Clock:
     def notes(self) -> tuple[str, ...]:
         """How the stamps are read, where that is not plain from their writing."""
         notes = [] if self.scale is None else [self.scale.note]
+        if self.every_s:
+            notes.append(f"stamps do not advance: rows are taken as {self.every_s:g} s apart, as stated")
         if self.order is not None:
             notes.append(f"dates are read {self.order.first} first: {self.order.why}")
         if self.local and self.offset_s is not None:
@@ -186,21 +200,32 @@ def time_scale_of(column: pa.Array, unit: str = "") -> TimeScale | None:
         return None
     middle, reach = float(np.median(number)), float(np.ptp(number))
     found = next((scale for scale in SCALES if scale.low <= middle < scale.high), None)
+    since = SINCE_START[unit or _unit_by_step(number)]
+    counted = since.low <= middle < since.high
     if found is not None:
         in_days = found.unit_s == DAY_S  # such numbers hardly change over an export
-        seconds = (found.unit_s, found.origin_s) == (1.0, 0.0)
-        other = unit in ("ms", "s", "min", "h") if in_days else unit not in ("", "s") and seconds
-        if not (other or (in_days and reach > HISTORY.excel_days)):
+        of_unix = found.origin_s == 0.0 and not found.local
+        other = (
+            unit in ("ms", "s", "min", "h")
+            if in_days
+            else of_unix and unit != "" and since.unit_s != found.unit_s
+        )
+        plausible = counted and HISTORY.least_step_s <= _step(number) * since.unit_s <= HISTORY.most_step_s
+        if not ((other and (in_days or plausible)) or (in_days and reach > HISTORY.excel_days)):
             return found
-    since = SINCE_START[unit or _unit_by_step(number)]
-    return since if since.low <= middle < since.high else None
+    return since if counted else None
+
+
+def _step(number: NDArray[np.float64]) -> float:
+    """The usual distance of neighbouring numbers that differ; 0 where none do."""
+    steps = np.abs(np.diff(number))
+    return float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
 
 
 def _unit_by_step(number: NDArray[np.float64]) -> str:
     """'ms' for counts that step by what only milliseconds do, 's' for others: trends of loops are sampled every few
     seconds, or every few minutes."""
-    steps = np.abs(np.diff(number))
-    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    step = _step(number)
     whole = bool((number % 1 == 0).all())
     return "ms" if whole and step >= HISTORY.least_ms_step and (step % 60 != 0 or step % 1000 == 0) else "s"
 
@@ -212,6 +237,18 @@ def counted_s(texts: pa.Array) -> NDArray[np.float64]:
         numbers(pc.replace_substring(pc.struct_field(parts, name), ",", ".")) for name in "hms"
     )
     return np.asarray(3600.0 * hour + 60.0 * minute + second)
+
+
+def of_day_s(texts: pa.Array) -> NDArray[np.float64]:
+    """Times of day as seconds, shape (n,), NaN where they are none: a day more, or less, where one lies over half a
+    day from the last."""
+    parts = fields(pc.binary_join_element_wise("1970-01-01", pc.utf8_trim_whitespace(texts), " "))
+    if parts is None:
+        return np.full(len(texts), np.nan)
+    second = np.where(parts.readable, parts.clock_s, np.nan)
+    known = np.isfinite(second)
+    second[known] = np.unwrap(second[known], period=DAY_S)
+    return np.asarray(second - DAY_S * np.floor(np.min(second[known], initial=DAY_S) / DAY_S))
 
 
 def date_and_time(arrays: Sequence[pa.Array]) -> pa.Array:

@@ -168,6 +168,7 @@ def _check_stated(options: ReadOptions) -> None:
     """Raise InputError for options that no file could be read with."""
     if options.timezone is not None:
         zone_of(options.timezone or "nowhere")
+    _ = options.interval_s
     mark, encoding, written = options.delimiter, options.encoding, options.date_format
     if mark is not None and (len(mark) != 1 or mark in '\r\n"\0'):
         raise InputError(f"--delimiter {mark!r}", "one character, no quote and no end of line", "correct it")

@@ -139,9 +139,13 @@ class Source:
         second, local = self.clock.seconds([arrays[i] for i in self.clock.columns])
         rows = _rows_of(arrays[self.tag], list(wanted))
         return {
-            tag: self._samples(c, arrays, self.clock.utc(second[rows[tag]], local), rows[tag])
+            tag: self._samples(c, arrays, self.clock.utc(second[self._stamped(rows[tag])], local), rows[tag])
             for tag, c in wanted.items()
         }
+
+    def _stamped(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The rows whose stamps those of a tag of a long table have: its own, or the first where none advances."""
+        return np.arange(len(rows)) if self.clock.every_s else rows
 
     def span(self) -> MainSpan:
         """Where the samples lie in time, stray ones apart [s since 1970-01-01 UTC]."""
@@ -151,6 +155,8 @@ class Source:
         for arrays in self.table.each(needed):
             held = dict(zip(needed, arrays, strict=True))
             stamp_s = [c.utc(*c.seconds([held[i] for i in c.columns]))[0] for c in clocks]
+            if self.tag >= 0 and self.clock.every_s:
+                stamp_s = [s[: max(len(s) // len(self.tags), 1)] for s in stamp_s]
             if np.isfinite(joined := np.concatenate(stamp_s)).any():
                 spans.append(main_span(joined))
         if not spans:
@@ -188,7 +194,8 @@ def _taken(column: pa.Array, rows: Rows) -> pa.Array:
 def open_wide(table: Table, options: ReadOptions) -> Source:
     """Take a table as wide: one time column, and a column for each tag."""
     clock = find_clock(table, options)
-    free = [i for i in range(len(table.names)) if i not in clock.columns and _holds_values(table, i)]
+    others = [i for i in range(len(table.names)) if i not in clock.columns and _holds_values(table, i)]
+    free = [i for i in others if not _counts_rows(table, i)] or others
     partner, said = quality_columns(table, free)
     values_in = [i for i in free if i not in partner.values()]
     if not values_in or not _any_number(table, values_in):
@@ -229,6 +236,15 @@ def _any_number(table: Table, columns: Sequence[int]) -> bool:
     texts = [h for h in heads if is_text(h.type) and h.null_count < len(h)]
     read = (parsed([str(text).strip() for text in h.unique().to_pylist()], table.decimal)[0] for h in texts)
     return len(texts) < len(heads) or any(np.isfinite(number).any() for number in read)
+
+
+def _counts_rows(table: Table, i: int) -> bool:
+    """Whether a column is named for that and numbers the rows, up or down: an index is no tag."""
+    if plain(table.names[i]) not in COLUMNS["index"] or not pa.types.is_integer(table.types[i]):
+        return False
+    number = table.head([i])[0].drop_null().to_numpy(zero_copy_only=False)
+    steps = np.unique(np.diff(number.astype(np.int64))).tolist()
+    return steps in ([1], [-1])
 
 
 def _holds_values(table: Table, i: int) -> bool:

@@ -1,14 +1,16 @@
-"""Layouts that no table is: blocks of one tag after another, and columns of blanks, laid beside as plain tables."""
+"""Layouts that no table is, laid beside as plain ones: blocks of one tag after another, columns of blanks, and long
+tables whose tags stand in several columns."""
 
 from __future__ import annotations
 
+import csv
 import re
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from analyzer.history.table import any_of
+from analyzer.history.table import COLUMNS, any_of, first_named, plain
 from analyzer.limits import HISTORY
 
 DELIMITERS = (";", "\t", "|", ",")
@@ -30,7 +32,7 @@ def rewritten(path: Path, encoding: str, lines: Sequence[str], place: Path) -> P
     `lines` are the file's first ones, the copy is laid under `place`.
     """
     filled = [line for line in lines if line.strip()]
-    rewrite = _blocks(filled) or _columns(filled[: 4 * HISTORY.layout_lines])
+    rewrite = _blocks(filled) or _in_parts(filled) or _columns(filled[: 4 * HISTORY.layout_lines])
     if rewrite is None:
         return None
     out = Path(tempfile.mkdtemp(prefix="rewritten-", dir=place)) / path.name
@@ -76,6 +78,31 @@ def _blocks(filled: Sequence[str]) -> Rewrite | None:
             elif tag:
                 cells = [cell.strip().strip('"') for cell in line.rstrip("\n").split(delimiter)]
                 yield [tag, *cells, *(["good"] if len(cells) < 3 else [])][:4]
+
+    return rows
+
+
+def _in_parts(filled: Sequence[str]) -> Rewrite | None:
+    """How a long table is read whose tag is a role alone, PV or OP, and whose loop stands in other columns."""
+    lines = [line for line in filled if not line.startswith("#")]
+    delimiter = max(DELIMITERS, key=lines[0].count) if lines else ""
+    head, *rest = list(csv.reader(lines, delimiter=delimiter)) if lines else [[]]
+    tag = first_named(head, COLUMNS["tag"])
+    parts = [i for i, name in enumerate(head) if plain(name) in COLUMNS["name_part"] and i != tag]
+    rows_here = [row for row in rest if len(row) == len(head) and row != head]
+    if tag is None or not parts or len(rows_here) < len(rest) - 1 or not rows_here:
+        return None
+    if not all(plain(row[tag]) in COLUMNS["bare_ending"] for row in rows_here):
+        return None
+    kept = [i for i in range(len(head)) if i not in parts]
+
+    def rows(source: Iterator[str]) -> Iterator[Sequence[str]]:
+        yield [head[i] for i in kept]
+        held = (line for line in source if line.strip() and not line.startswith("#"))
+        for row in csv.reader(held, delimiter=delimiter):
+            if len(row) == len(head) and row != head:
+                loop = "/".join(row[i].strip() for i in parts if row[i].strip())
+                yield [f"{loop}.{row[i].strip()}" if i == tag else row[i] for i in kept]
 
     return rows
 

@@ -34,10 +34,13 @@ PATTERN = (
     r"(?:[T ,]+(?:klo )?(?P<h>\d{1,2})[:.](?P<m>\d\d)(?:[:.](?P<s>\d\d)(?:[.,:;](?P<f>\d+))?)?"
     r"\s*(?:(?P<p>[AaPp])(?:\.?[Mm]\.?|\s*$))?)?"
     r"\s*[(\[]?(?:UTC|GMT)?\s*(?P<z>[A-Z]{1,5}|[+-]\d\d(?::?\d\d)?)?[)\]]?"
-    r"(?:\s*[(\[]?(?P<n>[A-Z][A-Za-z]+/[A-Za-z_/]+|[A-Z][A-Za-z]+(?: [A-Za-z]+)+)[)\]]?)?\s*$"
+    r"(?:\s*[(\[]?(?P<n>[A-Z][A-Za-z]+/[A-Za-z_/]+|[A-Z][A-Za-z]*\.?(?: [A-Za-z.]+)+)[)\]]?)?\s*$"
 )
 REARRANGED = [(way["written"].replace("LETTER", LETTER), way["meant"]) for way in WORDS["rearranged"]]
 """Writings that are brought into the form of the pattern, and what they become."""
+CROATIAN = dict(zip(WORDS["croatian"]["names"], WORDS["croatian"]["months"], strict=True))
+CROATIAN_ALONE = tuple(WORDS["croatian"]["alone"])
+CROATIAN_ZONES = frozenset(WORDS["croatian"]["zones"])
 MONTHS = {begins: int(month) for month, words in WORDS["months"].items() for begins in words}
 LONGEST_MONTH = max(map(len, MONTHS))
 FIRST = {"year": 0, "day": 1, "month": 2}
@@ -54,6 +57,10 @@ HEADER_ZONE = re.compile(
 )
 NAMED_ZONE = re.compile(r"(?P<zone>[A-Z][A-Za-z]+/[A-Za-z_]+(?:/[A-Za-z_]+)?)[)\]]?\s*$")
 """A zone of the database of time zones at the end of a stamp or a column's name."""
+ZONE_WORDS = {words.lower(): zone for words, zone in WORDS["zone_words"].items()}
+WORDED_ZONE = re.compile(
+    r"(?P<words>[A-Z][A-Za-z.]*(?: [A-Z][A-Za-z.]*)*) (?:Standard|Summer|Daylight) Time[)\]]?\s*$"
+)
 OFFSETS_H = {name: float(hours) for hours, names in WORDS["zone_letters"]["hours"].items() for name in names}
 SEVERAL = frozenset(WORDS["zone_letters"]["several"])
 
@@ -75,7 +82,12 @@ def own_letters(timezone: str | None) -> Mapping[str, float]:
 
 
 def named_zone(text: str) -> str | None:
-    """The zone at the end of a stamp or a column's name, as in '[Europe/Berlin]'; None where none is known there."""
+    """The zone at the end of a stamp or a column's name, as in '[Europe/Berlin]' or 'W. Europe Standard Time'; None
+    where none is known there."""
+    worded = WORDED_ZONE.search(text[-60:])
+    for k in range(len(words := worded["words"].split(" ")) if worded is not None else 0):
+        if (zone := ZONE_WORDS.get(" ".join(words[k:]).lower())) is not None:
+            return zone
     found = NAMED_ZONE.search(text[-60:])
     try:
         return None if found is None else ZoneInfo(found["zone"]).key
@@ -148,8 +160,8 @@ def fields(texts: pa.Array, timezone: str | None = None) -> Fields | None:
     offset_s = _offset(part["z"], known)
     clock_s, shown = _clock(part)
     return Fields(
-        _number_or_month(part["a"]),
-        _number_or_month(part["b"]),
+        _number_or_month(part["a"], timezone),
+        _number_or_month(part["b"], timezone),
         _whole_numbers(part["c"]),
         clock_s,
         offset_s,
@@ -171,6 +183,9 @@ def _readable(parts: pa.Array, part: dict[str, pa.Array], known: Mapping[str, fl
     told = pc.and_(pc.is_valid(parts), meant)
     if pc.any(pc.not_equal(part["n"], "")).as_py():
         words = pc.and_(pc.match_substring(part["n"], " "), pc.equal(part["z"], ""))
+        kinds = pc.unique(part["n"])
+        unknown = kinds.filter(pa.array([named_zone(text) is None for text in kinds.to_pylist()]))
+        words = pc.and_(words, pc.is_in(part["n"], value_set=unknown))
         told = pc.and_(told, pc.invert(words))
     return _numpy(told)
 
@@ -217,18 +232,21 @@ def _whole_numbers(texts: pa.Array) -> NDArray[np.int64]:
     return _numpy(pc.cast(pc.if_else(pc.equal(texts, ""), "0", texts), pa.int64()))
 
 
-def _number_or_month(texts: pa.Array) -> NDArray[np.int64]:
+def _number_or_month(texts: pa.Array, timezone: str | None) -> NDArray[np.int64]:
     """Numbers, and months by their names; 0 for what is neither."""
     if pc.all(pc.or_(pc.utf8_is_digit(texts), pc.equal(texts, ""))).as_py():
         return _whole_numbers(texts)
     kinds = pc.dictionary_encode(texts)
-    meant = [int(t) if t.isdecimal() else _month(t.lower()) for t in kinds.dictionary.to_pylist()]
+    names = [name.lower() for name in kinds.dictionary.to_pylist()]
+    croatian = timezone in CROATIAN_ZONES or any(name.startswith(CROATIAN_ALONE) for name in names)
+    known = {**MONTHS, **CROATIAN} if croatian else MONTHS
+    meant = [int(name) if name.isdecimal() else _month(name, known) for name in names]
     return np.array(meant, dtype=np.int64)[_numpy(kinds.indices)]
 
 
-def _month(name: str) -> int:
+def _month(name: str, known: Mapping[str, int]) -> int:
     begins = (name[:n] for n in range(LONGEST_MONTH, 0, -1))
-    return next((MONTHS[b] for b in begins if b in MONTHS), 0)
+    return next((known[b] for b in begins if b in known), 0)
 
 
 def _clock(part: dict[str, pa.Array]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:

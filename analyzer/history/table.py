@@ -23,6 +23,9 @@ from identification.errors import InputError
 HEAD_ROWS = 1000
 """Rows by which a table is known before it is read."""
 WORDS: dict[str, Any] = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
+INTERVAL = re.compile(r"^\s*(?P<number>\d+(?:[.,]\d+)?)\s*(?P<unit>[A-Za-zµμ]*)\s*$")
+UNITS_S = {unit: scale["unit_s"] for unit, scale in WORDS["since_start"].items()}
+"""Units of time [s]."""
 COLUMNS: dict[str, tuple[str, ...]] = {kind: tuple(names) for kind, names in WORDS["columns"].items()}
 
 
@@ -40,6 +43,8 @@ class ReadOptions:
         Format of the stamps in the notation of `datetime.strptime`.
     timezone : str or None
         IANA name of the zone of stamps that state none; None takes them as UTC.
+    interval : str or None
+        Time between rows, such as 30s or 5 min, of a table whose stamps do not advance.
     time_column, quality_column : str or None
         Names of the columns of stamps and, in long tables, of quality codes as they stand in the header.
     good_quality : tuple of str or None
@@ -55,9 +60,25 @@ class ReadOptions:
     date_format: str | None = None
     timezone: str | None = None
     good_quality: tuple[str, ...] | None = None
+    interval: str | None = None
     time_column: str | None = None
     quality_column: str | None = None
     scratch: Path | None = None
+
+    @property
+    def interval_s(self) -> float:
+        """The stated time between rows [s], 0 where none is stated. Raises InputError where it is no such time."""
+        if self.interval is None:
+            return 0.0
+        found = INTERVAL.match(self.interval)
+        unit = {"": "s", "m": "min"}.get(found["unit"].lower(), found["unit"].lower()) if found else ""
+        each = [float(s) for name, s in UNITS_S.items() if re.fullmatch(any_of(name), unit)]
+        number = float(found["number"].replace(",", ".")) if found else 0.0
+        if not each or not 0.0 < number * each[0] < 1e6:
+            raise InputError(
+                f"--interval {self.interval!r}", "a time such as 30s, 5min or 500ms", "correct it"
+            )
+        return number * each[0]
 
     @property
     def place(self) -> Path:

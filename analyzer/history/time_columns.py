@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from analyzer.history import stamps
 from analyzer.history.clock import (
     ELAPSED,
+    OF_DAY,
     SINCE_START,
     WITHOUT_LEAP,
     Clock,
@@ -100,8 +101,18 @@ def find_clock(table: Table, options: ReadOptions, tag: int = -1) -> Clock:
     second, local = clock.seconds(table.head(clock.columns))
     if np.isnan(second).all():
         raise _unreadable(table, clock.columns[0])
-    _check_seconds(table, second, tag)
-    return _in_zone(table, replace(clock, local=local), table.names[clock.columns[0]])
+    stands = _stands(table, second, tag)
+    if stands and not options.interval_s:
+        seen = f"{table.path}: the time column '{table.names[clock.columns[0]]}' does not advance"
+        remedy = "export the stamps, or state the time between rows, such as --interval 30s"
+        raise InputError(seen, "a stamp of its own for each row", remedy)
+    if not stands:
+        _check_seconds(table, second, tag)
+    return _in_zone(
+        table,
+        replace(clock, local=local, every_s=options.interval_s if stands else 0.0),
+        table.names[clock.columns[0]],
+    )
 
 
 def stamps_clock(table: Table, column: int, options: ReadOptions, name: str) -> Clock:
@@ -110,6 +121,14 @@ def stamps_clock(table: Table, column: int, options: ReadOptions, name: str) -> 
     scale = time_scale_of(head, time_unit(table.names[column])) if is_number(head.type) else None
     clock = _with_order(table, Clock((column,), timezone=options.timezone, scale=scale), options)
     return _in_zone(table, replace(clock, local=clock.seconds([head])[1]), name)
+
+
+def _stands(table: Table, second: NDArray[np.float64], tag: int) -> bool:
+    """Whether all first rows have one stamp [s], each of the tags in more than one of them."""
+    known = second[np.isfinite(second)]
+    if known.size < HISTORY.minutes_rows or np.ptp(known) > 0.0:
+        return False
+    return tag < 0 or len(pc.unique(table.head([tag])[0])) <= HISTORY.minutes_share * known.size
 
 
 def _check_seconds(table: Table, second: NDArray[np.float64], tag: int) -> None:
@@ -246,7 +265,7 @@ def _is_doubtful(
     if is_stamp(table.names[chosen]):
         return False
     unread = [i for i, head in heads.items() if kinds[i] == "" and head.null_count < len(head)]
-    if any(is_stamp(table.names[i]) for i in unread) or clock.scale in (None, ELAPSED):
+    if any(is_stamp(table.names[i]) for i in unread) or clock.scale in (None, ELAPSED, OF_DAY):
         return any(is_stamp(table.names[i]) for i in unread)
     number = numbers(heads[chosen])
     return number.size > 1 and bool((np.diff(number) == 1).all()) and number[0] in (0.0, 1.0)
@@ -314,7 +333,7 @@ def _chosen(
         known = second[np.isfinite(second)]
         if known.size and (known[0] < 60.0 or known.max() > 86400.0):
             return replace(clock, columns=(i,), scale=ELAPSED)
-    return None
+    return replace(clock, columns=(times[0],), scale=OF_DAY) if times else None
 
 
 def _by_name(table: Table, columns: Sequence[int]) -> list[int]:

@@ -143,7 +143,7 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
         saturated = masked.mask("saturated") & ~shared.idle  # at rest a limit limits nothing
         masks = {**masked.masks, "saturated": saturated, "idle": shared.idle}
         masked = replace(masked, masks=MappingProxyType(masks))
-    return replace(_described(masked, scale, op_known, step, limits), shared=shared)
+    return replace(_described(masked, scale, op_known, spec.in_ma, step, limits), shared=shared)
 
 
 def _shared(
@@ -245,7 +245,7 @@ def op_range(scale: Scale, op: Floats) -> Needs:
 
 
 def _described(
-    record: LoopRecord, scale: Scale, op_known: bool, pv_step: float, limits: QualityLimits
+    record: LoopRecord, scale: Scale, op_known: bool, in_ma: bool, pv_step: float, limits: QualityLimits
 ) -> Prepared:
     compressed = float(record.mask("compressed").mean())
     notes = []
@@ -255,7 +255,7 @@ def _described(
         notes.append("no SP recorded: estimated as the median of PV")
     if not op_known:
         notes.append("no OP recorded: no cause can be told")
-    op_scaled = not op_known or op_in_range(record.op, limits)
+    op_scaled = not op_known or (op_in_range(record.op, limits) and not in_ma)
     if not op_scaled:
         notes.append(str(op_range(scale, record.op)))
     for name in ("gap", "stale", "saturated", "manual", "idle"):

@@ -27,8 +27,11 @@ CELLS: Mapping[str, Any] = STATED["cells"]
 NUMBERS: Mapping[str, tuple[float, float]] = CELLS["numbers"]
 CHOICES: Mapping[str, Sequence[str]] = CELLS["choices"]
 VALID_FROM = "valid_from"
+RECORDED = "recorded"
+"""What a draft writes into the column `ranges` of a row whose PV range is what was recorded: none that is stated."""
 COLUMNS = (*CELLS["texts"], *ROLES, *NUMBERS, *CHOICES, VALID_FROM)
-OWN_COLUMNS = ("op_unit", "sp_unit")  # near to a known name, and yet none misspelt
+OWN_COLUMNS = ("op_unit", "sp_unit", "ranges", "found_by", "sure_pct", "says")
+"""Near to a known name, and yet none misspelt; and what `triage loops` writes beside a row."""
 OTHER_NAMES = {other: ours for ours, others in STATED["other_names"].items() for other in others}
 
 
@@ -52,6 +55,8 @@ class LoopSpec:
     or tag that acts on OP beside the error, `feed` its tag where the export has it. `kp`, `ti`, `td` are as stated,
     in `gain_unit`, `ti_unit` and `form`; `pv_lo`, `pv_hi` and `gap` in the PV's own unit, `op_lo`, `op_hi`, the
     limits of OP and of its rate (a second) in the OP's. `kp` is 0 where the integral acts alone.
+    `upstream` is the loop (its PV) or tag that is this loop's measured load, `load` its tag where the export has it.
+    `in_ma` is True where OP looks like a current of 4 to 20 mA and no range of it is stated.
     `extra` holds columns of the plant's own, `stated` the names of the columns that the row fills. `valid_from_s` is
     when the row's settings came into force [s since 1970-01-01 UTC], None where it does not say; `earlier` holds the
     loop's rows before it, the oldest first.
@@ -66,6 +71,7 @@ class LoopSpec:
     split_of: str = ""
     override_with: str = ""
     feedforward: str = ""
+    upstream: str = ""
     sp: str | None = None
     pv: str | None = None
     op: str | None = None
@@ -100,6 +106,8 @@ class LoopSpec:
     earlier: tuple[LoopSpec, ...] = ()
     beside: Output | None = None
     feed: str | None = None
+    load: str | None = None
+    in_ma: bool = False
 
     @property
     def tags(self) -> tuple[str, ...]:
@@ -176,7 +184,7 @@ def csv_table(path: Path, of: str) -> tuple[list[str], list[tuple[int, dict[str,
     text = data.decode(detect_encoding(data), errors="replace").lstrip("\ufeff")
     if max(map(len, text.split("\n"))) > csv.field_size_limit():
         raise InputError(f"{path}: a line of more than 128 kB", f"one row a {of}", "correct the file")
-    first = next((line for line in text.splitlines() if line.strip()), "")
+    first = next((line for line in text.splitlines() if line.strip() and line[:1] != "#"), "")
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=max(",;\t", key=first.count))
     rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
     rows = [(row, cells) for row, cells in rows if any(cells) and not cells[0].startswith("#")]
@@ -233,7 +241,8 @@ def _spec(where: str, cells: Mapping[str, str], zone: str, day_first: bool | Non
         if low is None or high is None or not high - low > 1e-9 * max(abs(low), abs(high), 1.0):
             seen = f"{where}: {signal}_lo {low} and {signal}_hi {high}"
             raise InputError(seen, f"{signal}_hi above {signal}_lo, both or neither", "correct the range")
-    return spec
+    drafted = extra.get("ranges", "").lower() == RECORDED
+    return replace(spec, pv_lo=None, pv_hi=None, stated=spec.stated - {"pv_lo", "pv_hi"}) if drafted else spec
 
 
 def _number_in_bounds(where: str, name: str, cell: str) -> float:

@@ -4,75 +4,30 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from analyzer.loops.spec import ROLES, STATED, LoopSpec, Output, read_loops
+from analyzer.loops.names import loops_of
+from analyzer.loops.spec import ROLES, LoopSpec, Output, read_loops
 from identification.errors import InputError
 from identification.models import Form, Pid
 
-ENDINGS: Mapping[str, Mapping[str, Sequence[str]]] = STATED["endings"]
-"""By control system and role."""
-_KNOWN = {ending for roles in ENDINGS.values() for endings in roles.values() for ending in endings}
-_ENDINGS = "|".join(re.escape(ending) for ending in sorted(_KNOWN))
-_SPLIT = re.compile(rf"^(?P<loop>.+?)(?:[._:/]| (?=\w{{4,}}$))(?P<ending>{_ENDINGS})$", re.IGNORECASE)
-_BLOCK = re.compile(r"^(?P<module>.+)/[^/]+$")
 UNNAMED = re.compile(r"column \d+")
 """Name of a column of a table without a header."""
 __all__ = ["LoopSpec", "as_stated", "controller", "find_loops", "match", "no_loops", "read_loops"]
 
 
 def find_loops(tags: Iterable[str]) -> tuple[LoopSpec, ...]:
-    """Loops with at least a PV, found by the endings of the tags."""
+    """Loops with at least a PV, found by the names of the tags."""
     return tuple(LoopSpec(loop, **tags_of) for loop, tags_of in loops_of(tags).items())  # type: ignore[arg-type]
-
-
-def loops_of(tags: Iterable[str]) -> dict[str, dict[str, str]]:
-    """Loops with at least a PV: name to the tag of each role ('sp', 'pv', 'op', 'mode', 'position').
-
-    A function block is left out of the name where its module has no other: FIC1/PID1/PV.CV is of loop FIC1.
-    """
-    groups: dict[str, dict[str, str]] = {}
-    for tag in tags:
-        split = _SPLIT.match(tag)
-        if split:
-            groups.setdefault(split["loop"], {}).setdefault(split["ending"].upper(), tag)
-    found = {loop: _roles(endings) for loop, endings in groups.items()}
-    return _without_blocks({loop: roles for loop, roles in found.items() if "pv" in roles})
-
-
-def _roles(endings: Mapping[str, str]) -> dict[str, str]:
-    """Tags by role, as the control system has it that explains most endings."""
-    readings = [
-        {
-            role: next(endings[e] for e in system[role] if e in endings)
-            for role in ROLES
-            if not endings.keys().isdisjoint(system.get(role, ()))
-        }
-        for system in ENDINGS.values()
-    ]
-    roles = max(readings, key=lambda roles: ("pv" in roles, len(roles)))
-    for role in ("sp", "op"):
-        others = (ending for system in ENDINGS.values() for ending in system.get(role, ()))
-        free = (endings[e] for e in others if e in endings and endings[e] not in roles.values())
-        if role not in roles and (tag := next(free, None)) is not None:
-            roles[role] = tag
-    return roles
-
-
-def _without_blocks(loops: dict[str, dict[str, str]]) -> dict[str, dict[str, str]]:
-    modules = {loop: match["module"] for loop in loops if (match := _BLOCK.match(loop))}
-    blocks = Counter(modules.values())
-    single = {loop: module for loop, module in modules.items() if blocks[module] == 1}
-    return {single.get(loop, loop) if single.get(loop) not in loops else loop: loops[loop] for loop in loops}
 
 
 def no_loops(tags: Sequence[str]) -> InputError:
     """What is said of an export whose tags name no loop."""
     seen = f"no loops in the export, whose tags are {', '.join(tags[:8])}{', ...' if len(tags) > 8 else ''}"
-    return InputError(seen, "tags such as LOOP.PV", "state them with --loops loops.csv")
+    remedy = "let 'triage loops' look for them in the data, or state them with --loops loops.csv"
+    return InputError(seen, "tags such as LOOP.PV", remedy)
 
 
 def match(specs: Sequence[LoopSpec], tags: Iterable[str]) -> tuple[tuple[LoopSpec, ...], tuple[str, ...]]:
@@ -126,12 +81,17 @@ def _matched(spec: LoopSpec, known: Mapping[str, None], found: Mapping[str, str]
 
 
 def _with_tags_beside(spec: LoopSpec, by_loop: Mapping[str, LoopSpec], known: Mapping[str, None]) -> LoopSpec:
-    """A loop with the tags of those that it is judged beside, where the export has them."""
+    """A loop with the tags of those that it is judged beside or loaded by, where the export has them."""
     beside = spec.override_with or spec.split_of
-    other, fed = by_loop.get(beside) if beside != spec.loop else None, by_loop.get(spec.feedforward)
-    feed = fed.pv if fed is not None else spec.feedforward if spec.feedforward in known else None
+    other = by_loop.get(beside) if beside != spec.loop else None
+    feed, load = (_tag_of(name, by_loop, known) for name in (spec.feedforward, spec.upstream))
     output = Output(other.op, other.op_lo, other.op_hi) if other is not None and other.op else None
-    return spec if (output, feed) == (None, None) else replace(spec, beside=output, feed=feed)
+    return replace(spec, beside=output, feed=feed, load=load) if output or feed or load else spec
+
+
+def _tag_of(name: str, by_loop: Mapping[str, LoopSpec], known: Mapping[str, None]) -> str | None:
+    """The PV of a loop, or a tag, of this name; None where the export has neither."""
+    return by_loop[name].pv if name in by_loop else name if name in known else None
 
 
 def _missing(before: LoopSpec, after: LoopSpec) -> list[str]:
@@ -143,6 +103,8 @@ def _missing(before: LoopSpec, after: LoopSpec) -> list[str]:
         notes.append(f"{after.loop}: no OP of {beside} in the export, judged alone")
     if feed and after.feed is None:
         notes.append(f"{after.loop}: feedforward {feed} is neither a loop nor a tag of the export")
+    if after.upstream and after.load is None:
+        notes.append(f"{after.loop}: upstream {after.upstream} is neither a loop nor a tag of the export")
     return notes + [f"{after.loop}: {role.upper()} tag {tag} is not in the export" for role, tag in lost]
 
 

@@ -12,10 +12,12 @@ from typing import Any
 from weakref import finalize
 
 from analyzer.config import Config, WorkerLimits
+from analyzer.finder.draft import Row, draft, found_told
 from analyzer.history.export import Export, ReadOptions, open_export
 from analyzer.history.files import own_scratch
 from analyzer.history.plant_clock import utc_seconds, zone_of
 from analyzer.history.series import Series
+from analyzer.limits import HISTORY
 from analyzer.loops.changes import TuningChange, read_changes
 from analyzer.loops.spec import LoopSpec, unknown_columns
 from analyzer.loops.tags import find_loops, match, read_loops
@@ -33,7 +35,7 @@ class Asked:
     """Files, loops.csv, changes of settings, span of time [s since 1970-01-01 UTC] and limits.
 
     zone : the plant's time zone, of nights, pages and options; reading : how text exports are read, as in
-    analyzer.history.table.
+    analyzer.history.table; finding : whether, without loops.csv, loops are looked for in the data as well.
     """
 
     export: tuple[Path, ...]
@@ -43,13 +45,18 @@ class Asked:
     config: Config
     zone: str
     reading: Mapping[str, Any]
+    finding: bool = False
 
     def opened(self) -> Plant:
         """The export and its loops, found by their tags' endings where no loops.csv is given, and what there is to
         say of them and of the changes."""
         source = open_export(list(self.export), ReadOptions(**self.reading))
         notes: tuple[str, ...] = ()
-        if self.loops is None:
+        if self.loops is None and self.finding:
+            rows = draft(source, (), self.span)
+            specs = tuple(row.as_run for row in rows if row.sure)
+            notes = found_told(rows)
+        elif self.loops is None:
             specs = find_loops(source.tags)
         else:
             stated = read_loops(self.loops, self.zone, self.reading.get("day_first"))
@@ -58,7 +65,8 @@ class Asked:
             if own:
                 kept = f"{self.loops}: columns {', '.join(own)} mean nothing here and are kept as the plant's own"
                 notes = (kept, *notes)
-        notes = (*notes, *_of_no_loop(self.changes, specs))
+        specs, currents = in_milliamperes(source, specs)
+        notes = (*notes, *currents, *_of_no_loop(self.changes, specs))
         return Plant(source, specs, self.config, self.span, self.changes, self.zone, notes)
 
 
@@ -69,6 +77,7 @@ def asked_of(
     config: Config,
     since: datetime | None = None,
     until: datetime | None = None,
+    finding: bool = False,
     **reading: Any,
 ) -> Asked:
     """What a command line or a notebook asks; times that state no zone are of the plant's clock."""
@@ -80,7 +89,41 @@ def asked_of(
     last = last if until is None else utc_seconds(until, zone)
     if last <= first:
         raise InputError(f"--since {since} --until {until}", "an end after the start", "swap them")
-    return Asked(tuple(export), loops, dated, (first, last), config, zone, reading)
+    return Asked(tuple(export), loops, dated, (first, last), config, zone, reading, finding)
+
+
+def drafted(asked: Asked, told: Callable[[int, int], None]) -> list[Row]:
+    """The rows of a draft of loops.csv, those of a given one first; `told` is told of tags read, and of all. Raises
+    InputError where the export cannot be used."""
+    plant = guarded(asked)
+    return draft(plant.export, () if asked.loops is None else plant.specs, asked.span, told)
+
+
+def in_milliamperes(
+    source: Export, specs: tuple[LoopSpec, ...]
+) -> tuple[tuple[LoopSpec, ...], tuple[str, ...]]:
+    """The loops, marked where their OPs look like currents, and a note on that: where no range of OP is stated, of
+    two or more loops, and each OP that is looked at lies within the range of a signal of 4 to 20 mA."""
+    unstated = [
+        s for s in specs if s.op and s.pv and s.stated.isdisjoint(("op_lo", "op_hi")) and s.op_hi == 100.0
+    ]
+    looked_at = unstated[: HISTORY.ma_loops]
+    if len(unstated) < 2 or not all(
+        _lies_within(source, str(s.op), HISTORY.ma_low, HISTORY.ma_high) for s in looked_at
+    ):
+        return specs, ()
+    said = f"OP of {len(unstated)} loops lies between 4 and 20, like mA: nothing is told in % of OP; state "
+    marked = tuple(replace(s, in_ma=True) if s in unstated else s for s in specs)
+    return marked, (f"{said}op_lo 4 and op_hi 20 in loops.csv, or 0 and 100 where it is percent",)
+
+
+def _lies_within(source: Export, tag: str, low: float, high: float) -> bool:
+    """Whether all good values of a tag lie between two others."""
+    with suppress(InputError):  # a damaged file is told of where its loop is assessed
+        series = source.read([tag])[tag]
+        value = series.value[~series.bad]
+        return value.size > 0 and bool(low <= value.min() and value.max() <= high)
+    return False
 
 
 def _of_no_loop(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> tuple[str, ...]:

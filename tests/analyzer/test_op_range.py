@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
+from click.testing import CliRunner
 
+from analyzer.cli import main
 from analyzer.config import QualityLimits
 from analyzer.lanes.lanes import in_lanes
 from analyzer.loop.quality import op_in_range
@@ -84,3 +87,22 @@ def test_what_fits_a_range_of_0_to_100(low, high, resting, fits):
     at = low if low == 0.0 else high
     op[: int(1000 * resting)] = at
     assert op_in_range(op, QualityLimits()) is fits
+
+
+@pytest.mark.parametrize(
+    ("other", "stated", "told"), [(12.0, "", True), (60.0, "", False), (12.0, "4,20", False)]
+)
+def test_a_current_is_no_percent(tmp_path, other, stated, told):
+    """Where the OPs of all loops lie between 4 and 20 they look like mA: that is said, and nothing told in % of OP;
+    not where one is a percent, nor where the range is stated."""
+    k = np.arange(2000)
+    wave = np.sin(2 * np.pi * k / 50)
+    table = pd.DataFrame({"time": pd.date_range("2026-03-02", periods=2000, freq="10s")})
+    for loop, middle in (("A", 12.0), ("B", other)):
+        table[[f"{loop}.SP", f"{loop}.PV", f"{loop}.OP"]] = np.column_stack([0 * k, wave, middle - 3 * wave])
+    table.to_csv(tmp_path / "x.csv", index=False, float_format="%.3f")
+    (tmp_path / "loops.csv").write_text(f"loop,op_lo,op_hi\nA,{stated or ','}\nB,{stated or ','}\n")
+    asked = ["check", str(tmp_path / "x.csv"), "--loops", str(tmp_path / "loops.csv")]
+    said = CliRunner().invoke(main, asked, catch_exceptions=False).output
+    assert ("like mA" in said) == told
+    assert ("without them nothing is told in % of OP" in said) == told

@@ -300,3 +300,51 @@ def test_a_table_without_a_header_is_taken_in_the_order_of_loops_csv() -> None:
     assert "in the order of loops.csv" in notes[0]
     assert match(stated, columns[:-1])[0][0].pv is None
     assert match(stated, ["A.S", "A.P", "A.O"])[0][0].pv == "A.P"
+
+
+VENDORS = (
+    ("FIC101", "FIC101.SPEU", "FIC101.PVEU", "FIC101.CVEU"),
+    ("TIC1", "TIC1:WSP", "TIC1:PV", "TIC1:OP"),
+    ("mixer", "mixer.SET_POINT", "mixer.ACTUAL", "mixer.Y"),
+    ("FIC101", "SP FIC101 (m3/h)", "PV FIC101 (m3/h)", "OP FIC101 (%)"),
+    ("temperature", "target", "temperature", "power"),
+    ("Mesure", "Consigne", "Mesure", "Commande"),
+    ("TIC5", "Consigne TIC5", "Mesure TIC5", "Commande TIC5"),
+    ("U1", "U1/PID1/SP.CV", "U1/PID1/PV.CV", "U1/PID1/OUT.CV"),
+    ("x", "climate.x_temperature", "climate.x_current_temperature", "climate.x_heating_power"),
+    ("boiler", "sensor.boiler_setpoint", "sensor.boiler_process_value", "sensor.boiler_output"),
+    ("a1/fic7", "a1/fic7/sp", "a1/fic7/pv", "a1/fic7/cv"),
+    ("AS1/FIC1", "AS1/FIC1.SP#Value", "AS1/FIC1.PV_Out#Value", "AS1/FIC1.MV#Value"),
+    ("FIC1", "FIC1 SP", "FIC1 PV", "FIC1 OP"),
+    ("F1", "F1_SP.F_CV", "F1_PV.F_CV", "F1_OUT.F_CV"),
+    ("R1", "R1.W", "R1.X", "R1.Y"),
+    ("TIC 5", "TIC 5 - Börvärde", "TIC 5 - Ärvärde", "TIC 5 - Utsignal"),
+)
+
+
+@pytest.mark.parametrize("own", VENDORS, ids=lambda own: own[2])
+def test_loops_by_the_names_of_many_makes(own: tuple[str, str, str, str]) -> None:
+    """Roles stand behind the name or before it, in words of many languages, with units, blocks and domains around."""
+    (loop,) = find_loops(["Y99", *own[1:], "flow rate 7"])
+    assert (loop.loop.rstrip(" -"), loop.sp, loop.pv, loop.op) == own
+
+
+def test_a_column_that_numbers_the_rows_is_no_tag(tmp_path: Path) -> None:
+    """An id that falls by one a row is left out; a value that does so under another name is kept."""
+    rows = "".join(f"{900 - k},2026-03-02 00:00:{k:02d},{k},{k}\n" for k in range(60))
+    (tmp_path / "x.csv").write_text("id,time,FT_1,FV_1\n" + rows)
+    assert open_export([tmp_path / "x.csv"]).tags == ("FT_1", "FV_1")
+
+
+def test_isa_letters_pair_what_measures_with_what_moves() -> None:
+    """FT_211 and FV_211 are a loop, LT_211 and an index are none."""
+    (loop,) = find_loops(["id", "FT_211", "FV_211", "LT_211", "TV_7"])
+    assert (loop.loop, loop.pv, loop.op) == ("FIC211", "FT_211", "FV_211")
+
+
+@pytest.mark.parametrize(
+    "tags", [["TK1 Level", "TK2 Level"], ["R1.Temperature", "R1.Pressure"], ["X", "Y", "Z"]]
+)
+def test_a_word_alone_makes_no_loop(tags: list[str]) -> None:
+    """A measurement that is named for what it measures is no loop by that."""
+    assert find_loops(tags) == ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from analyzer.history import stamps
 from analyzer.history.export import open_export
+from analyzer.history.table import ReadOptions
 from identification.errors import InputError
 
 MOMENTS = pd.date_range("2024-11-21 08:00", periods=60, freq="5s", tz="UTC")
@@ -84,12 +86,20 @@ def test_many_columns_are_asked_at_once_whether_they_hold_stamps(
     assert met[0] == met[1] > 0
 
 
-def test_a_time_of_day_without_a_date_is_refused(tmp_path: Path) -> None:
-    """Of what day eight o'clock was nobody knows."""
-    rows = [f"08:00:{k:02d},{k}" for k in range(60)]
-    (tmp_path / "x.csv").write_text("\n".join(["Time,a.PV", *rows]) + "\n")
-    with pytest.raises(InputError, match="no time stamp that is known"):
-        open_export([tmp_path / "x.csv"])
+@pytest.mark.parametrize("form", ["%H:%M:%S", "%I:%M:%S %p"])
+@pytest.mark.parametrize("blocks", [False, True])
+def test_a_time_of_day_without_a_date_is_read(tmp_path: Path, form: str, blocks: bool) -> None:
+    """Times from 23:00 to 01:00 of the second day run on over both midnights, and that no date is stated is told;
+    in a table of one tag after another too."""
+    at = pd.date_range("1970-01-01 23:00", "1970-01-03 01:00", freq="60s")
+    rows = [f"{t.strftime(form)},{k}" for k, t in enumerate(at)]
+    if blocks:
+        rows = [f"{tag},{row}" for tag in ("a.PV", "a.OP") for row in rows]
+    head = "tag,Time,value" if blocks else "Time,a.PV"
+    (tmp_path / "x.csv").write_text("\n".join([head, *rows]) + "\n")
+    export = pickle.loads(pickle.dumps(open_export([tmp_path / "x.csv"])))
+    np.testing.assert_array_equal(export.read(["a.PV"])["a.PV"].stamp_s, 82800.0 + 60.0 * np.arange(len(at)))
+    assert any("no date" in note for note in export.notes)
 
 
 @pytest.mark.parametrize("long", [False, True])
@@ -110,3 +120,40 @@ def test_stamps_that_lost_their_seconds(tmp_path: Path, long: bool, form: str, s
     else:
         export = open_export([tmp_path / "x.csv"])
         assert export.read([export.tags[0]])[export.tags[0]].stamp_s.size == 120
+
+
+@pytest.mark.parametrize("mark", [",", ";", "\t"])
+def test_a_name_split_over_columns_is_one_tag(tmp_path: Path, mark: str) -> None:
+    """Area, loop and parameter in columns of their own name a tag together."""
+    rows = [("time", "area", "loop", "parameter", "value")]
+    for k, at in enumerate(MOMENTS):
+        rows += [
+            (f"{at:%Y-%m-%d %H:%M:%S}", "A1", loop, p, k + i)
+            for loop in "FG"
+            for i, p in enumerate(("PV", "OP"))
+        ]
+    (tmp_path / "x.csv").write_text("\n".join(mark.join(map(str, row)) for row in rows) + "\n")
+    export = open_export([tmp_path / "x.csv"])
+    assert export.tags == ("A1/F.PV", "A1/F.OP", "A1/G.PV", "A1/G.OP")
+    np.testing.assert_array_equal(export.read(["A1/G.OP"])["A1/G.OP"].value, np.arange(60) + 1)
+
+
+@pytest.mark.parametrize("long", [False, True])
+def test_rows_of_one_stamp_need_their_interval(tmp_path: Path, long: bool) -> None:
+    """Where no stamp advances one line says what to state, and with the interval stated the rows are read."""
+    rows = [f"Aug-04-07 20:47:20,{k}" for k in range(60)]
+    if long:
+        rows = [f"{tag},{row}" for row in rows for tag in ("a.PV", "a.OP")]
+    head = "tag,Time,value" if long else "Time,a.PV"
+    (tmp_path / "x.csv").write_text("\n".join([head, *rows]) + "\n")
+    with pytest.raises(InputError, match=r"the time column 'Time' does not advance.*--interval 30s"):
+        open_export([tmp_path / "x.csv"])
+    for stated in ("30s", "0.5 min", "30000 ms", "30"):
+        export = open_export([tmp_path / "x.csv"], ReadOptions(interval=stated))
+        stamp_s = export.read(["a.PV"])["a.PV"].stamp_s
+        np.testing.assert_allclose(np.diff(stamp_s), 30.0)
+        assert len(stamp_s) == 60
+        assert export.span() == (stamp_s[0], stamp_s[-1])
+    for wrong in ("soon", "-3s", "0", "30 parsecs"):
+        with pytest.raises(InputError, match="--interval"):
+            open_export([tmp_path / "x.csv"], ReadOptions(interval=wrong))

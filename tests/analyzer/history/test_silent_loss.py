@@ -69,5 +69,5 @@ def test_check_without_loops_is_no_success(tmp_path: Path) -> None:
     assert result.exit_code == 2
     assert result.stderr.splitlines() == [
         "triage: no loops in the export, whose tags are a, b; expected tags such as LOOP.PV; "
-        "state them with --loops loops.csv"
+        "let 'triage loops' look for them in the data, or state them with --loops loops.csv"
     ]

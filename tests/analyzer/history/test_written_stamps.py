@@ -7,8 +7,10 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
+from analyzer.history import stamps
 from analyzer.history.export import open_export
 from analyzer.history.table import ReadOptions
 from identification.errors import InputError
@@ -152,3 +154,50 @@ def test_times_that_pass_a_day_need_no_name(tmp_path: Path) -> None:
     export = open_export([tmp_path / "x.csv"])
     assert export.tags == ("A", "B")
     assert export.span() == (25 * 3600 + 600.0, 25 * 3600 + 639.0)
+
+
+@pytest.mark.parametrize(
+    ("written", "month"),
+    [
+        *[("5. svibnja 2026. 08:00:00", 5), ("05-ožu-2026 08:00:00", 3), ("5. srpnja 2026. 8:00:00", 7)],
+        *[("05 lipanj 2026 08:00", 6), ("05 lipca 2026 08:00", 7), ("05 srpna 2026 08:00", 8)],
+    ],
+)
+def test_croatian_months(written: str, month: int) -> None:
+    """Croatian names are months of their own where they are not Polish or Czech ones."""
+    parts = stamps.fields(pa.array([written]))
+    assert parts is not None
+    assert stamps.stamp_seconds(parts)[0] == datetime(2026, month, 5, 8, tzinfo=UTC).timestamp()
+
+
+def test_a_month_of_two_languages_is_the_zone_s() -> None:
+    """Listopad is October in Zagreb and November in Warsaw."""
+    for zone, month in (("Europe/Zagreb", 10), ("Europe/Warsaw", 11)):
+        parts = stamps.fields(pa.array(["05 listopad 2026 08:00"]), zone)
+        assert parts is not None
+        assert stamps.stamp_seconds(parts)[0] == datetime(2026, month, 5, 8, tzinfo=UTC).timestamp()
+
+
+@pytest.mark.parametrize("written", ["{} Central European Standard Time", "{} (W. Europe Standard Time)"])
+@pytest.mark.parametrize(("month", "hours"), [(1, 1), (7, 2)])
+def test_zones_as_windows_names_them(tmp_path: Path, written: str, month: int, hours: int) -> None:
+    """A zone in words behind the stamps is that zone, its summer time too; one that nobody knows is refused."""
+    at = [f"2026-{month:02d}-05 08:00:{k:02d}" for k in range(60)]
+    path = tmp_path / "x.csv"
+    path.write_text("time,a.PV\n" + "".join(f"{written.format(t)},{k}\n" for k, t in enumerate(at)))
+    first = open_export([path]).read(["a.PV"])["a.PV"].stamp_s[0]
+    assert first == datetime(2026, month, 5, 8 - hours, tzinfo=UTC).timestamp()
+    path.write_text(path.read_text().replace("Europe", "Atlantis"))
+    if "W." in written:
+        with pytest.raises(InputError):
+            open_export([path])
+
+
+@pytest.mark.parametrize(("unit", "unit_s"), [("us", 1e-6), ("µs", 1e-6), ("ns", 1e-9), ("ms", 1e-3)])
+def test_a_unit_in_the_name_is_the_unit(tmp_path: Path, unit: str, unit_s: float) -> None:
+    """A clock of the size of another is read in the unit that its column's name states: 10 ms stay 10 ms."""
+    step = round(0.01 / unit_s)
+    rows = "".join(f"{123456789 + k * step},{k % 7}\n" for k in range(100))
+    (tmp_path / "x.csv").write_text(f"time ({unit}),a.PV\n{rows}", encoding="utf-8")
+    stamp_s = open_export([tmp_path / "x.csv"]).read(["a.PV"])["a.PV"].stamp_s
+    np.testing.assert_allclose(np.diff(stamp_s), 0.01, rtol=1e-3)

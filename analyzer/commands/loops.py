@@ -1,0 +1,47 @@
+"""The command `loops`: a draft of loops.csv from a bag of tags."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from analyzer.commands.options import bar, export_options, say
+
+if TYPE_CHECKING:
+    from analyzer.night.asked import Asked
+
+
+@click.command()
+@export_options
+@click.option(
+    "--out",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="File that the draft is written to. Default: stdout.",
+)
+def loops(asked: Asked, out: Path | None) -> None:
+    """A draft of loops.csv: the loops of an export, by their tags' names and by what the data show.
+
+    What --loops states is kept. A loop that is not sure is written behind a #, with what speaks for it.
+
+    Example: triage loops export.parquet --out loops.csv
+    """
+    from analyzer.finder.draft import as_csv
+    from analyzer.night.asked import drafted
+    from reports.whole_file import whole_file
+
+    with bar("tags") as progress:
+        rows = drafted(asked, progress)
+    text = as_csv(rows)
+    if out is None:
+        click.echo(text, nl=False)
+    else:
+        with whole_file(out) as path:
+            path.write_text(text, encoding="utf-8")
+    sure = [row for row in rows if row.sure]
+    kinds = ", ".join(
+        f"{n} {by}" for by in ("stated", "names", "data") if (n := sum(r.found_by == by for r in sure))
+    )
+    more = f"; {len(rows) - len(sure)} less sure, behind #" if len(rows) > len(sure) else ""
+    say(f"{len(sure)} loops ({kinds or 'none'}){more}{f', in {out}' if out else ''}", err=True)

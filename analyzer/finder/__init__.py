@@ -1,0 +1,1 @@
+"""Which tags of a bag make which loops: by names, then by what the data show."""

@@ -1,0 +1,81 @@
+"""Tags of an export on one clock, a few at a time: what the finder looks at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analyzer.history.export import Export
+from analyzer.history.series import Series
+from analyzer.limits import FINDER
+
+
+@dataclass(frozen=True, slots=True)
+class Sampled:
+    """Tags on one clock: names, values without gaps, shape (n, tags), and the time between samples [s]."""
+
+    tags: tuple[str, ...]
+    values: NDArray[np.float64]
+    dt_s: float
+
+    def of(self, tags: Sequence[str]) -> Sampled:
+        """Some of the tags, as far as they are held, in the order asked for."""
+        place = {tag: k for k, tag in enumerate(self.tags)}
+        known = [tag for tag in tags if tag in place]
+        return Sampled(tuple(known), self.values[:, [place[tag] for tag in known]], self.dt_s)
+
+
+def sampled(
+    export: Export,
+    tags: Sequence[str],
+    span: tuple[float, float],
+    told: Callable[[int, int], None] = lambda done, total: None,
+) -> Sampled:
+    """Values of tags that hold numbers, over the last day of a span [s since 1970-01-01 UTC].
+
+    Held from each good sample to the next; a tag without numbers, or of which most are bad, is left out. Raises
+    InputError where the export cannot be read.
+    """
+    first, last = export.span()
+    last = min(last, span[1])
+    first = max(first, span[0], last - FINDER.longest_s)
+    clock: NDArray[np.float64] | None = None
+    names: list[str] = []
+    columns: list[NDArray[np.float64]] = []
+    for k in range(0, len(tags), FINDER.at_once):
+        read = export.read(tags[k : k + FINDER.at_once])
+        if clock is None:
+            clock = _clock(list(read.values()), first, last, len(tags))
+        for tag, series in read.items():
+            held = _held(series, clock)
+            if held is not None:
+                names.append(tag)
+                columns.append(held)
+        told(min(k + FINDER.at_once, len(tags)), len(tags))
+    if clock is None or not columns:
+        return Sampled((), np.empty((0, 0)), 1.0)
+    return Sampled(tuple(names), np.column_stack(columns), float(clock[1] - clock[0]))
+
+
+def _clock(read: Sequence[Series], first: float, last: float, tags: int) -> NDArray[np.float64]:
+    """A clock of the commonest interval of some tags, thinned where all tags would have too many samples."""
+    steps = [float(np.median(np.diff(s.stamp_s))) for s in read if len(s.stamp_s) > 1]
+    step = max(float(np.median(steps)) if steps else 1.0, 1e-3)
+    thinned = int(np.ceil((last - first) / step * tags / FINDER.most_cells))
+    return (
+        np.arange(first, last + step / 2, step * max(thinned, 1))
+        if last > first
+        else np.array([first, first + 1.0])
+    )
+
+
+def _held(series: Series, clock: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """A tag's last good value at each time of a clock; None where it has few."""
+    good = ~series.bad & np.isfinite(series.value)
+    if good.sum() < 2 or good.sum() < FINDER.good_share * len(series.value):
+        return None
+    at = np.searchsorted(series.stamp_s[good], clock + 1e-6, side="right") - 1
+    return np.asarray(series.value[good][np.maximum(at, 0)])

@@ -1,0 +1,244 @@
+"""A draft of loops.csv: what is stated, what the names of tags say, and what the data show of the others."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from analyzer.finder.clock import Sampled, sampled
+from analyzer.finder.pairs import Pair, found_pairs, known_pair
+from analyzer.history.export import Export
+from analyzer.limits import FINDER
+from analyzer.loops.spec import RECORDED, ROLES, STATED, LoopSpec
+from analyzer.loops.tags import find_loops
+
+COLUMNS = (
+    *(
+        "loop",
+        "type",
+        "master",
+        *ROLES,
+        "pv_lo",
+        "pv_hi",
+        "op_lo",
+        "op_hi",
+        "kp",
+        "ti",
+        "gain_unit",
+        "ti_unit",
+    ),
+    *("scan_s", "ranges", "found_by", "sure_pct", "says"),
+)
+HEAD = (
+    "# A draft. Check first: rows found by data, then ranges that are only recorded (column ranges), then settings.",
+    f"# Rows behind # are less sure than {FINDER.sure_pct:g} %: remove the mark where they are right.",
+)
+
+
+ISA_NAME = re.compile(rf"(?<![A-Za-z])([{''.join(STATED['types'])}])(?:D?[IRT]?C[AV]?|[IT]{{1,2}})[-_ ]?\d")
+WITHIN_PCT = 5.0
+"""How far an OP in percent may lie beyond 0 and 100."""
+MOST_NAMES = 5
+"""Loops that are named in a note."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A loop of the draft: its row, by what it was found ('names', 'data' or 'stated'), how sure that is [%], and
+    what speaks for it."""
+
+    spec: LoopSpec
+    found_by: str
+    sure_pct: float
+    says: str = ""
+
+    @property
+    def sure(self) -> bool:
+        """Whether the row counts; else it is written commented out."""
+        return self.sure_pct >= FINDER.sure_pct
+
+    @property
+    def as_run(self) -> LoopSpec:
+        """The loop as a night has it: a range that is only recorded is none that is stated."""
+        return replace(self.spec, pv_lo=None, pv_hi=None)
+
+
+def draft(
+    export: Export,
+    stated: Sequence[LoopSpec] = (),
+    span: tuple[float, float] = (-math.inf, math.inf),
+    told: Callable[[int, int], None] = lambda done, total: None,
+) -> list[Row]:
+    """The loops of an export: stated ones as they are, others by names, then by data of the tags that are left.
+
+    span : of time, of which the last day is looked at [s since 1970-01-01 UTC]; told : is told of tags read, and of
+    all. Raises InputError where the export cannot be read.
+    """
+    taken = {tag for spec in stated for tag in spec.tags}
+    rows = [Row(spec, "stated", 100.0, "stated") for spec in stated]
+    named = [
+        s for s in find_loops(export.tags) if s.pv not in taken and s.loop not in {r.spec.loop for r in rows}
+    ]
+    whole = [spec for spec in named if spec.op is not None]
+    taken |= {tag for spec in whole for tag in spec.tags}
+    free = [tag for tag in export.tags if tag not in taken]
+    held = sampled(export, [*free, *(tag for spec in whole for tag in spec.tags)], span, told)
+    rows += [_named(held, spec) for spec in whole]
+    found = by_data(held.of(free))
+    rows += _joined(found, [spec for spec in named if spec.op is None])
+    return rows
+
+
+def _named(held: Sampled, spec: LoopSpec) -> Row:
+    """A loop of names, with what its data show of type, ranges and settings."""
+    said = f"tags of one name: {', '.join(spec.tags)}"
+    known = [tag for tag in (spec.pv, spec.op, spec.sp) if tag in held.tags]
+    if known[:2] != [spec.pv, spec.op] or len(held.values) < FINDER.least_blocks:
+        return Row(spec, "names", FINDER.surest_pct, said)
+    own = held.of(known)
+    pair = known_pair(own.values)
+    shown = _shown(own, pair)
+    law = f"; {_law(own, pair)}" if pair.told >= FINDER.law_told and pair.kp else ""
+    return Row(replace(spec, type=type_of(spec.loop), **shown), "names", FINDER.surest_pct, said + law)
+
+
+def found_told(rows: Sequence[Row]) -> tuple[str, ...]:
+    """What was found by data, a sentence each, and what was left out for being less sure."""
+    seen = [row for row in rows if row.found_by == "data"]
+    sure = tuple(
+        f"{row.spec.loop}: found by data, {row.sure_pct:.0f} % sure: {row.says}" for row in seen if row.sure
+    )
+    other = [row.spec.loop for row in seen if not row.sure]
+    few = ", ".join(other[:MOST_NAMES]) + (" ..." if len(other) > MOST_NAMES else "")
+    left = (
+        f"{len(other)} loops are less sure and left out ({few}); 'triage loops' writes what speaks for them"
+    )
+    return (*sure, left) if other else sure
+
+
+def by_data(held: Sampled) -> list[Row]:
+    """Loops that the data of tags show."""
+    pairs = found_pairs(held.values)
+    outputs = {
+        held.values[:, p.op].tobytes(): _name(held.tags[p.pv], held.tags[p.op])
+        for p in pairs
+        if p.sure_pct >= FINDER.sure_pct
+    }
+    return [_row(held, pair, outputs) for pair in pairs]
+
+
+def _row(held: Sampled, pair: Pair, outputs: dict[bytes, str]) -> Row:
+    name = _name(held.tags[pair.pv], held.tags[pair.op])
+    master = "" if pair.sp is None else outputs.get(held.values[:, pair.sp].tobytes(), "")
+    spec = LoopSpec(
+        name,
+        type=type_of(held.tags[pair.pv]),
+        master="" if master == name else master,
+        sp=None if pair.sp is None else held.tags[pair.sp],
+        pv=held.tags[pair.pv],
+        op=held.tags[pair.op],
+    )
+    says = f"{_law(held, pair)}; {100 * pair.noise:.0f} % of their noise is one; next best tag "
+    says += f"{100 * pair.runner_up / max(pair.weight, 1e-9):.0f} % as like"
+    says += "" if pair.sp is None else f"; {spec.sp} is where PV is held"
+    return Row(replace(spec, **_shown(held, pair)), "data", pair.sure_pct, says)
+
+
+def _shown(held: Sampled, pair: Pair) -> dict[str, Any]:
+    """Columns of loops.csv that the data of a loop show: recorded ranges, and the settings where the law is plain."""
+    pv, op = (held.values[:, k] for k in (pair.pv, pair.op))
+    (pv_lo, pv_hi), (op_lo, op_hi) = _extremes(pv), _extremes(op)
+    if op.min() >= -WITHIN_PCT and op.max() <= 100.0 + WITHIN_PCT:
+        op_lo, op_hi = 0.0, 100.0
+    shown: dict[str, Any] = {"pv_lo": pv_lo, "pv_hi": pv_hi, "op_lo": op_lo, "op_hi": op_hi}
+    if pair.told < FINDER.law_told or not pair.kp or pair.ti_samples is None:
+        return shown
+    ti = 0.0 if math.isinf(pair.ti_samples) else pair.ti_samples * held.dt_s
+    return {**shown, "kp": pair.kp, "ti": ti, "gain_unit": "engineering"}
+
+
+def _law(held: Sampled, pair: Pair) -> str:
+    """The law of a pair, in words."""
+    way = "direct" if pair.kp < 0 else "reverse"
+    law = (
+        f"{'P alone' if pair.ti_samples == math.inf else 'PI'}, {way} acting"
+        if pair.told
+        else "of unknown sign"
+    )
+    shown = f"explains {100 * pair.law:.0f} % of its moves"
+    return f"{held.tags[pair.op]} follows {held.tags[pair.pv]} by a law ({law}) that {shown}"
+
+
+def _joined(found: Sequence[Row], open_loops: Sequence[LoopSpec]) -> list[Row]:
+    """Loops whose OP their names leave open, with the OP that the data show; and the loops that no name tells of."""
+    by_pv = {row.spec.pv: row for row in found}
+    rows = []
+    for spec in open_loops:
+        seen = by_pv.pop(spec.pv, None)
+        if seen is None:
+            rows.append(Row(spec, "names", FINDER.surest_pct, "a PV by its name; no OP is seen"))
+            continue
+        known = {role: getattr(spec, role) or getattr(seen.spec, role) for role in ROLES}
+        rows.append(replace(seen, spec=replace(seen.spec, loop=spec.loop, **known)))
+    return [*rows, *by_pv.values()]
+
+
+def _name(pv: str, op: str) -> str:
+    """What both tags begin with, where that is a name; else PV's tag."""
+    apart = next((k for k, (a, b) in enumerate(zip(pv, op, strict=False)) if a != b), min(len(pv), len(op)))
+    shared = pv[:apart].rstrip("._:/- ")
+    whole = all(len(tag) == len(shared) or not tag[len(shared)].isalnum() for tag in (pv, op))
+    return shared if len(shared) > 2 and whole else pv
+
+
+def type_of(tag: str) -> str:
+    """The type of a loop by the first letter of its ISA name (FIC101: a flow); '' where that tells nothing."""
+    letters = ISA_NAME.search(tag)
+    return "" if letters is None else str(STATED["types"][letters[1]])
+
+
+def _extremes(x: np.ndarray) -> tuple[float, float]:
+    """Least and largest of what was recorded, in few digits; apart where it stands still."""
+    low, high = (float(f"{v:.4g}") for v in (x.min(), x.max()))
+    return (low, high) if high > low else (low - 0.5, low + 0.5)
+
+
+def as_csv(rows: Sequence[Row]) -> str:
+    """The draft as loops.csv; what is less sure is commented out."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    out.write("\n".join(HEAD) + "\n")
+    for row in rows:
+        at = out.tell()
+        writer.writerow([_cell(row, column) for column in COLUMNS])
+        if not row.sure:
+            line = out.getvalue()[at:]
+            out.seek(at)
+            out.write(f"# {line}")
+    return out.getvalue()
+
+
+def _cell(row: Row, column: str) -> str:
+    own = {
+        "ranges": RECORDED if row.found_by != "stated" and row.spec.has_pv_range else "",
+        "found_by": row.found_by,
+        "sure_pct": f"{row.sure_pct:.0f}",
+        "says": row.says,
+    }
+    if column in own:
+        return own[column]
+    value = getattr(row.spec, column)
+    settings = column in ("kp", "ti", "gain_unit", "ti_unit")
+    seen = row.spec.kp is not None if settings else row.spec.has_pv_range or column in ("type", "master")
+    spoken = (row.found_by != "stated" and seen) or column in row.spec.stated or column in ("loop", *ROLES)
+    if value is None or not spoken:
+        return ""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

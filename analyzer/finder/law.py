@@ -1,0 +1,111 @@
+"""How well one tag's moves follow another by the law of a controller, for all pairs of tags at once.
+
+A PI controller moves OP by -Kp (dPV + 1/Ti int (PV - SP) dt). Between the averages of neighbouring blocks of samples
+the same law holds of the moves of both and of the moves of the running integral, however long the blocks are. What
+the noise of PV does to OP in the very same sample no process does to another, for it lags: so the innovations of both
+are compared as well (Haugh 1976, J. Am. Stat. Assoc. 71: cross-correlation of prewhitened series).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analyzer.limits import FINDER
+
+Matrix = NDArray[np.float64]
+TINY = 1e-12
+"""What is no length of a column, but rounding."""
+ALIKE = 1e-6
+"""Least share of moves and integral that are not one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moves:
+    """Moves of block averages and of the running integrals of tags, means removed, shape (blocks - 1, tags), and what
+    is left of the moves once each tag's own past is taken out."""
+
+    value: Matrix
+    integral: Matrix
+    innovation: Matrix
+
+    @classmethod
+    def of(cls, values: Matrix, width: int) -> Moves:
+        """From values, shape (n, tags), in blocks of `width` samples."""
+        centred = values - values.mean(axis=0)
+        running = np.cumsum(centred, axis=0) - centred / 2
+        value, integral = (np.diff(blocks(x, width), axis=0) for x in (centred, running))
+        value, integral = value - value.mean(axis=0), integral - integral.mean(axis=0)
+        return cls(value, integral, innovations(value))
+
+    def of_tags(self, count: int) -> Moves:
+        """The first tags alone."""
+        return Moves(self.value[:, :count], self.integral[:, :count], self.innovation[:, :count])
+
+
+def widths(samples: int) -> tuple[int, ...]:
+    """Lengths of blocks [samples], of which there are enough."""
+    return tuple(w for w in FINDER.widths if samples // w >= FINDER.least_blocks) or (1,)
+
+
+def explained(causes: Moves, effects: Moves) -> Matrix:
+    """Share of the moves of each effect that the law explains by each cause, shape (causes, effects), 0 to 1."""
+    moved, summed, wanted = _unit(causes.value), _unit(causes.integral), _unit(effects.value)
+    a, b = moved.T @ wanted, summed.T @ wanted
+    c = (moved * summed).sum(axis=0)[:, None]
+    return np.clip((a**2 + b**2 - 2 * a * b * c) / np.maximum(1 - c**2, ALIKE), 0.0, 1.0)
+
+
+def shared_noise(causes: Moves, effects: Moves) -> Matrix:
+    """Squared correlation of the innovations in the same block, shape (causes, effects)."""
+    return (_unit(causes.innovation).T @ _unit(effects.innovation)) ** 2
+
+
+def direction(moves: Moves, pv: int, op: int) -> float:
+    """How much more the pair looks like a controller from `pv` to `op` than from `op` to `pv`, in standard errors.
+
+    Of a controller moves and integral act the same way. The other way round they do not: what OP owes to the noise
+    of PV has the sign of the controller, what PV owes to OP that of the process, and feedback has both opposite.
+    """
+
+    def agreeing(cause: int, effect: int) -> float:
+        columns = moves.value[:, cause], moves.integral[:, cause], moves.integral[:, effect]
+        slope, error = fitted(moves.value[:, effect], *columns)
+        return float(slope[1] / error[1] * np.sign(slope[0]))
+
+    return agreeing(pv, op) - agreeing(op, pv)
+
+
+def fitted(wanted: Matrix, *columns: Matrix) -> tuple[Matrix, Matrix]:
+    """Slopes of a linear regression without a constant, and their standard errors."""
+    x = np.column_stack(columns)
+    slope, *_ = np.linalg.lstsq(x, wanted, rcond=None)
+    left = wanted - x @ slope
+    inverse = np.linalg.pinv(x.T @ x)
+    variance = left @ left / max(len(wanted) - x.shape[1], 1)
+    return np.asarray(slope), np.sqrt(np.maximum(np.diag(inverse) * variance, TINY))
+
+
+def blocks(values: Matrix, width: int) -> Matrix:
+    """Averages of neighbouring samples, shape (blocks, tags)."""
+    whole = len(values) // width * width
+    return np.asarray(values[:whole].reshape(-1, width, values.shape[1]).mean(axis=1))
+
+
+def _unit(columns: Matrix) -> Matrix:
+    """Columns of length one; of a constant one zeros."""
+    size = np.sqrt((columns**2).sum(axis=0))
+    return columns / np.where(size > TINY, size, np.inf)
+
+
+def innovations(value: Matrix) -> Matrix:
+    """What is left of moves, shape (n, tags), once each tag's own last ones are taken out; shape (n - past, tags)."""
+    past = FINDER.past
+    out = np.empty((len(value) - past, value.shape[1]))
+    for k in range(value.shape[1]):
+        lagged = np.column_stack([value[past - 1 - i : len(value) - 1 - i, k] for i in range(past)])
+        slope, *_ = np.linalg.lstsq(lagged.T @ lagged, lagged.T @ value[past:, k], rcond=None)
+        out[:, k] = value[past:, k] - lagged @ slope
+    return out

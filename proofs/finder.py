@@ -1,0 +1,180 @@
+"""Loops found in a bag of tags by the data alone: python -m proofs.finder [--shared ../shared] [--seeds 1 2]
+
+Tags lose their names and their order, and twenty measurements of no loop stand among them: drift, slow noise, waves,
+sensors that follow a PV, plain noise. Plants: those of the shared folder, where it is there, at 1, 10 and 60 s, its
+recording of the Tennessee Eastman process at 3 s, and the sample mill at 10 s. A pair is right where PV and OP are of
+one loop; only pairs that are sure are counted. Gains and integral times are compared with loops.csv where the law
+explains .9 of OP's moves. Bags without a controller are the same plants without OP and set points that move, and a
+thousand tags of noise, drift and waves. Writes finder.md here.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.signal import lfilter
+
+from analyzer.finder.pairs import Pair, found_pairs
+from analyzer.limits import FINDER
+from analyzer.loops.spec import LoopSpec, read_loops
+from analyzer.loops.tags import controller
+from proofs.common import command, command_line, publish, table
+
+STRANGERS = 20
+NEAR = 0.2
+"""A gain or an integral time is right within this share."""
+Bag = tuple[str, pd.DataFrame, float, dict[str, LoopSpec]]
+"""Name, tags in columns, time between samples [s], and what loops.csv states."""
+
+
+def strangers(values: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Measurements of no loop, shape (n, count)."""
+    n = len(values)
+    e, t = rng.normal(size=(n, count)), np.arange(n)
+    out = np.empty((n, count))
+    for k in range(count):
+        beside = values[:, rng.integers(values.shape[1])]
+        out[:, k] = (
+            0.02 * np.cumsum(e[:, k]),
+            0.3 * lfilter([1.0], [1.0, -0.98], e[:, k]),
+            5.0 * np.sin(2 * np.pi * t / rng.uniform(200, 2000)) + 0.3 * e[:, k],
+            lfilter([0.0, 0.0, 0.05], [1.0, -0.95], beside - beside.mean()) + 0.1 * beside.std() * e[:, k],
+            e[:, k],
+        )[k % 5]
+    return np.round(50.0 + out, 2)
+
+
+def bags(shared: Path) -> Iterator[Bag]:
+    """The plants, those of the shared folder where it is there."""
+    mill = pd.read_parquet("sample_data/mill.parquet")
+    day = mill[(mill["timestamp"] >= "2026-03-08") & (mill["timestamp"] < "2026-03-09")]
+    yield "sample mill, 10 s", day, 10.0, _stated(Path("sample_data/loops.csv"))
+    for folder, file, intervals in (
+        ("plants/a", "export", (1, 10, 60)),
+        ("plants/b", "export", (1, 10, 60)),
+        ("recordings/tep", "idv14", (3,)),
+    ):
+        path = shared / folder / f"{file}.parquet"
+        if path.exists():
+            held, stated = pd.read_parquet(path), _stated(shared / folder / "loops.csv")
+            for every in intervals:
+                thinned = held if every == 3 else held.iloc[::every]
+                yield f"{folder}, {every} s", thinned, float(every), stated
+
+
+def _stated(path: Path) -> dict[str, LoopSpec]:
+    return {spec.loop: spec for spec in read_loops(path)}
+
+
+def in_disorder(held: pd.DataFrame, seed: int) -> tuple[list[str], np.ndarray]:
+    """True names and values, shape (n, tags), in a random order among strangers."""
+    rng = np.random.default_rng(seed)
+    numbers = held.select_dtypes("number").ffill().bfill().fillna(0.0)
+    values = np.column_stack([numbers, strangers(numbers.to_numpy(float), STRANGERS, rng)])
+    names = [*numbers.columns, *(f"stranger.{k}" for k in range(STRANGERS))]
+    order = rng.permutation(len(names))
+    return [names[k] for k in order], values[:, order]
+
+
+def counted(names: list[str], values: np.ndarray, dt_s: float, stated: dict[str, LoopSpec]) -> Counter[str]:
+    """What is right and wrong of a bag."""
+    found: Counter[str] = Counter(loops=sum(name.endswith(".OP") for name in names))
+    for pair in found_pairs(values):
+        if pair.sure_pct < FINDER.sure_pct:
+            continue
+        loop, same = names[pair.pv].rpartition(".")[0], _names(names, values, pair.op)
+        right = names[pair.pv] == f"{loop}.PV" and f"{loop}.OP" in same
+        found["right"] += right
+        found["wrong"] += not right
+        if right:
+            found["sp"] += pair.sp is not None and f"{loop}.SP" in _names(names, values, pair.sp)
+            found += _settings(pair, stated[loop], dt_s)
+    return found
+
+
+def _names(names: list[str], values: np.ndarray, tag: int) -> set[str]:
+    """Names of all tags that hold the same as one: the output of a master is the set point of its slave."""
+    return {names[k] for k in np.flatnonzero((values == values[:, [tag]]).all(axis=0))}
+
+
+def _settings(pair: Pair, spec: LoopSpec, dt_s: float) -> Counter[str]:
+    """Whether gain and integral time are those that are stated."""
+    span = (spec.pv_hi or 100.0) - (spec.pv_lo or 0.0)
+    pid = controller(spec, span)
+    if pid is None or pair.told < FINDER.law_told:
+        return Counter()
+    kp, ti = pair.kp * span / (spec.op_hi - spec.op_lo), (pair.ti_samples or 0.0) * dt_s
+    near_ti = ti == pid.ti_s or abs(ti / pid.ti_s - 1) < NEAR
+    near_kp = abs(kp / pid.kp - 1) < NEAR
+    return Counter(
+        told=1,
+        kp=int(near_kp),
+        sign=int(kp * pid.kp > 0),
+        ti=int(near_ti),
+        ti_told=int(pair.ti_samples is not None),
+    )
+
+
+def without_controllers(held: pd.DataFrame, seed: int) -> int:
+    """Pairs that are told of the measurements of a plant alone, with the set points that never move."""
+    still = [c for c in held if c.endswith(".SP") and held[c].nunique() == 1]
+    _, values = in_disorder(held[[*still, *(c for c in held if c.endswith(".PV"))]], seed)
+    return sum(p.sure_pct >= FINDER.sure_pct for p in found_pairs(values))
+
+
+def of_nothing(seed: int) -> int:
+    """Pairs that are told of forty tags of noise, drift and waves."""
+    rng = np.random.default_rng(seed)
+    values = strangers(np.cumsum(rng.normal(size=(3000, 8)), axis=0), 40, rng)[:, np.arange(40) % 5 != 3]
+    return sum(p.sure_pct >= FINDER.sure_pct for p in found_pairs(values))
+
+
+def main() -> None:
+    """Look for the loops of all plants and write the page."""
+    given = command_line(__doc__, shared=Path("../shared"), seeds=[1, 2])
+    rows, total, nothing = [], Counter[str](), 0
+    for name, held, dt_s, stated in bags(given.shared):
+        found, took_s = Counter[str](), 0.0
+        for seed in given.seeds:
+            names, values = in_disorder(held, seed)
+            begun = time.monotonic()
+            found += counted(names, values, dt_s, stated)
+            took_s += (time.monotonic() - begun) / len(given.seeds)
+            nothing += without_controllers(held, seed)
+        total += found
+        rows.append((*_cells(name, found), f"{took_s:.1f}"))
+    noise = sum(of_nothing(seed) for seed in range(32))
+    heads = "plant | loops | right | wrong | SP of right | Kp | sign | told | Ti | told | s"
+    publish(
+        __file__,
+        "Loops found in a bag of tags",
+        command(__file__, seeds=given.seeds),
+        (__doc__ or "").split("\n\n")[1].replace("\n", " ").split(" Writes finder.md")[0],
+        table(heads, [*rows, (*_cells("all", total), "")], numbers=True),
+        f"Pairs told where no controller is: {nothing} in the plants' measurements alone, {noise} among 1,024 tags "
+        "of noise, drift and waves.",
+    )
+
+
+def _cells(name: str, found: Counter[str]) -> tuple[object, ...]:
+    loops = found["loops"] or 1
+    shares = f"{found['right'] / loops:.2f}", found["wrong"], f"{found['sp'] / max(found['right'], 1):.2f}"
+    return (
+        name,
+        found["loops"],
+        *shares,
+        found["kp"],
+        found["sign"],
+        found["told"],
+        found["ti"],
+        found["ti_told"],
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,87 @@
+"""`triage loops` writes a draft of loops.csv that the other commands read."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner, Result
+
+from analyzer.cli import main
+from analyzer.finder.draft import Row, as_csv, type_of
+from analyzer.loops.spec import LoopSpec, read_loops
+from tests.analyzer.finder.test_pairs import pi_loop, strangers
+
+
+def triage(*arguments: object) -> Result:
+    """A command, run here."""
+    return CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An export of one loop with names, one without, and measurements of no loop."""
+    named, nameless = pi_loop(2.0, 60.0, 0.5, seed=2), pi_loop(-1.0, 40.0, -0.8, seed=3)
+    others = strangers(6000, 6, 9)
+    table = pd.DataFrame({"timestamp": pd.date_range("2026-03-02", periods=6000, freq="s")})
+    table[["TIC7.SP", "TIC7.PV", "TIC7.OP"]] = named
+    table[["X3", "X1", "X2"]] = nameless + np.array([7.0, 7.0, 0.0])
+    table[[f"Y{k}" for k in range(6)]] = others
+    path = tmp_path_factory.mktemp("bag") / "export.csv"
+    table[table.columns[1:]] = table[table.columns[1:]].round(3)
+    table.to_csv(path, index=False)
+    return path
+
+
+def test_the_draft_is_read_as_loops_csv(bag: Path, tmp_path: Path) -> None:
+    """What the command writes is loops.csv: the loop of names and the loop of the data, with its settings."""
+    done = triage("loops", bag, "--out", tmp_path / "loops.csv")
+    assert done.exit_code == 0
+    assert "2 loops (1 names, 1 data)" in done.output
+    named, found = read_loops(tmp_path / "loops.csv")
+    assert (named.loop, named.op, named.extra["found_by"]) == ("TIC7", "TIC7.OP", "names")
+    assert (found.sp, found.pv, found.op, found.extra["found_by"]) == ("X3", "X1", "X2", "data")
+    assert found.kp == pytest.approx(-1.0, rel=0.1)
+    assert found.ti == pytest.approx(40.0, rel=0.1)
+    assert found.extra["ranges"] == "recorded"
+
+
+def test_what_is_stated_is_kept(bag: Path, tmp_path: Path) -> None:
+    """A loop of --loops stands as it is stated, and its tags are nobody else's."""
+    (tmp_path / "stated.csv").write_text("loop,pv,op,kp,ti\nQ,X1,Y0,3,7\n")
+    done = triage("loops", bag, "--loops", tmp_path / "stated.csv")
+    rows = {r["loop"]: r for r in csv.DictReader(x for x in done.stdout.splitlines() if x[:1] != "#")}
+    assert (rows["Q"]["pv"], rows["Q"]["op"], rows["Q"]["kp"], rows["Q"]["ti"]) == ("X1", "Y0", "3", "7")
+    assert rows["Q"]["found_by"] == "stated"
+    assert set(rows) == {"Q", "TIC7"}
+
+
+def test_a_less_sure_loop_is_commented_out(tmp_path: Path) -> None:
+    """A row below the probability stands behind a # and is read by no command."""
+    rows = [Row(LoopSpec("A", pv="a"), "data", 89.0, "x, y"), Row(LoopSpec("B", pv="b"), "data", 91.0)]
+    (tmp_path / "loops.csv").write_text(as_csv(rows))
+    assert "\n# A," in as_csv(rows)
+    assert [s.loop for s in read_loops(tmp_path / "loops.csv")] == ["B"]
+
+
+def test_a_first_night_needs_no_file(bag: Path, tmp_path: Path) -> None:
+    """Without loops.csv a run has the loops of names, with --find-loops those of the data too; check says why."""
+    alone = triage("run", bag, "--store", tmp_path / "a")
+    assert "1 of 1 loops assessed" in alone.output
+    found = triage("run", bag, "--find-loops", "--store", tmp_path / "b")
+    assert "2 of 2 loops assessed" in found.output
+    told = triage("check", bag, "--find-loops").output
+    assert "X1: found by data" in told
+    assert "X2 follows X1 by a law (PI, direct acting)" in told
+
+
+@pytest.mark.parametrize(
+    "tag", ["FIC101.PV flow", "LC12 level", "a1/PIC-7.pv pressure", "TT_3 temperature", "T0001 ", "FAN3 "]
+)
+def test_a_type_is_told_by_isa_letters(tag: str) -> None:
+    """The first letter of an instrument's name tells what it measures; of other names it tells nothing."""
+    name, _, kind = tag.partition(" ")
+    assert type_of(name) == kind

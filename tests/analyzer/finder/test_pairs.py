@@ -1,0 +1,122 @@
+"""Loops in a bag of tags are found by what the data show, and nothing is found where there is no controller."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analyzer.finder.pairs import found_pairs
+from analyzer.limits import FINDER
+from analyzer.loops.spec import read_loops
+from analyzer.loops.tags import controller
+
+SAMPLE = Path(__file__).parents[3] / "sample_data"
+DT_S = 10.0
+NEVER_OPEN = {"TIC2118", "FIC2120"}
+"""Loops of the mill whose OP rests at a limit, or that are not read at all, the whole day."""
+
+
+@pytest.fixture(scope="module")
+def mill() -> pd.DataFrame:
+    """The last day of the sample mill: its tags that hold numbers."""
+    table = pd.read_parquet(SAMPLE / "mill.parquet")
+    day = table[(table["timestamp"] >= "2026-03-08") & (table["timestamp"] < "2026-03-09")]
+    return day.drop(columns="timestamp").select_dtypes("number").ffill().bfill().fillna(0.0)
+
+
+def strangers(n: int, count: int, seed: int) -> np.ndarray:
+    """Measurements of no loop, shape (n, count): drift, slow noise, waves, plain noise."""
+    rng = np.random.default_rng(seed)
+    e, t = rng.normal(size=(n, count)), np.arange(n)
+    out = e.copy()
+    out[:, ::4] = 0.02 * np.cumsum(e[:, ::4], axis=0)
+    for k in range(1, count, 4):
+        out[1:, k] = np.convolve(e[:, k], 0.98 ** np.arange(200))[1:n]
+    for k in range(2, count, 4):
+        out[:, k] = 5.0 * np.sin(2 * np.pi * t / rng.uniform(60, 2000)) + 0.3 * e[:, k]
+    return np.round(50.0 + out, 2)
+
+
+def pi_loop(kp: float, ti_s: float, slope: float, n: int = 6000, seed: int = 1) -> np.ndarray:
+    """SP, PV and OP of a PI loop on a lag of 100 s with a wandering load, a sample a second, shape (n, 3)."""
+    rng = np.random.default_rng(seed)
+    out, load, x, total = np.empty((n, 3)), 0.0, 50.0, 50.0
+    for k in range(n):
+        load = 0.999 * load + 0.05 * rng.normal()
+        sp = 50.0 if k < n / 2 else 53.0
+        pv = x + 0.1 * rng.normal()
+        total += kp * (sp - pv) / ti_s
+        op = kp * (sp - pv) + total
+        x += (slope * (op - 50.0) + load + 50.0 - x) / 100.0
+        out[k] = sp, pv, op
+    return out
+
+
+def test_the_loops_of_a_renamed_mill_are_found(mill: pd.DataFrame) -> None:
+    """Of a plant's shuffled tags among strangers three in four loops are sure and none is wrong; gains and integral
+    times are those of the plant's controllers within a fifth."""
+    rng = np.random.default_rng(5)
+    values = np.column_stack([mill.to_numpy(float), strangers(len(mill), 20, 5)])
+    names = np.array([*mill.columns, *(f"M{k}.X" for k in range(20))])
+    order = rng.permutation(len(names))
+    names, pairs = names[order], found_pairs(values[:, order])
+    sure = [p for p in pairs if p.sure_pct >= FINDER.sure_pct]
+    loops = {names[p.op].rpartition(".")[0]: p for p in sure}
+    wrong = [(names[p.pv], names[p.op]) for loop, p in loops.items() if names[p.pv] != f"{loop}.PV"]
+    assert wrong == []
+    assert len(loops) >= 0.7 * (22 - len(NEVER_OPEN))
+    right = [names[p.sp] == f"{loop}.SP" for loop, p in loops.items() if p.sp is not None]
+    assert all(right)
+    assert len(right) >= 0.9 * len(loops)
+    stated = {s.loop: s for s in read_loops(SAMPLE / "loops.csv")}
+    for loop, pair in loops.items():
+        spec = stated[loop]
+        span = (spec.pv_hi or 0.0) - (spec.pv_lo or 0.0)
+        pid = controller(spec, span)
+        if pair.told < FINDER.law_told or pid is None:
+            continue
+        assert pair.kp * span / 100.0 == pytest.approx(pid.kp, rel=0.2), loop
+        if pair.ti_samples is not None:
+            assert pair.ti_samples * DT_S == pytest.approx(pid.ti_s, rel=0.2), loop
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_nothing_is_found_where_nothing_is(seed: int) -> None:
+    """Of forty tags of noise, drift and waves no two are a loop: of 1,000 tags none."""
+    assert [p for p in found_pairs(strangers(3000, 40, seed)) if p.sure_pct >= FINDER.sure_pct] == []
+
+
+def test_recordings_without_op_have_no_loop(mill: pd.DataFrame) -> None:
+    """Measurements of a plant that swings together are no loops where no output is among them."""
+    pvs = mill[[c for c in mill if c.endswith(".PV")]].to_numpy(float)
+    assert [p for p in found_pairs(pvs) if p.sure_pct >= FINDER.sure_pct] == []
+
+
+@pytest.mark.parametrize(("kp", "ti_s", "slope"), [(2.0, 60.0, 0.5), (-2.0, 60.0, -0.5), (0.8, 200.0, 1.5)])
+def test_settings_and_sign_come_from_the_law(kp: float, ti_s: float, slope: float) -> None:
+    """PV, OP and SP of a loop are told apart, and its gain, sign and integral time recovered within a tenth."""
+    values = np.column_stack([strangers(6000, 8, 3), pi_loop(kp, ti_s, slope)])
+    best = found_pairs(values)[0]
+    assert (best.sp, best.pv, best.op) == (8, 9, 10)
+    assert best.sure_pct >= FINDER.sure_pct
+    assert best.kp == pytest.approx(kp, rel=0.1)
+    assert best.ti_samples == pytest.approx(ti_s, rel=0.1)
+
+
+def test_units_and_order_change_nothing() -> None:
+    """Another unit of PV scales the gain alone, and another order of the tags changes no pair."""
+    values = np.column_stack([pi_loop(2.0, 60.0, 0.5), strangers(6000, 6, 4)])
+    plain = found_pairs(values)[0]
+    turned = found_pairs(values[:, ::-1] * np.array([1.0] * 7 + [9.0, 9.0]))[0]
+    last = values.shape[1] - 1
+    assert (last - turned.pv, last - turned.op) == (plain.pv, plain.op)
+    assert turned.kp * 9.0 == pytest.approx(plain.kp, rel=1e-6)
+
+
+def test_too_little_finds_nothing() -> None:
+    """One tag, or a hundred samples, are no loop and no error."""
+    assert found_pairs(strangers(3000, 1, 1)) == []
+    assert found_pairs(strangers(100, 8, 1)) == []
