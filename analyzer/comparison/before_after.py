@@ -178,7 +178,7 @@ def _too_little(hours: tuple[float, float], spans: tuple[Span, Span], limits: Co
     found = []
     for name, usable, span in zip(("before", "after"), hours, spans, strict=True):
         total = max((span.last_s - span.first_s) / HOUR_S, 0.0)
-        if usable < 24 * limits.least_days:
+        if round(usable / 24, 1) < limits.least_days:  # as it is told
             least = f"{limits.least_days:g} usable days"
             found.append(f"too little time {name}: needs {least}, has {usable / 24:.1f}")
         elif usable < limits.usable_share * total:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -95,6 +97,14 @@ def test_too_little_time_is_not_counted() -> None:
     cut = {k: v[: WEEK + 48] for k, v in found.items()}
     result = compare("L", cut, *spans_around(CHANGED_S, 7))
     assert result.reasons == ("too little time after: needs 3 usable days, has 2.0",)
+
+
+def test_a_reason_is_none_that_reads_like_enough() -> None:
+    """71.9 usable hours are told as 3.0 days, and 3 days are enough."""
+    found = hours(0.5)
+    found["usable_h"][WEEK + 1 :] = 71.9 / (WEEK - 1)
+    limits = replace(LIMITS, usable_share=0.0)
+    assert compare("L", found, *spans_around(CHANGED_S, 7), limits=limits).reasons == ()
 
 
 def test_gaps_are_left_out_of_the_means() -> None:
