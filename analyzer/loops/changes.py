@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.comparison.block_bootstrap import Floats
 from analyzer.config import Config
 from analyzer.history.plant_clock import DAY_S, UTC_NAME, date_of
 from analyzer.history.stamps import parse_times
 from analyzer.loops.spec import LoopSpec, csv_table
 from identification.errors import InputError
+from identification.record import Floats
 
 TIMES = ("ti_old", "ti_new")
 COLUMNS = ("loop", "time", "kp_old", "ti_old", "kp_new", "ti_new", "who")

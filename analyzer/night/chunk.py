@@ -131,6 +131,7 @@ def _loop_row(
     try:
         prepared = prepare(spec, part, config.quality)
         known |= {"pv_lo": prepared.scale.low, "pv_hi": prepared.scale.low + prepared.scale.span}
+        known["travel_of"] = "OP" if prepared.record.position is None else "stem"
         known["straight_pct"] = 100.0 * prepared.compressed_share
         known |= standing(prepared, controller_of(spec, prepared), spec.type, config)
         earlier = earlier_settings(stated, changes, prepared)
