@@ -468,12 +468,14 @@ def grade(found: LoopComparison) -> Grade:
     """A loop's four verdicts as one."""
     verdicts = [c.verdict for c in found.primary]
     better = [c for c in found.primary if c.verdict is ChangeVerdict.BETTER]
-    told = {v for v in verdicts if v is not ChangeVerdict.INCOMPARABLE}
+    known = [c for c in found.primary if c.verdict is not ChangeVerdict.INCOMPARABLE]
+    told = {c.verdict for c in known}
     if not told:
         return Grade.INCOMPARABLE
     if ChangeVerdict.WORSE in verdicts:
         return Grade.TRADED if better else Grade.WORSE
-    if told <= {ChangeVerdict.SAME}:
+    simulated = {c.verdict for c in known if c.measure.name in SIMULATED}
+    if simulated == {ChangeVerdict.SAME} and not better:
         return Grade.SAME
     if ChangeVerdict.INCOMPARABLE in verdicts and not better:
         return Grade.INCOMPARABLE

@@ -195,9 +195,7 @@ def _told(part: Part) -> parts.Cell:
     """A part in percent with its 90 % interval."""
     low, high = (words.signed(_percent(end)) for end in part.interval(NINETY))
     value = _percent(part.value)
-    return parts.Cell(
-        words.signed(value) if part.deviation == 0 else f"{words.signed(value)} ({low} … {high})", value
-    )
+    return parts.Cell("0" if part.deviation == 0 else f"{words.signed(value)} ({low} … {high})", value)
 
 
 def _stated(row: words.Row, name: str) -> float | None:
@@ -308,11 +306,11 @@ def _in_short(case: ChangeCase) -> tuple[words.Told, ...]:
 
 
 def _change_cell(change: Change | None, found: LoopComparison) -> parts.Cell:
-    """The change's own part where the weeks differ or it is nothing, else what was measured."""
+    """The change's own part where both loops were simulated, else what was measured."""
     if change is None or change.verdict is ChangeVerdict.INCOMPARABLE:
         return parts.Cell("–")
     colour = _colour(change, found)
-    if change.parts is not None and (found.reasons or change.verdict is ChangeVerdict.SAME):
+    if change.parts is not None:
         return replace(_told(change.parts.change), kind=colour)
     if change.interval_pct is None:
         return parts.Cell("–")
@@ -328,6 +326,21 @@ def changes_in_short(cases: Sequence[ChangeCase]) -> parts.Table:
     return words.page_table("changes", map(_in_short, cases), columns=(*first, *four, last))
 
 
+def _parts_told(found: LoopComparison) -> parts.Listing | None:
+    """What each simulated figure's difference is made of, a line each; None where nothing was simulated."""
+    told = words.texts("parts_told")["line"]
+    lines = []
+    for c in found.primary:
+        if c.parts is not None:
+            four = (
+                _told(part).text for part in (c.parts.change, c.parts.load, c.parts.left, c.parts.promised)
+            )
+            names = ("change", "load", "left", "promised")
+            line = told.format(measured=words.signed(c.value_pct), **dict(zip(names, four, strict=True)))
+            lines.append((f"{c.measure.title}:", line))
+    return parts.Listing(tuple(lines)) if lines else None
+
+
 def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> parts.Section:
     """What became of one loop: settings, spans, remarks, trends (the study's Figure 10)."""
     found, change = case.found, case.change
@@ -340,7 +353,11 @@ def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> parts.
     facts = parts.Facts(tuple(zip(names, (_settings_typed(case), when, *spans), strict=True)))
     wear = wear_texts(found, case.row)
     blocks: tuple[parts.Block, ...] = parts.there(
-        words.lead(outcome(found)), facts, words.listing(wear) if wear else None, _trend(case, number_)
+        words.lead(outcome(found)),
+        facts,
+        _parts_told(found),
+        words.listing(wear) if wear else None,
+        _trend(case, number_),
     )
     return parts.Section(f"{found.loop} {case.row['description'] or ''}".strip(), blocks)
 
@@ -357,15 +374,23 @@ def _trend(case: ChangeCase, number_: int) -> parts.Trend | None:
     return trend_block(f"trend-{number_}", title, thin, marks, words.pv_scale_of(case.row))
 
 
+def _shown(change: Change) -> tuple[float | None, float | None, float | None]:
+    """The change's own part where both loops were simulated, else what was measured, with its ends [% of before]."""
+    if change.parts is not None:
+        low, high = map(_percent, change.parts.change.interval(NINETY))
+        return _percent(change.parts.change.value), low, high
+    return change.value_pct, *(change.interval_pct or (None, None))
+
+
 def per_loop_chart(cases: Sequence[ChangeCase]) -> parts.IntervalChart:
     """Change per loop and assessment (the study's Figure 12)."""
     bars = []
     for case in cases:
         for c in case.found.primary:
-            low, high = c.interval_pct or (None, None)
-            text = f"{words.signed(c.value_pct)} %" if c.interval_pct else c.verdict.value
+            value, low, high = _shown(c)
+            text = c.verdict.value if value is None else f"{words.signed(value)} %"
             name, kind = c.measure.short_title, _colour(c, case.found)
-            bars.append(parts.IntervalBar(case.found.loop, name, c.value_pct, low, high, kind, text))
+            bars.append(parts.IntervalBar(case.found.loop, name, value, low, high, kind, text))
     caption = "Bars: change in % of the span before; lines: its interval. Less is better in all four."
     return parts.IntervalChart(
         "change-per-loop", "Change per loop and assessment", "% of before", tuple(bars), caption
@@ -375,14 +400,13 @@ def per_loop_chart(cases: Sequence[ChangeCase]) -> parts.IntervalChart:
 def _average(cases: Sequence[ChangeCase], measure: Measure) -> parts.IntervalBar:
     """Mean of the loops' changes; errors of different loops taken as independent."""
     changes = [c for case in cases for c in case.found.primary if c.measure.name == measure.name]
-    known = [c for c in changes if c.value_pct is not None]
+    known = [shown for shown in map(_shown, changes) if shown[0] is not None]
     group = words.with_noun(len(known), "loop")
     if not known:
         return parts.IntervalBar(
             group, measure.short_title, None, None, None, "incomparable", "nothing comparable"
         )
-    values = np.array([c.value_pct for c in known], float)
-    ends = np.array([c.interval_pct for c in known], float)
+    values, ends = np.array(known, float)[:, 0], np.array(known, float)[:, 1:]
     down, up = np.sqrt(((ends - values[:, None]) ** 2).sum(axis=0)) / len(known)
     mean = float(values.mean())
     low, high = max(mean - float(down), -100.0), mean + float(up)
