@@ -255,9 +255,8 @@ def reasons_of_load(
 ) -> list[str]:
     """What differs between two spans that no tuning of the loop can alter: noise, load, a cycle from outside."""
     found, sides = [], (weeks.before, weeks.after)
-    a, b = (float(np.median([n.noise_db for n in side])) for side in sides)
-    if abs(b - a) > limits.noise_db:
-        found.append(f"different noise: {10 ** ((b - a) / 20):.2g} times as large after")
+    if abs(weeks.louder_db) > limits.noise_db:
+        found.append(f"different noise: {10 ** (weeks.louder_db / 20):.2g} times as large after")
     a, b = (
         _moves_of_load(*(gridded(hours, span, x) for x in ("op_mean_pct", "sp_mean_pct"))) for span in spans
     )

@@ -198,18 +198,24 @@ class Weeks:
     after: tuple[LoopNight, ...]
     old: Pid
     new: Pid
-
-    @property
-    def repaired(self) -> bool:
-        """Whether the settings stayed, and the valve was at fault in most nights before and is in few after."""
-        was, is_now = (sum(n.worn_alone for n in side) / len(side) for side in (self.before, self.after))
-        at_fault = any(n.at_fault for n in self.before)
-        return self.old == self.new and at_fault and was > 0.5 and is_now <= 0.5 * was
+    repaired: bool = False
 
     @property
     def same(self) -> bool:
         """Whether neither settings nor valve changed."""
         return self.old == self.new and not self.repaired
+
+    @property
+    def louder_db(self) -> float:
+        """How much louder PV's fastest noise is after [dB]."""
+        before, after = (float(np.median([n.noise_db for n in side])) for side in (self.before, self.after))
+        return after - before
+
+    @property
+    def cured(self) -> bool:
+        """Whether a valve at fault shows its fault in few nights after, and did in most before."""
+        was, is_now = (sum(n.worn_alone for n in side) / len(side) for side in (self.before, self.after))
+        return any(n.at_fault for n in self.before) and was > 0.5 and is_now <= 0.5 * was
 
 
 def equal_load(weeks: Weeks, limits: ComparisonLimits, figures: FigureLimits) -> EqualLoad | None:
@@ -233,12 +239,16 @@ def equal_load(weeks: Weeks, limits: ComparisonLimits, figures: FigureLimits) ->
     missed = np.abs(np.median(present - recorded, axis=0))
     if missed.max() > math.log(limits.agree_error):
         return None
-    off = np.hypot(*missed)[[0, 0, 1, 1]]
     own = table[:, 1] - table[:, 0]
     change, load = own.mean(axis=1), (table[:, :, 1] - table[:, :, 0]).mean(axis=1)
     ratio = table[..., 2] - table[..., 3]
+    off = np.hypot(*missed)[[0, 0, 1, 1]]
+    hardly = min(
+        float(np.abs(np.median(change, axis=0)).max()) / limits.beside_change, 1.0
+    )  # little is little off
     named = [
-        {n: _part(x[:, i], off[i], limits) for i, n in enumerate(FIGURES)} for x in (change, load, own[:, 0])
+        {n: _part(x[:, i], share * off[i], limits) for i, n in enumerate(FIGURES)}
+        for x, share in ((change, hardly), (load, 1.0), (own[:, 0], hardly))
     ]
     return EqualLoad(
         named[0],
@@ -378,6 +388,7 @@ def weeks_of(
     spans: Sequence[tuple[float, float]],
     old: tuple[float | None, float | None],
     new: tuple[float | None, float | None],
+    limits: ComparisonLimits,
 ) -> Weeks | None:
     """A loop's nights within two spans [s], of which nine tenths must lie in one, with the settings in force: those
     that a change states, else the nights' own; None where a side has no night, or settings are not known."""
@@ -395,4 +406,6 @@ def weeks_of(
     pids = pid_of(sides[0][-1], *old), pid_of(sides[1][-1], *new)
     if pids[0] is None or pids[1] is None:
         return None
-    return Weeks(nights[0], nights[1], pids[0], pids[1])
+    weeks = Weeks(nights[0], nights[1], pids[0], pids[1])
+    quiet = abs(weeks.louder_db) <= limits.noise_db  # loud noise moves a stem within its play
+    return replace(weeks, repaired=pids[0] == pids[1] and quiet and weeks.cured)

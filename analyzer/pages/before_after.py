@@ -128,7 +128,7 @@ def _evidence(
     """What a loop's nights say of a change beside its hours."""
     before, after = spans
     ends = [(span.first_s, span.last_s) for span in spans]
-    weeks = weeks_of(rows, ends, (change.kp_old, change.ti_old), (change.kp_new, change.ti_new))
+    weeks = weeks_of(rows, ends, (change.kp_old, change.ti_old), (change.kp_new, change.ti_new), limits)
     later = [r for r in rows if r["start_s"] is not None and after.first_s <= r["start_s"] < after.last_s]
     others = sum(r["action"] == Action.CHECK_SETTINGS for r in later)
     recorded = any(r["travel_of"] == "stem" for r in rows)
