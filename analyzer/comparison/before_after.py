@@ -123,7 +123,6 @@ class ChangeVerdict(StrEnum):
 
     BETTER = "better"
     WORSE = "worse"
-    TRADED = "traded"
     SAME = "no change"
     UNCLEAR = "no clear change"
     INCOMPARABLE = "not comparable"
@@ -131,10 +130,7 @@ class ChangeVerdict(StrEnum):
     @property
     def colour(self) -> str:
         """The kind under which pages colour it."""
-        return UNCOLOURED if self in (ChangeVerdict.TRADED, ChangeVerdict.SAME) else self.name.lower()
-
-
-UNCOLOURED = "unclear"
+        return ChangeVerdict.UNCLEAR.colour if self is ChangeVerdict.SAME else self.name.lower()
 
 
 class Grade(StrEnum):
@@ -290,6 +286,10 @@ def _called(part: tuple[float, float, float], measure: Measure, least: float) ->
     return ChangeVerdict.BETTER if (value < 0) == measure.lower_is_better else ChangeVerdict.WORSE
 
 
+LEAST_DEVIATION = 1e-3
+"""Standard deviation of a measured logarithm of a ratio, at least; ours: figures that stand still are no surer."""
+
+
 def _measured(found: Difference, measure: Measure, level: float, reference: Reference | None) -> Part | None:
     """A difference as the logarithm of a ratio, less what unchanged loops did, its deviation towards zero; None where
     before or after is nothing."""
@@ -301,7 +301,7 @@ def _measured(found: Difference, measure: Measure, level: float, reference: Refe
         ndtri(0.5 + level / 2)
     )
     common = NO_PART if reference is None else reference.of.get(measure.name, NO_PART)
-    return Part(value - common.value, math.hypot(deviation, common.deviation))
+    return Part(value - common.value, max(math.hypot(deviation, common.deviation), LEAST_DEVIATION))
 
 
 def parts_of(measured: Part, simulated: EqualLoad, name: str, alike: bool, limits: ComparisonLimits) -> Parts:
@@ -312,22 +312,21 @@ def parts_of(measured: Part, simulated: EqualLoad, name: str, alike: bool, limit
     others what was simulated.
     """
     own = simulated.change[name]
+    days = Part(0.0, measured.deviation)  # loads of weeks that are alike differ as days do
     if simulated.same:
-        left = Part(measured.value, measured.deviation)
-        return Parts(NO_PART, NO_PART, left, NO_PART) if alike else Parts(NO_PART, left, NO_PART, NO_PART)
-    load = NO_PART if alike else simulated.load[name]
+        left, load = (measured, days) if alike else (NO_PART, measured)
+        return Parts(NO_PART, load, left, NO_PART)
+    load = days if alike else simulated.load[name]
     if alike:
         most = max(abs(part.value) for part in simulated.change.values())
-        added = limits.beside_measured * min(
-            most / limits.beside_change, 1.0
-        )  # hardly other settings do hardly more
-        sure = Part(own.value, math.hypot(own.deviation, added))
+        share = min(most / limits.beside_change, 1.0)  # hardly other settings do hardly more
+        sure = Part(own.value, math.hypot(own.deviation, share * limits.beside_measured))
         weight = measured.deviation**-2, sure.deviation**-2
         own = Part((measured.value * weight[0] + sure.value * weight[1]) / sum(weight), sum(weight) ** -0.5)
         if abs(measured.value - sure.value) > 2.0 * math.hypot(measured.deviation, sure.deviation):
             far = max(abs(own.value - x.value) for x in (measured, sure))
             own = Part(own.value, max(own.deviation, far / float(ndtri(0.95))))  # 90 % then holds both
-    deviation = math.sqrt(measured.deviation**2 + own.deviation**2 + load.deviation**2)
+    deviation = math.hypot(measured.deviation, own.deviation, 0.0 if alike else load.deviation)
     left = Part(measured.value - own.value - load.value, deviation)
     return Parts(own, load, left, simulated.promised[name])
 

@@ -267,7 +267,7 @@ def _row(change: Change, found: LoopComparison, first: bool) -> tuple[words.Told
 def _colour(change: Change, found: LoopComparison) -> str:
     """The colour of a figure's verdict: what a trade costs is not red."""
     traded = change.verdict is ChangeVerdict.WORSE and grade(found) is Grade.TRADED
-    return ChangeVerdict.TRADED.colour if traded else change.verdict.colour
+    return ChangeVerdict.UNCLEAR.colour if traded else change.verdict.colour
 
 
 def figures(cases: Sequence[ChangeCase], primary: bool, name: str) -> parts.Table:
