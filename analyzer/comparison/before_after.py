@@ -241,7 +241,10 @@ def reasons_against(
     if max(a, b) > limits.sp_travel_floor and max(a, b) > limits.sp_travel_ratio * min(a, b):
         found.append(f"different set point travel: {a:.3g} %/h before, {b:.3g} %/h after")
     a, b = (x or 0.0 for x in pair("at_limits_pct"))
-    if max(a, b) > limits.limit_points:
+    swings = (
+        x or 0.0 for x in pair("oscillating_pct")
+    )  # a loop that swings from limit to limit does so itself
+    if max(x * (1.0 - share / 100.0) for x, share in zip((a, b), swings, strict=True)) > limits.limit_points:
         found.append(f"OP at a limit: {a:.0f} % of the time before, {b:.0f} % after")
     return tuple(found)
 
@@ -388,7 +391,8 @@ def _change(
     if simulated is not None and simulated.same:
         by_itself = ChangeVerdict.SAME
     measured = _measured(found, measure, level, evidence.reference)
-    name = "stem_travel" if measure is STEM_TRAVEL else SIMULATED.get(measure.name)
+    of_stem = measure is STEM_TRAVEL or (measure is TRAVEL and evidence.stem_recorded)
+    name = "stem_travel" if of_stem else SIMULATED.get(measure.name)
     if simulated is None or measured is None or name is None:
         kept = alike or by_itself is ChangeVerdict.SAME
         return Change(measure, found, by_itself if kept else ChangeVerdict.INCOMPARABLE)

@@ -19,7 +19,7 @@ from analyzer.comparison.block_bootstrap import Floats
 from analyzer.comparison.shared_process import Spectra, shared_process
 from analyzer.config import ComparisonLimits, FigureLimits
 from analyzer.loop.assessments import travel_of
-from analyzer.loop.decisions import Cause, Fault
+from analyzer.loop.decisions import Cause, Fault, counts
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller
 from identification.errors import InputError
@@ -35,7 +35,7 @@ MOST_TRIED = 3 * DRAWS
 """Models that are drawn at most: some are unstable under settings under which the plant was not."""
 LEAST_DEVIATION = np.array([0.07, 0.1, 0.07])
 """Standard deviations of the logs of slope, time constant and dead time, at least; ours: one lag stands for all."""
-MOST_MISFIT_DB, LEAST_SURE = 1.5, 0.5
+MOST_MISFIT_DB, MOST_SPREAD = 1.5, 0.5
 """Misfit of the spectra of both weeks [dB], and deviation of the slope's log, up to which they tell the process;
 ours: known loops leave 0.4 to 1.1 dB."""
 STEPS = 8192
@@ -141,7 +141,7 @@ def night_of(row: Mapping[str, Any]) -> LoopNight | None:
         row["valve_travel_pct_per_h"] or 0.0,
         moves / hours if moves else (1.0 / hours if travel else 0.0),
         travel / moves if moves else travel,
-        row["cause"] == Cause.LOAD and (row["oscillating_pct"] or 0.0) >= 50.0,
+        row["cause"] == Cause.LOAD and counts(row["oscillating_pct"]),
     )
 
 
@@ -243,9 +243,8 @@ def equal_load(weeks: Weeks, limits: ComparisonLimits, figures: FigureLimits) ->
     change, load = own.mean(axis=1), (table[:, :, 1] - table[:, :, 0]).mean(axis=1)
     ratio = table[..., 2] - table[..., 3]
     off = np.hypot(*missed)[[0, 0, 1, 1]]
-    hardly = min(
-        float(np.abs(np.median(change, axis=0)).max()) / limits.beside_change, 1.0
-    )  # little is little off
+    most = float(np.abs(np.median(change, axis=0)).max())
+    hardly = min(most / limits.beside_change, 1.0)  # of hardly other settings what is missed cancels
     named = [
         {n: _part(x[:, i], share * off[i], limits) for i, n in enumerate(FIGURES)}
         for x, share in ((change, hardly), (load, 1.0), (own[:, 0], hardly))
@@ -278,7 +277,11 @@ def _models(weeks: Weeks, rng: np.random.Generator) -> Iterator[Model]:
     shared = None
     if not faulty and weeks.old != weeks.new:
         shared = shared_process([_spectra(weeks.before, weeks.old), _spectra(weeks.after, weeks.new)])
-    if shared is not None and shared.misfit_db <= MOST_MISFIT_DB and shared.covariance[0, 0] <= LEAST_SURE**2:
+    if (
+        shared is not None
+        and shared.misfit_db <= MOST_MISFIT_DB
+        and shared.covariance[0, 0] <= MOST_SPREAD**2
+    ):
         spread = np.clip(np.sqrt(np.diag(shared.covariance)), LEAST_DEVIATION, 0.5)
         unit = shared.covariance / np.sqrt(np.outer(*[np.diag(shared.covariance)] * 2))
         root = spread[:, None] * np.linalg.cholesky(unit + 1e-6 * np.eye(3))

@@ -91,6 +91,16 @@ def test_incomparable_spans_are_not_counted(column: str, value: float, said: str
     assert grade(found) == "incomparable"
 
 
+def test_a_loop_that_swung_to_its_limits_is_compared() -> None:
+    """OP at a limit for 30 % of the time is no reason against comparing where the loop swung all that week."""
+    found = hours(0.5)
+    found["at_limits_pct"][:WEEK] = 30.0
+    found["oscillating_pct"][:WEEK] = 100.0
+    assert compare("L", found, *spans_around(CHANGED_S, 7)).reasons == ()
+    found["oscillating_pct"][:WEEK] = 0.0
+    assert compare("L", found, *spans_around(CHANGED_S, 7)).reasons != ()
+
+
 def test_too_little_time_is_not_counted() -> None:
     """Two days after a change are too few, and the text says how many there are."""
     found = hours(0.5)
