@@ -126,18 +126,23 @@ def _evidence(
     limits: ComparisonLimits,
 ) -> Evidence:
     """What a loop's nights say of a change beside its hours."""
-    before, after = spans
     ends = [(span.first_s, span.last_s) for span in spans]
     weeks = weeks_of(rows, ends, (change.kp_old, change.ti_old), (change.kp_new, change.ti_new), limits)
-    later = [r for r in rows if r["start_s"] is not None and after.first_s <= r["start_s"] < after.last_s]
-    others = sum(r["action"] == Action.CHECK_SETTINGS for r in later)
     recorded = any(r["travel_of"] == "stem" for r in rows)
-    if later and others > 0.5 * len(later):
-        return Evidence(("the controller works with other settings than stated",), stem_recorded=recorded)
+    was_other, is_other = (_works_with_others(rows, span) for span in spans)
+    if was_other or is_other:  # nothing can be simulated
+        sham = "OP does not follow the new settings: they were not typed in"
+        return Evidence(() if was_other else (sham,), stem_recorded=recorded)
     if weeks is None:
         return Evidence(stem_recorded=recorded)
-    reasons = reasons_of_load(hours, (before, after), weeks, limits)
+    reasons = reasons_of_load(hours, spans, weeks, limits)
     return Evidence(tuple(reasons), equal_load(weeks, limits, FigureLimits()), None, recorded)
+
+
+def _works_with_others(rows: Sequence[words.Row], span: Span) -> bool:
+    """Whether in most nights of a span OP shows other settings than those that are stated."""
+    own = [r for r in rows if r["start_s"] is not None and span.first_s <= r["start_s"] < span.last_s]
+    return sum(r["action"] == Action.CHECK_SETTINGS for r in own) > 0.5 * len(own)
 
 
 def _reference(

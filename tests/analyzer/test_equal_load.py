@@ -17,7 +17,7 @@ from analyzer.loops.changes import TuningChange
 from analyzer.loops.tags import match
 from analyzer.night import batch
 from analyzer.night.nights import Plant
-from analyzer.pages.before_after import ChangeCase, change_cases, changes_page, outcome
+from analyzer.pages.before_after import ChangeCase, _evidence, change_cases, changes_page, outcome
 from analyzer.store.store import Store
 from proofs.before_after_plant import LOADS, changed, truth
 from proofs.plant import CONFIG, START_S, Sketch, Trends, simulate, spec, write_export
@@ -176,6 +176,21 @@ def test_what_unchanged_loops_did_is_a_reference() -> None:
     assert isinstance(found, Reference)
     assert found.of["average_absolute_error_pct"].value == pytest.approx(math.log(1.5), abs=0.02)
     assert reference(hours[:4], *spans) is None
+
+
+@pytest.mark.parametrize(("before", "said"), [("none", 1), ("check settings", 0)])
+def test_settings_that_were_never_typed_in_are_told(before: str, said: int) -> None:
+    """Nights whose OP follows other settings after a change alone say that it was not typed in; where OP did so
+    before too, the statement is wrong and no reason against comparing."""
+    known = {"duration_s": DAY_S, "kp": None, "travel_of": "OP"}
+    rows = [
+        {**known, "start_s": DAY_S * k, "action": before if k < DAYS else "check settings"}
+        for k in range(2 * DAYS)
+    ]
+    spans = Span(0.0, DAYS * DAY_S), Span(DAYS * DAY_S, 2 * DAYS * DAY_S)
+    found = _evidence(rows, {}, TuningChange("L", DAYS * DAY_S), spans, CONFIG.before_after)
+    assert len(found.reasons) == said
+    assert found.simulated is None
 
 
 def test_the_proofs_loops_are_what_they_say() -> None:
