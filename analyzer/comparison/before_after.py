@@ -1,21 +1,27 @@
 """Did it help? Hourly figures of a loop before and after a change, compared with an interval and a verdict.
 
-A change is called better or worse only where the two spans can be compared and the interval, widened for
-drift and for the number of figures looked at, leaves zero out. All figures are means over usable hours.
+A change is called better or worse only where the interval of its own part, widened for drift and for the number of
+figures looked at, leaves zero out. On equal load that part is what was measured, beside what simulation of both loops
+says (equal_load.py); where the weeks differ it is what simulation says alone. All figures are means over usable
+hours.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
+from scipy.special import ndtri
 
 from analyzer.columns import BY_NAME
 from analyzer.comparison.block_bootstrap import Difference, Floats, Side, difference
+from analyzer.comparison.equal_load import NO_PART, EqualLoad, Part, Weeks
 from analyzer.config import ComparisonLimits
 from analyzer.history.plant_clock import HOUR_S
+from identification.signals.robust import robust_deviation
 
 LIMITS = ComparisonLimits()
 """The limits in force where none are given."""
@@ -71,11 +77,12 @@ class Measure:
     scale: float = 1.0
     lower_is_better: bool = True
     scaled_unit: str = ""
+    own_title: str = ""
 
     @property
     def title(self) -> str:
-        """The column's title."""
-        return BY_NAME[self.name].title
+        """The column's title, where it has none of its own."""
+        return self.own_title or BY_NAME[self.name].title
 
     @property
     def short_title(self) -> str:
@@ -103,19 +110,27 @@ MEASURES = (
 """The study's four first (its section 7), then the others of the store. Least differences are ours: about the
 resolution of what a historian keeps."""
 
+TRAVEL = next(m for m in MEASURES if m.name == "valve_travel_pct_per_h")
+STEM_TRAVEL = replace(TRAVEL, own_title="Valve travel (stem, simulated)")
+OP_TRAVEL = replace(TRAVEL, primary=False, own_title="Travel of OP")
+"""Behind a valve at fault the stem travels otherwise than OP, and it is the stem that wears."""
+SIMULATED = {TRAVEL.name: "valve_travel_pct_per_h", **{m.name: m.name for m in (MEASURES[0], MEASURES[3])}}
+"""Figures that are simulated, and how equal_load.py calls them."""
+
 
 class ChangeVerdict(StrEnum):
     """What became of a figure."""
 
     BETTER = "better"
     WORSE = "worse"
+    SAME = "no change"
     UNCLEAR = "no clear change"
     INCOMPARABLE = "not comparable"
 
     @property
     def colour(self) -> str:
         """The kind under which pages colour it."""
-        return self.name.lower()
+        return ChangeVerdict.UNCLEAR.colour if self is ChangeVerdict.SAME else self.name.lower()
 
 
 class Grade(StrEnum):
@@ -124,19 +139,33 @@ class Grade(StrEnum):
     CLEAR = "clear"
     MODEST = "modest"
     PARTIAL = "partial"
-    MIXED = "mixed"
+    TRADED = "traded"
     WORSE = "worse"
+    SAME = "same"
     NONE = "none"
     INCOMPARABLE = "incomparable"
 
 
 @dataclass(frozen=True, slots=True)
+class Parts:
+    """What a difference is made of, as logarithms of ratios: due to the change, to load and set point, left over; and
+    what settings promised on the load of before."""
+
+    change: Part
+    load: Part
+    left: Part
+    promised: Part
+
+
+@dataclass(frozen=True, slots=True)
 class Change:
-    """One figure before and after; percent of before, None where before is zero."""
+    """One figure before and after; percent of before, None where before is zero; parts, None where nothing was
+    simulated."""
 
     measure: Measure
     found: Difference
     verdict: ChangeVerdict
+    parts: Parts | None = None
 
     @property
     def value_pct(self) -> float | None:
@@ -157,7 +186,8 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class LoopComparison:
-    """A loop before and after: its changes, reasons against comparing, and the source loop."""
+    """A loop before and after: its changes, reasons against comparing, the source loop, and what unchanged loops did
+    meanwhile."""
 
     loop: str
     before: Span
@@ -167,6 +197,7 @@ class LoopComparison:
     reasons: tuple[str, ...]
     source_loop: str = ""
     limits: ComparisonLimits = LIMITS
+    reference: Reference | None = None
 
     @property
     def primary(self) -> tuple[Change, ...]:
@@ -178,7 +209,7 @@ def _too_little(hours: tuple[float, float], spans: tuple[Span, Span], limits: Co
     found = []
     for name, usable, span in zip(("before", "after"), hours, spans, strict=True):
         total = max((span.last_s - span.first_s) / HOUR_S, 0.0)
-        if usable < 24 * limits.least_days:
+        if round(usable / 24, 1) < limits.least_days:  # as it is told
             least = f"{limits.least_days:g} usable days"
             found.append(f"too little time {name}: needs {least}, has {usable / 24:.1f}")
         elif usable < limits.usable_share * total:
@@ -210,30 +241,172 @@ def reasons_against(
     if max(a, b) > limits.sp_travel_floor and max(a, b) > limits.sp_travel_ratio * min(a, b):
         found.append(f"different set point travel: {a:.3g} %/h before, {b:.3g} %/h after")
     a, b = (x or 0.0 for x in pair("at_limits_pct"))
-    if max(a, b) > limits.limit_points:
+    swings = (
+        x or 0.0 for x in pair("oscillating_pct")
+    )  # a loop that swings from limit to limit does so itself
+    if max(x * (1.0 - share / 100.0) for x, share in zip((a, b), swings, strict=True)) > limits.limit_points:
         found.append(f"OP at a limit: {a:.0f} % of the time before, {b:.0f} % after")
     return tuple(found)
 
 
-def _change_verdict(found: Difference, measure: Measure, limits: ComparisonLimits) -> ChangeVerdict:
-    small = abs(found.value) < max(measure.least, limits.least_pct / 100 * abs(found.before))
-    if small or found.low <= 0 <= found.high:
+def reasons_of_load(
+    hours: Hours, spans: tuple[Span, Span], weeks: Weeks, limits: ComparisonLimits
+) -> list[str]:
+    """What differs between two spans that no tuning of the loop can alter: noise, load, a cycle from outside."""
+    found, sides = [], (weeks.before, weeks.after)
+    if abs(weeks.louder_db) > limits.noise_db:
+        found.append(f"different noise: {10 ** (weeks.louder_db / 20):.2g} times as large after")
+    a, b = (
+        _moves_of_load(*(gridded(hours, span, x) for x in ("op_mean_pct", "sp_mean_pct"))) for span in spans
+    )
+    reach = max((n.width for side in sides for n in side), default=0.0)  # a stem hides so much of OP's way
+    if min(a, b) > 0 and max(b / a, a / b) > limits.load_ratio and abs(b * b - a * a) > 0.25 * reach**2:
+        found.append(f"different load: {b / a:.2g} times as large after")
+    a, b = (sum(n.from_outside for n in side) / len(side) for side in sides)
+    if abs(b - a) > limits.outside_share:
+        found.append(f"a cycle from outside in {100 * a:.0f} % of nights before, {100 * b:.0f} % after")
+    return found
+
+
+def _moves_of_load(op: Side, sp: Side) -> float:
+    """Median over days of the deviation of hourly mean OP, without what goes with the set point [% OP]; 0 where no
+    day holds enough hours."""
+    known = op.weight > 0
+    if not known.any():
+        return 0.0
+    asked, moved = sp.value - sp.value[known].mean(), op.value - op.value[known].mean()
+    moved = moved - asked * float(asked[known] @ moved[known]) / max(float(asked[known] @ asked[known]), 1e-9)
+    days = [(moved[k : k + 24], known[k : k + 24]) for k in range(0, moved.size, 24)]
+    spreads = [float(np.std(x[use])) for x, use in days if use.sum() >= 12]
+    return float(np.median(spreads)) if spreads else 0.0
+
+
+def _called(part: tuple[float, float, float], measure: Measure, least: float) -> ChangeVerdict:
+    """The verdict on a value with its interval's ends; below `least` it is none."""
+    value, low, high = part
+    if abs(value) < least or low <= 0 <= high:
         return ChangeVerdict.UNCLEAR
-    return ChangeVerdict.BETTER if (found.value < 0) == measure.lower_is_better else ChangeVerdict.WORSE
+    return ChangeVerdict.BETTER if (value < 0) == measure.lower_is_better else ChangeVerdict.WORSE
+
+
+LEAST_DEVIATION = 1e-3
+"""Standard deviation of a measured logarithm of a ratio, at least; ours: figures that stand still are no surer."""
+
+
+def _measured(found: Difference, measure: Measure, level: float, reference: Reference | None) -> Part | None:
+    """A difference as the logarithm of a ratio, less what unchanged loops did, its deviation towards zero; None where
+    before or after is nothing."""
+    if min(found.before, found.after) <= measure.least:
+        return None
+    value = math.log(found.after / found.before)
+    near = found.before + (found.high if value < 0 else found.low)
+    deviation = abs(value - math.log(max(near, 0.01 * found.before) / found.before)) / float(
+        ndtri(0.5 + level / 2)
+    )
+    common = NO_PART if reference is None else reference.of.get(measure.name, NO_PART)
+    return Part(value - common.value, max(math.hypot(deviation, common.deviation), LEAST_DEVIATION))
+
+
+def parts_of(measured: Part, simulated: EqualLoad, name: str, alike: bool, limits: ComparisonLimits) -> Parts:
+    """The parts of a measured change.
+
+    Where nothing changed in loop and valve the change's own part is nothing. In weeks that are alike it is what was
+    measured and what was simulated, each by its precision, or a span over both where they contradict each other; in
+    others what was simulated.
+    """
+    own = simulated.change[name]
+    days = Part(0.0, measured.deviation)  # loads of weeks that are alike differ as days do
+    if simulated.same:
+        left, load = (measured, days) if alike else (NO_PART, measured)
+        return Parts(NO_PART, load, left, NO_PART)
+    load = days if alike else simulated.load[name]
+    if alike:
+        most = max(abs(part.value) for part in simulated.change.values())
+        share = min(most / limits.beside_change, 1.0)  # hardly other settings do hardly more
+        sure = Part(own.value, math.hypot(own.deviation, share * limits.beside_measured))
+        weight = measured.deviation**-2, sure.deviation**-2
+        own = Part((measured.value * weight[0] + sure.value * weight[1]) / sum(weight), sum(weight) ** -0.5)
+        if abs(measured.value - sure.value) > 2.0 * math.hypot(measured.deviation, sure.deviation):
+            far = max(abs(own.value - x.value) for x in (measured, sure))
+            own = Part(own.value, max(own.deviation, far / float(ndtri(0.95))))  # 90 % then holds both
+    deviation = math.hypot(measured.deviation, own.deviation, 0.0 if alike else load.deviation)
+    left = Part(measured.value - own.value - load.value, deviation)
+    return Parts(own, load, left, simulated.promised[name])
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """What is known beside the hours of a loop: reasons why the weeks differ, what simulation says, what unchanged
+    loops did, and whether travel is the recorded stem's."""
+
+    reasons: tuple[str, ...] = ()
+    simulated: EqualLoad | None = None
+    reference: Reference | None = None
+    stem_recorded: bool = False
 
 
 def change_of(
-    hours: Hours, spans: tuple[Span, Span], measure: Measure, comparable: bool, limits: ComparisonLimits
-) -> Change | None:
-    """The change of one figure; None where it is not known on both sides."""
+    hours: Hours, spans: tuple[Span, Span], measure: Measure, evidence: Evidence, limits: ComparisonLimits
+) -> list[Change]:
+    """The change of one figure, none where it is not known on both sides; of travel behind a valve at fault that of
+    the stem and that of OP."""
     before, after = (gridded(hours, s, measure.name) for s in spans)
     if min(before.weight.sum(), after.weight.sum()) <= 0:
-        return None
+        return []
     family = sum(m.primary == measure.primary for m in MEASURES)
-    d = difference(before, after, 1 - (1 - limits.confidence) / family)
+    level = 1 - (1 - limits.confidence) / family
+    drifting = evidence.simulated is None or measure.name not in SIMULATED
+    d = difference(before, after, level, drifting=drifting)
     found = Difference(*(x * measure.scale for x in (d.before, d.after, d.low, d.high)))
-    verdict = _change_verdict(found, measure, limits) if comparable else ChangeVerdict.INCOMPARABLE
-    return Change(measure, found, verdict)
+    own = _change(measure, found, level, evidence, limits)
+    stem = None if evidence.simulated is None else evidence.simulated.stem
+    if measure is not TRAVEL or stem is None or stem == NO_PART or evidence.stem_recorded:
+        return [own]
+    return [_of_stem(found, level, evidence, limits), replace(own, measure=OP_TRAVEL)]
+
+
+def _of_stem(op: Difference, level: float, evidence: Evidence, limits: ComparisonLimits) -> Change:
+    """The change of the stem's travel: that of OP times what of it the simulated stems take."""
+    assert evidence.simulated is not None
+    share, ratio = evidence.simulated.stem_share, evidence.simulated.stem
+    before, factor = op.before * share, share * math.exp(ratio.value)
+    wide = math.exp(ratio.deviation * float(ndtri(0.5 + level / 2)))
+    low, high = (op.before + op.low) * factor / wide, (op.before + op.high) * factor * wide
+    return _change(
+        STEM_TRAVEL,
+        Difference(before, op.after * factor, low - before, high - before),
+        level,
+        evidence,
+        limits,
+    )
+
+
+def _change(
+    measure: Measure, found: Difference, level: float, evidence: Evidence, limits: ComparisonLimits
+) -> Change:
+    """A difference with its parts and its verdict."""
+    least = max(measure.least, limits.least_pct / 100 * abs(found.before))
+    by_itself = _called((found.value, found.low, found.high), measure, least)
+    simulated, alike = evidence.simulated, not evidence.reasons
+    if simulated is not None and simulated.same:
+        by_itself = ChangeVerdict.SAME
+    measured = _measured(found, measure, level, evidence.reference)
+    of_stem = measure is STEM_TRAVEL or (measure is TRAVEL and evidence.stem_recorded)
+    name = "stem_travel" if of_stem else SIMULATED.get(measure.name)
+    if simulated is None or measured is None or name is None:
+        kept = alike or by_itself is ChangeVerdict.SAME
+        return Change(measure, found, by_itself if kept else ChangeVerdict.INCOMPARABLE)
+    parts = parts_of(measured, simulated, name, alike, limits)
+    if simulated.same:
+        return Change(measure, found, ChangeVerdict.SAME, parts)
+    low, high = parts.change.interval(float(ndtri(0.5 + limits.confidence / 2)))
+    least = max(limits.least_pct / 100, measure.least / found.before)
+    verdict = _called((parts.change.value, low, high), measure, least)
+    if verdict is ChangeVerdict.UNCLEAR and max(-low, high) < math.log1p(limits.none_pct / 100):
+        verdict = ChangeVerdict.SAME
+    if verdict is ChangeVerdict.UNCLEAR and not alike:
+        verdict = ChangeVerdict.INCOMPARABLE
+    return Change(measure, found, verdict, parts)
 
 
 def compare(
@@ -243,28 +416,71 @@ def compare(
     after: Span,
     source_loop: str = "",
     limits: ComparisonLimits = LIMITS,
+    evidence: Evidence | None = None,
 ) -> LoopComparison:
     """A loop's hourly figures of two spans; without verdicts, and with the reasons, where they cannot be compared.
 
-    source_loop : the loop that this one follows, where the nights name one.
+    source_loop : the loop that this one follows, where the nights name one; evidence : what is known beside them.
     """
-    spans = before, after
+    spans, beside = (before, after), evidence or Evidence()
     usable = [gridded(hours, s, "usable_h").weight.sum() for s in spans]
     held = float(usable[0]), float(usable[1])
-    reasons = (*_too_little(held, spans, limits), *reasons_against(hours, before, after, limits))
-    changes = [change_of(hours, spans, m, not reasons, limits) for m in MEASURES]
-    known = tuple(c for c in changes if c is not None)
-    return LoopComparison(loop, before, after, held, known, reasons, source_loop, limits)
+    short = _too_little(held, spans, limits)
+    if short:
+        beside = replace(beside, simulated=None)
+    reasons = (*short, *reasons_against(hours, before, after, limits), *beside.reasons)
+    beside = replace(beside, reasons=reasons)
+    known = tuple(c for m in MEASURES for c in change_of(hours, spans, m, beside, limits))
+    return LoopComparison(loop, before, after, held, known, reasons, source_loop, limits, beside.reference)
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """What loops without a change did between the same spans: how many, and logs of ratios by figure."""
+
+    loops: int
+    of: Mapping[str, Part]
+
+
+def reference(
+    others: Sequence[Hours], before: Span, after: Span, limits: ComparisonLimits = LIMITS
+) -> Reference | None:
+    """The common change of unchanged loops, figure by figure: their median ratio where it is clear; None with too few
+    of them (difference in differences, Card and Krueger 1994)."""
+    of: dict[str, Part] = {}
+    for m in (m for m in MEASURES if m.primary):
+        ratios = []
+        for hours in others:
+            sides = [gridded(hours, span, m.name) for span in (before, after)]
+            if (
+                min(s.weight.sum() for s in sides) >= 24 * limits.least_days
+                and min(s.mean for s in sides) > m.least
+            ):
+                ratios.append(math.log(sides[1].mean / sides[0].mean))
+        if len(ratios) < limits.controls:
+            continue
+        value, spread = float(np.median(ratios)), robust_deviation(np.array(ratios) - np.median(ratios))
+        deviation = math.sqrt(math.pi / 2 / len(ratios)) * spread  # of a median
+        if abs(value) > 2.0 * deviation:
+            of[m.name] = Part(value, deviation)
+    return Reference(len(others), of) if len(others) >= limits.controls else None
 
 
 def grade(found: LoopComparison) -> Grade:
     """A loop's four verdicts as one."""
     verdicts = [c.verdict for c in found.primary]
     better = [c for c in found.primary if c.verdict is ChangeVerdict.BETTER]
-    if found.reasons or not verdicts:
+    known = [c for c in found.primary if c.verdict is not ChangeVerdict.INCOMPARABLE]
+    told = {c.verdict for c in known}
+    if not told:
         return Grade.INCOMPARABLE
     if ChangeVerdict.WORSE in verdicts:
-        return Grade.MIXED if better else Grade.WORSE
+        return Grade.TRADED if better else Grade.WORSE
+    simulated = {c.verdict for c in known if c.measure.name in SIMULATED}
+    if simulated == {ChangeVerdict.SAME} and not better:
+        return Grade.SAME
+    if ChangeVerdict.INCOMPARABLE in verdicts and not better:
+        return Grade.INCOMPARABLE
     if len(better) < len(verdicts):
         return Grade.PARTIAL if better else Grade.NONE
     least = min(abs(c.value_pct or np.inf) for c in better)

@@ -122,16 +122,17 @@ def student(before: Side, after: Side, spread: tuple[float, float], level: float
     return float(bias * stdtrit(freedom, 0.5 + level / 2) / ndtri(PERCENTILES[1] / 100))
 
 
-def difference(before: Side, after: Side, level: float, seed: int = 0) -> Difference:
+def difference(before: Side, after: Side, level: float, seed: int = 0, drifting: bool = True) -> Difference:
     """The difference of two spans with an interval that holds the truth with probability `level`.
 
     After begins where before ends, each with some usable hour. The level [-] is already corrected for how many
-    figures are looked at. One seed draws the same hours for every figure of a loop.
+    figures are looked at. One seed draws the same hours for every figure of a loop. Not `drifting` are days of which
+    it is known otherwise that their load does not.
     """
     rng = np.random.default_rng(seed)
     left, right = replicates(before, rng), replicates(after, rng)
     spread = float(left.std()), float(right.std())
-    wide = student(before, after, spread, level) * drift_factor(before, after)
+    wide = student(before, after, spread, level) * (drift_factor(before, after) if drifting else 1.0)
     value = after.mean - before.mean
     low, high = np.percentile(right - left, PERCENTILES) - value
     return Difference(before.mean, after.mean, value + wide * min(low, 0.0), value + wide * max(high, 0.0))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -245,5 +245,9 @@ def hourly(
     rows = []
     for a, b, start in hour_edges(record):
         significance, share = _hourly_oscillation(found, record, start, a, b)
-        rows.append(Hour(start, assess_span(record.span(a, b), limits, band), significance, share))
+        figures = assess_span(record.span(a, b), limits, band)
+        if a > 0 and figures.sp_travel_pct is not None:  # a move on the hour is between two hours' samples
+            moved = abs(float(record.sp[a] - record.sp[a - 1]))
+            figures = replace(figures, sp_travel_pct=figures.sp_travel_pct + moved)
+        rows.append(Hour(start, figures, significance, share))
     return rows

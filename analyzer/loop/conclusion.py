@@ -99,7 +99,8 @@ def _swing(found: Oscillations) -> Swing:
 def _cycle_known(a: Assessment) -> Known:
     """How regular the most significant oscillation is, the periods of all, and the ends of its last ten."""
     first, found = a.oscillations.first, a.oscillations.found
-    out: Known = {"periods": "[]"}
+    spectrum = _spectrum_kept(a.oscillations)
+    out: Known = {"periods": "[]", "spectrum": spectrum}
     if first is not None:
         periods = [{"period_s": o.period_s, "amplitude_pct": o.amplitude_pct} for o in found]
         out = {
@@ -107,7 +108,7 @@ def _cycle_known(a: Assessment) -> Known:
             "prominence": first.prominence,
             "correlation": first.rhythm.first,
             "periods": json.dumps(periods),
-            "spectrum": _spectrum_kept(a.oscillations),
+            "spectrum": spectrum,
         }
     return out if a.close_s is None else {**out, "close_first_s": a.close_s[0], "close_last_s": a.close_s[1]}
 

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.comparison.block_bootstrap import Floats
 from analyzer.config import Config
 from analyzer.history.plant_clock import DAY_S, UTC_NAME, date_of
 from analyzer.history.stamps import parse_times
 from analyzer.loops.spec import LoopSpec, csv_table
 from identification.errors import InputError
+from identification.record import Floats
 
 TIMES = ("ti_old", "ti_new")
 COLUMNS = ("loop", "time", "kp_old", "ti_old", "kp_new", "ti_new", "who")
@@ -103,12 +103,15 @@ def stated_changes(rows: Sequence[Mapping[str, Any]]) -> list[TuningChange]:
     Parameters
     ----------
     rows : sequence of mapping
-        The loop's rows of the nights in their order, with loop, start_s, kp and ti.
+        The loop's rows of the nights in their order, with loop, start_s, settings_changed_s (None where nothing was
+        typed in within the night, which then begins with its settings), kp and ti.
     """
     known = [r for r in rows if r["start_s"] is not None and r["kp"] is not None]
     seen = "the settings stated in loops.csv differ from the night before"
     return [
-        TuningChange(b["loop"], b["start_s"], a["kp"], a["ti"], b["kp"], b["ti"], seen=seen)
+        TuningChange(
+            b["loop"], b["settings_changed_s"] or b["start_s"], a["kp"], a["ti"], b["kp"], b["ti"], seen=seen
+        )
         for a, b in pairwise(known)
         if (a["kp"], a["ti"]) != (b["kp"], b["ti"])
     ]

@@ -119,16 +119,17 @@ def _loop_row(
     held: Held | None = None,
 ) -> None:
     """Keep the row of one loop and night, whatever happens, and its assessment where there is one."""
-    spec = in_force(stated, changes, night.last_s)
+    spec = in_force(stated, changes, night.at_end_s)
     part = {tag: cut(s, night) for tag, s in series.items()}
     known: dict[str, Cell] = {
         "good_h": _good_h(part.get(spec.pv or "")),
         "timezone": night.zone,
-        "settings_from": settings_from(stated, changes, night.last_s, night.zone),
+        "settings_from": settings_from(stated, changes, night.at_end_s, night.zone),
     }
     try:
         prepared = prepare(spec, part, config.quality)
         known |= {"pv_lo": prepared.scale.low, "pv_hi": prepared.scale.low + prepared.scale.span}
+        known["travel_of"] = "OP" if prepared.record.position is None else "stem"
         known["straight_pct"] = 100.0 * prepared.compressed_share
         known |= standing(prepared, controller_of(spec, prepared), spec.type, config)
         earlier = earlier_settings(stated, changes, prepared)
@@ -163,7 +164,8 @@ def _typed_in(earlier: Sequence[Earlier], spec: LoopSpec, found: Assessment, zon
         return {}
     last = earlier[-1]
     text = words.settings_changed(last.spec, spec, stamp(last.until_s, zone).split()[-1])
-    return {"settings_changed": text, "judged_since_s": None if found.outdated else last.until_s}
+    since_s = None if found.outdated else last.until_s
+    return {"settings_changed": text, "settings_changed_s": last.until_s, "judged_since_s": since_s}
 
 
 def _settings_row(spec: LoopSpec, night: str, advice: Advice) -> list[dict[str, Any]]:

@@ -37,6 +37,11 @@ class Night:
     last_s: float
     zone: str = UTC_NAME
 
+    @property
+    def at_end_s(self) -> float:
+        """The last moment that belongs to it [s]: what is dated at its end belongs to the next one."""
+        return math.nextafter(self.last_s, -math.inf)
+
 
 def _name(first_s: float, last_s: float, zone: str) -> str:
     """The plant's date of a span's middle."""
@@ -135,7 +140,7 @@ class Plant:
         if night is not None and night not in self.spans:
             raise InputError(f"night {night}", f"one of {', '.join(self.nights[-3:])}", "see Plant.nights")
         span = None if night is None else self.spans[night]
-        spec = in_force(spec, self.changes, self.export.span()[1] if span is None else span.last_s)
+        spec = in_force(spec, self.changes, self.export.span()[1] if span is None else span.at_end_s)
         prepared = prepare(spec, self.trends(spec.tags, span), self.config.quality)
         return PlantLoop(spec, prepared, self, span)
 

@@ -6,7 +6,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,18 +15,24 @@ from analyzer.comparison.before_after import (
     MEASURES,
     Change,
     ChangeVerdict,
+    Evidence,
     Grade,
+    Hours,
     LoopComparison,
     Measure,
+    Reference,
     Span,
     compare,
     follows,
     grade,
+    reasons_of_load,
+    reference,
     spans_around,
 )
-from analyzer.config import ComparisonLimits, Config
+from analyzer.comparison.equal_load import Part, equal_load, weeks_of
+from analyzer.config import ComparisonLimits, Config, FigureLimits
 from analyzer.history.plant_clock import UTC_NAME
-from analyzer.loop.decisions import counts
+from analyzer.loop.decisions import Action, counts
 from analyzer.loops.changes import TuningChange, behaviour_change, stated_changes
 from analyzer.pages import words
 from analyzer.pages.loop_pictures import trend_block
@@ -39,6 +45,10 @@ COLUMNS = words.keys("of-a-change")
 HOURS_A_YEAR = 8760.0
 PRIMARY = tuple(m for m in MEASURES if m.primary)
 """The study's four figures."""
+NINETY = 1.645
+"""Standard deviations of a 90 % interval to either side."""
+MOST_CONTROLS = 40
+"""Unchanged loops of an area that are read at most; ours."""
 TREND_BUCKETS = 4000
 """Buckets of a trend on this page: two weeks at two pixels a bucket, 64 kB a loop; ours."""
 OFFERED = "These changes were not stated but seen in the loops' behaviour: confirm them first."
@@ -98,21 +108,99 @@ def change_cases(
             continue
         oscillating = [counts(r["oscillating_pct"]) for r in own]
         source = follows([r["source_loop"] for r in own], oscillating, limits)
-        result = compare(change.loop, hours[change.loop], before, after, source, limits)
+        seen = _evidence(own, hours[change.loop], change, (before, after), limits)
+        if seen.simulated is None or not seen.simulated.same:
+            seen = replace(
+                seen, reference=_reference(store, nights, own[-1], changes, (before, after), limits)
+            )
+        result = compare(change.loop, hours[change.loop], before, after, source, limits, seen)
         found.append(ChangeCase(change, result, own[-1], trends.get(change.loop)))
     return found, missing
 
 
+def _evidence(
+    rows: Sequence[words.Row],
+    hours: Hours,
+    change: TuningChange,
+    spans: tuple[Span, Span],
+    limits: ComparisonLimits,
+) -> Evidence:
+    """What a loop's nights say of a change beside its hours."""
+    ends = [(span.first_s, span.last_s) for span in spans]
+    weeks = weeks_of(rows, ends, (change.kp_old, change.ti_old), (change.kp_new, change.ti_new), limits)
+    recorded = any(r["travel_of"] == "stem" for r in rows)
+    was_other, is_other = (_works_with_others(rows, span) for span in spans)
+    if was_other or is_other:  # nothing can be simulated
+        sham = "OP does not follow the new settings: they were not typed in"
+        return Evidence(() if was_other else (sham,), stem_recorded=recorded)
+    if weeks is None:
+        return Evidence(stem_recorded=recorded)
+    reasons = reasons_of_load(hours, spans, weeks, limits)
+    return Evidence(tuple(reasons), equal_load(weeks, limits, FigureLimits()), None, recorded)
+
+
+def _works_with_others(rows: Sequence[words.Row], span: Span) -> bool:
+    """Whether in most nights of a span OP shows other settings than those that are stated."""
+    own = [r for r in rows if r["start_s"] is not None and span.first_s <= r["start_s"] < span.last_s]
+    return sum(r["action"] == Action.CHECK_SETTINGS for r in own) > 0.5 * len(own)
+
+
+def _reference(
+    store: Store,
+    nights: Sequence[str],
+    row: words.Row,
+    changes: Sequence[TuningChange],
+    spans: tuple[Span, Span],
+    limits: ComparisonLimits,
+) -> Reference | None:
+    """What loops of the same area did meanwhile of which no change is stated; None with too few, or without areas."""
+    if not row["area"]:
+        return None
+    touched = {c.loop for c in changes}
+    beside = store.own_rows("nights", nights[-1], ["loop", "area", "status"])
+    alike = [r["loop"] for r in beside if r["area"] == row["area"] and r["loop"] not in touched]
+    held = read_hours(store, alike[:MOST_CONTROLS], nights)
+    return reference(list(held.values()), *spans, limits)
+
+
 def outcome(found: LoopComparison) -> str:
-    """A loop's outcome in one phrase."""
-    better = [c.measure.short_title.lower() for c in found.primary if c.verdict is ChangeVerdict.BETTER]
+    """A loop's outcome in one phrase, with what makes its weeks differ."""
+
+    def of(verdict: ChangeVerdict) -> list[Change]:
+        return [c for c in found.primary if c.verdict is verdict]
+
+    reached, won, lost = grade(found), of(ChangeVerdict.BETTER), of(ChangeVerdict.WORSE)
     reasons = "; ".join(found.reasons) or "no hourly figures on both sides"
-    text: str = words.texts("outcomes")[grade(found)]["said"].format(
-        better=words.enumerated(better), reasons=reasons
+    text: str = words.texts("outcomes")[reached]["said"].format(
+        better=words.enumerated([c.measure.short_title.lower() for c in won]),
+        gained=words.enumerated([_priced(c) for c in won]),
+        lost=words.enumerated([_priced(c) for c in lost]),
+        reasons=reasons,
     )
+    if found.reasons and reached is not Grade.INCOMPARABLE:
+        text += f"; this is on equal load, for the weeks are not comparable as measured: {reasons}"
+    if found.reference is not None and found.reference.of:
+        text += f"; what {found.reference.loops} unchanged loops of its area did is taken off"
     if found.source_loop:
         text += f"; the cause lies in the neighbour {found.source_loop}, whose oscillation it follows"
     return text
+
+
+def _priced(change: Change) -> str:
+    """A figure's name, with its own change where it is simulated."""
+    name = change.measure.short_title.lower()
+    return name if change.parts is None else f"{name} ({words.signed(_percent(change.parts.change.value))} %)"
+
+
+def _percent(log_ratio: float) -> float:
+    return 100.0 * math.expm1(log_ratio)
+
+
+def _told(part: Part) -> parts.Cell:
+    """A part in percent with its 90 % interval."""
+    low, high = (words.signed(_percent(end)) for end in part.interval(NINETY))
+    value = _percent(part.value)
+    return parts.Cell("0" if part.deviation == 0 else f"{words.signed(value)} ({low} … {high})", value)
 
 
 def _stated(row: words.Row, name: str) -> float | None:
@@ -162,25 +250,37 @@ def _outcome_tiles(cases: Sequence[ChangeCase]) -> parts.Tiles:
     return parts.Tiles(((str(len(cases)), "changes looked at", ""), *shown))
 
 
-def _row(change: Change, found: LoopComparison) -> tuple[words.Told, ...]:
-    """A figure before and after; the interval is in percent of before, in the figure's unit where that is zero."""
+def _row(change: Change, found: LoopComparison, first: bool) -> tuple[words.Told, ...]:
+    """A figure before and after; the interval is in percent of before, in the figure's unit where that is zero; the
+    remark on a loop stands in its first row."""
     d, ends, unit = change.found, change.interval_pct, change.measure.unit
     interval = f"{words.number(d.low)} … {words.number(d.high)} {unit}"
     if ends is not None:
         interval = f"{words.signed(ends[0])} … {words.signed(ends[1])} %"
+    of = change.parts
     follows = f"follows {found.source_loop}" if found.source_loop else ""
     return (
         *(found.loop, change.measure.title, unit, d.before, d.after),
         parts.Cell(words.signed(change.value_pct), change.value_pct),
         *(interval, d.low, d.high),
-        parts.Cell(change.verdict.value, kind=change.verdict.colour),
-        "; ".join(found.reasons) or follows,
+        *(("–",) * 4 if of is None else map(_told, (of.change, of.load, of.left, of.promised))),
+        parts.Cell(change.verdict.value, kind=_colour(change, found)),
+        ("; ".join(found.reasons) or follows) if first else "",
     )
+
+
+def _colour(change: Change, found: LoopComparison) -> str:
+    """The colour of a figure's verdict: what a trade costs is not red."""
+    traded = change.verdict is ChangeVerdict.WORSE and grade(found) is Grade.TRADED
+    return ChangeVerdict.UNCLEAR.colour if traded else change.verdict.colour
 
 
 def figures(cases: Sequence[ChangeCase], primary: bool, name: str) -> parts.Table:
     """Figures before and after of all loops (the study's Figure 11)."""
-    rows = [_row(c, case.found) for case in cases for c in case.found.changes if c.measure.primary == primary]
+    rows = []
+    for case in cases:
+        some = [c for c in case.found.changes if c.measure.primary == primary]
+        rows += [_row(c, case.found, primary and c is some[0]) for c in some]
     return words.page_table("figures", rows, name=name, searchable=len(rows) > 12)
 
 
@@ -205,18 +305,22 @@ def _in_short(case: ChangeCase) -> tuple[words.Told, ...]:
         parts.Cell(case.found.loop, kind="strong"),
         case.row["description"] or "",
         _settings_typed(case),
-        *(_change_cell(by_name.get(m.name)) for m in PRIMARY),
+        *(_change_cell(by_name.get(m.name), case.found) for m in PRIMARY),
         parts.Cell(outcome(case.found), kind=kind),
     )
 
 
-def _change_cell(change: Change | None) -> parts.Cell:
-    if change is None or change.verdict is ChangeVerdict.INCOMPARABLE or change.interval_pct is None:
+def _change_cell(change: Change | None, found: LoopComparison) -> parts.Cell:
+    """The change's own part where both loops were simulated, else what was measured."""
+    if change is None or change.verdict is ChangeVerdict.INCOMPARABLE:
+        return parts.Cell("–")
+    colour = _colour(change, found)
+    if change.parts is not None:
+        return replace(_told(change.parts.change), kind=colour)
+    if change.interval_pct is None:
         return parts.Cell("–")
     low, high = map(words.signed, change.interval_pct)
-    return parts.Cell(
-        f"{words.signed(change.value_pct)} ({low} … {high})", change.value_pct, change.verdict.colour
-    )
+    return parts.Cell(f"{words.signed(change.value_pct)} ({low} … {high})", change.value_pct, colour)
 
 
 def changes_in_short(cases: Sequence[ChangeCase]) -> parts.Table:
@@ -225,6 +329,21 @@ def changes_in_short(cases: Sequence[ChangeCase]) -> parts.Table:
     hint = "Change, with its interval"
     four = (parts.Column(m.name, f"{m.short_title}, % of before", True, hint, True) for m in PRIMARY)
     return words.page_table("changes", map(_in_short, cases), columns=(*first, *four, last))
+
+
+def _parts_told(found: LoopComparison) -> parts.Listing | None:
+    """What each simulated figure's difference is made of, a line each; None where nothing was simulated."""
+    told = words.texts("parts_told")["line"]
+    lines = []
+    for c in found.primary:
+        if c.parts is not None:
+            four = (
+                _told(part).text for part in (c.parts.change, c.parts.load, c.parts.left, c.parts.promised)
+            )
+            names = ("change", "load", "left", "promised")
+            line = told.format(measured=words.signed(c.value_pct), **dict(zip(names, four, strict=True)))
+            lines.append((f"{c.measure.title}:", line))
+    return parts.Listing(tuple(lines)) if lines else None
 
 
 def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> parts.Section:
@@ -239,7 +358,11 @@ def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> parts.
     facts = parts.Facts(tuple(zip(names, (_settings_typed(case), when, *spans), strict=True)))
     wear = wear_texts(found, case.row)
     blocks: tuple[parts.Block, ...] = parts.there(
-        words.lead(outcome(found)), facts, words.listing(wear) if wear else None, _trend(case, number_)
+        words.lead(outcome(found)),
+        facts,
+        _parts_told(found),
+        words.listing(wear) if wear else None,
+        _trend(case, number_),
     )
     return parts.Section(f"{found.loop} {case.row['description'] or ''}".strip(), blocks)
 
@@ -256,15 +379,23 @@ def _trend(case: ChangeCase, number_: int) -> parts.Trend | None:
     return trend_block(f"trend-{number_}", title, thin, marks, words.pv_scale_of(case.row))
 
 
+def _shown(change: Change) -> tuple[float | None, float | None, float | None]:
+    """The change's own part where both loops were simulated, else what was measured, with its ends [% of before]."""
+    if change.parts is not None:
+        low, high = map(_percent, change.parts.change.interval(NINETY))
+        return _percent(change.parts.change.value), low, high
+    return change.value_pct, *(change.interval_pct or (None, None))
+
+
 def per_loop_chart(cases: Sequence[ChangeCase]) -> parts.IntervalChart:
     """Change per loop and assessment (the study's Figure 12)."""
     bars = []
     for case in cases:
         for c in case.found.primary:
-            low, high = c.interval_pct or (None, None)
-            text = f"{words.signed(c.value_pct)} %" if c.interval_pct else c.verdict.value
-            name, kind = c.measure.short_title, c.verdict.colour
-            bars.append(parts.IntervalBar(case.found.loop, name, c.value_pct, low, high, kind, text))
+            value, low, high = _shown(c)
+            text = c.verdict.value if value is None else f"{words.signed(value)} %"
+            name, kind = c.measure.short_title, _colour(c, case.found)
+            bars.append(parts.IntervalBar(case.found.loop, name, value, low, high, kind, text))
     caption = "Bars: change in % of the span before; lines: its interval. Less is better in all four."
     return parts.IntervalChart(
         "change-per-loop", "Change per loop and assessment", "% of before", tuple(bars), caption
@@ -273,15 +404,14 @@ def per_loop_chart(cases: Sequence[ChangeCase]) -> parts.IntervalChart:
 
 def _average(cases: Sequence[ChangeCase], measure: Measure) -> parts.IntervalBar:
     """Mean of the loops' changes; errors of different loops taken as independent."""
-    changes = [c for case in cases for c in case.found.primary if c.measure == measure]
-    known = [c for c in changes if c.value_pct is not None]
+    changes = [c for case in cases for c in case.found.primary if c.measure.name == measure.name]
+    known = [shown for shown in map(_shown, changes) if shown[0] is not None]
     group = words.with_noun(len(known), "loop")
     if not known:
         return parts.IntervalBar(
             group, measure.short_title, None, None, None, "incomparable", "nothing comparable"
         )
-    values = np.array([c.value_pct for c in known], float)
-    ends = np.array([c.interval_pct for c in known], float)
+    values, ends = np.array(known, float)[:, 0], np.array(known, float)[:, 1:]
     down, up = np.sqrt(((ends - values[:, None]) ** 2).sum(axis=0)) / len(known)
     mean = float(values.mean())
     low, high = max(mean - float(down), -100.0), mean + float(up)

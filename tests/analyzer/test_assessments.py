@@ -178,6 +178,16 @@ def test_travel_of_the_position_where_it_is_recorded():
     assert assess_span(r, FIGURES).valve_travel_pct_per_h > 50
 
 
+def test_set_point_moves_count_whatever_the_minute_they_fall_on():
+    """A set point that moves by 2 % on every hour, or in the middle of each, travels as far: 2 %/h."""
+    t = np.arange(0, 6 * 3600, 10)
+    for minute in (0, 30):
+        sp = 50 + 2.0 * (((t + 60 * minute) // 3600) % 2)
+        made = record(sp, sp, dt_s=10.0)
+        found = hourly(made, detect(made, CONFIG.oscillation), FIGURES)
+        assert [h.figures.sp_travel_pct for h in found][1:] == [2.0] * 5
+
+
 # Gaps, constants and nothing at all
 
 

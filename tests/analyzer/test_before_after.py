@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -89,12 +91,30 @@ def test_incomparable_spans_are_not_counted(column: str, value: float, said: str
     assert grade(found) == "incomparable"
 
 
+def test_a_loop_that_swung_to_its_limits_is_compared() -> None:
+    """OP at a limit for 30 % of the time is no reason against comparing where the loop swung all that week."""
+    found = hours(0.5)
+    found["at_limits_pct"][:WEEK] = 30.0
+    found["oscillating_pct"][:WEEK] = 100.0
+    assert compare("L", found, *spans_around(CHANGED_S, 7)).reasons == ()
+    found["oscillating_pct"][:WEEK] = 0.0
+    assert compare("L", found, *spans_around(CHANGED_S, 7)).reasons != ()
+
+
 def test_too_little_time_is_not_counted() -> None:
     """Two days after a change are too few, and the text says how many there are."""
     found = hours(0.5)
     cut = {k: v[: WEEK + 48] for k, v in found.items()}
     result = compare("L", cut, *spans_around(CHANGED_S, 7))
     assert result.reasons == ("too little time after: needs 3 usable days, has 2.0",)
+
+
+def test_a_reason_is_none_that_reads_like_enough() -> None:
+    """71.9 usable hours are told as 3.0 days, and 3 days are enough."""
+    found = hours(0.5)
+    found["usable_h"][WEEK + 1 :] = 71.9 / (WEEK - 1)
+    limits = replace(LIMITS, usable_share=0.0)
+    assert compare("L", found, *spans_around(CHANGED_S, 7), limits=limits).reasons == ()
 
 
 def test_gaps_are_left_out_of_the_means() -> None:

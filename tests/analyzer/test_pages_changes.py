@@ -67,8 +67,19 @@ def test_times_have_zones(text: str) -> None:
 def test_settings_that_differ_between_nights_are_changes() -> None:
     """Settings of loops.csv that differ from the night before are a change at that night's start."""
     rows = [
-        {"loop": "A", "start_s": T + k, "kp": kp, "ti": 10.0} for k, kp in enumerate((1.0, 1.0, 2.0, 2.0))
+        {"loop": "A", "start_s": T + k, "settings_changed_s": None, "kp": kp, "ti": 10.0}
+        for k, kp in enumerate((1.0, 1.0, 2.0, 2.0))
     ]
     (found,) = stated_changes(rows)
     assert (found.time_s, found.kp_old, found.kp_new) == (T + 2, 1.0, 2.0)
     assert found.seen
+
+
+def test_a_change_within_a_night_is_dated_to_its_sample() -> None:
+    """Where settings were typed in within a night, the change is dated to that moment, not to the night's start."""
+    days = [
+        {"loop": "A", "start_s": T + 86400.0 * k, "settings_changed_s": None, "kp": 1.0 + (k > 0), "ti": 10.0}
+        for k in range(2)
+    ]
+    days[1]["settings_changed_s"] = T + 86400.0 + 30_611.0
+    assert [c.time_s for c in stated_changes(days)] == [T + 86400.0 + 30_611.0]

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from analyzer.config import Config
 from analyzer.history.export import open_export
 from analyzer.history.stamps import parse_time
-from analyzer.loops.changes import TuningChange, in_force, settings_from
+from analyzer.loops.changes import TuningChange, in_force, read_changes, settings_from
 from analyzer.loops.tags import match, read_loops
 from analyzer.night import batch
 from analyzer.night.nights import Plant
+from analyzer.pages.before_after import detected
 from analyzer.store.store import Store
 from identification.errors import InputError
-from proofs.plant import START_S, Sketch, simulate, spec, write_export
+from proofs.plant import START_S, Sketch, Trends, simulate, spec, write_export
 
 LOOP = spec("L", kp=1.0, ti=10.0)
 FIRST = TuningChange("L", 100.0, 1.0, 10.0, 2.0, 20.0)
@@ -57,6 +61,28 @@ def test_a_run_advises_on_the_settings_in_force(tmp_path):
         rows.append(row)
     assert [r["action"] for r in rows] == ["check settings", "retune"]
     assert (rows[1]["kp"], rows[1]["ti"]) == (0.65, 30.0)
+
+
+def test_a_date_without_a_time_belongs_to_the_night_that_begins_there(tmp_path):
+    """Settings dated at midnight are those of the night that begins then: the night before keeps the old ones, is not
+    asked to check its settings, and the change is found where it was."""
+    flow = Sketch("none", (1.0, 40.0, 8.0), 1.0, 30.0, moves=3.0)
+    changed = replace(flow, kp=0.4, ti=60.0)
+    days = [simulate(s, 24.0, seed) for seed, s in enumerate((flow, flow, changed, changed))]
+    joined = Trends(
+        *(np.concatenate([getattr(d, n)[::10] for d in days]) for n in ("sp", "pv", "op", "stem"))
+    )
+    export = open_export([write_export(tmp_path / "x.parquet", {"L": joined}, dt_s=10.0)])
+    stated = match([spec("L", kp=1.0, ti=30.0, scan_s=1.0)], export.tags)[0]
+    path = tmp_path / "changes.csv"
+    path.write_text("loop,time,kp_old,ti_old,kp_new,ti_new\nL,2026-03-04,1,30,0.4,60\n", encoding="utf-8")
+    store = Store(tmp_path / "store")
+    batch.run(Plant(export, stated, Config(), changes=read_changes(path)), store)
+    rows = [store.read("nights", night).to_pylist()[0] for night in store.nights()]
+    assert [r["kp"] for r in rows] == [1.0, 1.0, 0.4, 0.4]
+    assert not any(r["settings_changed"] or r["action"] == "check settings" for r in rows)
+    (found,) = detected(store, None, Config())
+    assert found.time_s == START_S + 2 * 86400.0
 
 
 DATED = """loop,kp,ti,gain_unit,valid_from

@@ -1,0 +1,414 @@
+"""What a change did on equal load: the loops of before and after, each simulated on the loads of both weeks.
+
+A night keeps the spectrum of its error, the process that was identified and the settings in force. The load of a
+night is that spectrum over the loop's sensitivity (e = S d); with it any settings and any valve can be simulated on
+the same load, so that what the settings do parts from what the load does.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from analyzer.comparison.block_bootstrap import Floats
+from analyzer.comparison.shared_process import Spectra, shared_process
+from analyzer.config import ComparisonLimits, FigureLimits
+from analyzer.loop.assessments import travel_of
+from analyzer.loop.decisions import Cause, Fault, counts
+from analyzer.loops.spec import LoopSpec
+from analyzer.loops.tags import controller
+from identification.errors import InputError
+from identification.limits import SIGNALS
+from identification.models import Backlash, Fopdt, Form, Loop, Pid, Stiction, Valve
+from identification.signals.robust import robust_deviation
+from tuning.forecast import in_digits, loop_in_digits, run, settled
+from tuning.frequency_response import loop_response, maximum_sensitivity
+
+DRAWS = 24
+"""Models and loads that are drawn: their spread is then known within 15 %; ours."""
+MOST_TRIED = 3 * DRAWS
+"""Models that are drawn at most: some are unstable under settings under which the plant was not."""
+LEAST_DEVIATION = np.array([0.07, 0.1, 0.07])
+"""Standard deviations of the logs of slope, time constant and dead time, at least; ours: one lag stands for all."""
+MOST_MISFIT_DB, MOST_SPREAD = 1.5, 0.5
+"""Misfit of the spectra of both weeks [dB], and deviation of the slope's log, up to which they tell the process;
+ours: known loops leave 0.4 to 1.1 dB."""
+STEPS = 8192
+"""Samples of each simulation; ours: 22 hours at 10 s."""
+WINDOW_POWER = 0.375
+"""Mean square of the Hann window that the kept spectrum has."""
+HARMONICS = (1, 2, 3, 5)
+"""Multiples of a valve's cycle that are taken out of the load, for the simulated valve makes them."""
+BESIDE_OCTAVES = 0.5
+"""How far about each of them [octaves]; ours: a cycle that a load disturbs is as wide."""
+WHOLE = 0.9
+"""Share of a night that a span must hold for the night to be of it; ours: the hour after a change is left out."""
+CALIBRATED = 3
+"""Times that a load's size is corrected; ours: the error is then within 5 % of the recorded one."""
+FIGURES = ("average_absolute_error_pct", "variability_pct", "stem_travel", "valve_travel_pct_per_h")
+"""What is simulated; stem_travel is that of the stem, valve_travel_pct_per_h that of OP [%/h]."""
+
+
+@dataclass(frozen=True, slots=True)
+class LoopNight:
+    """What one night says of a loop.
+
+    constants, logs of slope [%/(% s)], time constant and dead time [s], and deviations of the logs, shape (3,) each,
+    None where nothing was fitted; sign, of the slope; width, jump, of the valve's fault [% OP]; at_fault, whether it
+    has one by all nights, and worn_alone by this one; cycle_s, period of a cycle that the valve makes [s], 0 for
+    none; frequency [Hz] and level [dB of % PV per line], shape (b,), of the error without what the set point
+    explains; duration_s; error [% PV], its recorded average; op_travel [%/h]; moves [1/h] and their size [% PV] of
+    the set point; from_outside, whether a load's cycle was told.
+    """
+
+    constants: tuple[Floats, Floats] | None
+    sign: float
+    width: float
+    jump: float
+    at_fault: bool
+    worn_alone: bool
+    cycle_s: float
+    frequency: Floats
+    level: Floats
+    duration_s: float
+    error: float
+    op_travel: float
+    moves: float
+    size: float
+    from_outside: bool
+
+    @property
+    def noise_db(self) -> float:
+        """Level at the record's highest frequencies, where no control reaches [dB]."""
+        return float(np.mean(self.level[-3:]))
+
+    @property
+    def dt_s(self) -> float:
+        """Interval of the record's samples [s], within a sixth."""
+        return float(1.0 / (2.0 * SIGNALS.peak_band * self.frequency[-1]))
+
+
+def pid_of(row: Mapping[str, Any], kp: float | None = None, ti: float | None = None) -> Pid | None:
+    """The settings of a night's row, or others in its units, in percent and seconds; None where none are known."""
+    spec = LoopSpec(
+        row["loop"],
+        pv_lo=row["pv_lo"],
+        pv_hi=row["pv_hi"],
+        kp=row["kp"] if kp is None else kp,
+        ti=row["ti"] if ti is None else ti,
+        form=Form(row["form"] or "ideal"),
+        gain_unit=row["gain_unit"] or "percent",
+        ti_unit=row["ti_unit"] or "s",
+    )
+    span = None if None in (spec.pv_lo, spec.pv_hi) else float(spec.pv_hi or 0.0) - float(spec.pv_lo or 0.0)
+    try:
+        return controller(spec, span)
+    except InputError:
+        return None
+
+
+def night_of(row: Mapping[str, Any]) -> LoopNight | None:
+    """What a row of the table of nights says; None where it keeps no spectrum or error of the loop."""
+    if not row["spectrum"] or not row["average_absolute_error_pct"] or not row["duration_s"]:
+        return None
+    kept = json.loads(row["spectrum"])
+    level = np.array(kept["db"], float)
+    if level.size < 6:
+        return None
+    known, said = row["duration_s"], json.loads(row["witness"] or "{}")
+    fault = row["valve_fault"] in (Fault.BACKLASH, Fault.STICTION)
+    own = row["backlash_pct"] or row["stickband_pct"] or 0.0
+    width, jump = said.get("width", [own])[0], said.get("slip_jump", [row["slip_jump_pct"] or 0.0])[0]
+    valve_made = row["cause"] == Cause.VALVE and row["period_s"] is not None
+    hours, moves = known / 3600.0, row["sp_moves"] or 0.0
+    travel = row["sp_travel_pct"] or 0.0
+    return LoopNight(
+        *_constants(row, said),
+        width if fault else 0.0,
+        jump if fault else 0.0,
+        fault,
+        "width" in said,
+        row["period_s"] if valve_made else 0.0,
+        2.0 ** (np.arange(level.size) / 6.0) / kept["period_s"],
+        level,
+        known,
+        row["average_absolute_error_pct"],
+        row["valve_travel_pct_per_h"] or 0.0,
+        moves / hours if moves else (1.0 / hours if travel else 0.0),
+        travel / moves if moves else travel,
+        row["cause"] == Cause.LOAD and counts(row["oscillating_pct"]),
+    )
+
+
+def _constants(row: Mapping[str, Any], said: Mapping[str, Any]) -> tuple[tuple[Floats, Floats] | None, float]:
+    """Logs of slope, time constant and dead time with their deviations, and the slope's sign."""
+    if "slope" in said:
+        pairs = np.array([said[name] for name in ("slope", "time_constant_s", "dead_time_s")], float)
+    elif row["slope_pct_per_s"] and row["dead_time_s"] is not None:
+        lag = row["time_constant_s"] or 0.25 * row["duration_s"]
+        pairs = np.array([[row["slope_pct_per_s"], 0.2], [lag, 0.3], [row["dead_time_s"], 0.2]])
+    else:
+        return None, 1.0
+    sign = math.copysign(1.0, pairs[0, 0])
+    return (np.log(np.maximum(np.abs(pairs[:, 0]), 1e-9)), pairs[:, 1]), sign
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A logarithm of a ratio with its standard deviation [-]."""
+
+    value: float
+    deviation: float
+
+    def interval(self, times: float) -> tuple[float, float]:
+        """Its ends at so many standard deviations."""
+        return self.value - times * self.deviation, self.value + times * self.deviation
+
+
+NO_PART = Part(0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class EqualLoad:
+    """What simulation says of a change, by name of the figure (FIGURES).
+
+    change, on the loads of both weeks, by settings or repair; load, what the loads do on both loops; promised, the
+    change on the load of before; stem, of the stem's travel over OP's, after over before, nothing behind a sound
+    valve, and stem_share, what it was before [-]; same, whether neither settings nor valve changed.
+    """
+
+    change: Mapping[str, Part]
+    load: Mapping[str, Part]
+    promised: Mapping[str, Part]
+    stem: Part
+    stem_share: float = 1.0
+    same: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Weeks:
+    """A loop's nights before and after a change, the settings in force, and whether the valve was repaired."""
+
+    before: tuple[LoopNight, ...]
+    after: tuple[LoopNight, ...]
+    old: Pid
+    new: Pid
+    repaired: bool = False
+
+    @property
+    def same(self) -> bool:
+        """Whether neither settings nor valve changed."""
+        return self.old == self.new and not self.repaired
+
+    @property
+    def louder_db(self) -> float:
+        """How much louder PV's fastest noise is after [dB]."""
+        before, after = (float(np.median([n.noise_db for n in side])) for side in (self.before, self.after))
+        return after - before
+
+    @property
+    def cured(self) -> bool:
+        """Whether a valve at fault shows its fault in few nights after, and did in most before."""
+        was, is_now = (sum(n.worn_alone for n in side) / len(side) for side in (self.before, self.after))
+        return any(n.at_fault for n in self.before) and was > 0.5 and is_now <= 0.5 * was
+
+
+def equal_load(weeks: Weeks, limits: ComparisonLimits, figures: FigureLimits) -> EqualLoad | None:
+    """Both loops on both weeks' loads; None where no process was identified, or the simulated present does not have
+    the recorded error."""
+    if weeks.same:
+        nothing = dict.fromkeys(FIGURES, NO_PART)
+        return EqualLoad(nothing, {}, nothing, NO_PART, same=True)
+    rng, drawn = np.random.default_rng(0), []
+    models = _models(weeks, rng)
+    for k, model in zip(range(MOST_TRIED), models, strict=False):
+        found = _simulated(weeks, model, k, rng, figures)
+        drawn += [] if found is None else [found]
+        if len(drawn) == DRAWS:
+            break
+    if len(drawn) < DRAWS // 2:
+        return None
+    table = np.array([d[0] for d in drawn])  # draws, loops, loads, figures
+    recorded = np.array([d[1] for d in drawn])
+    present = table[:, [0, 1], [0, 1]][..., [0, 3]]  # error and OP travel of each loop on its own load
+    missed = np.abs(np.median(present - recorded, axis=0))
+    if missed.max() > math.log(limits.agree_error):
+        return None
+    own = table[:, 1] - table[:, 0]
+    change, load = own.mean(axis=1), (table[:, :, 1] - table[:, :, 0]).mean(axis=1)
+    ratio = table[..., 2] - table[..., 3]
+    off = np.hypot(*missed)[[0, 0, 1, 1]]
+    most = float(np.abs(np.median(change, axis=0)).max())
+    hardly = min(most / limits.beside_change, 1.0)  # of hardly other settings what is missed cancels
+    named = [
+        {n: _part(x[:, i], share * off[i], limits) for i, n in enumerate(FIGURES)}
+        for x, share in ((change, hardly), (load, 1.0), (own[:, 0], hardly))
+    ]
+    return EqualLoad(
+        named[0],
+        named[1],
+        named[2],
+        _part(ratio[:, 1, 1] - ratio[:, 0, 0], 0.0, limits) if np.any(ratio) else NO_PART,
+        math.exp(float(np.median(ratio[:, 0, 0]))),
+    )
+
+
+def _part(x: Floats, missed: float, limits: ComparisonLimits) -> Part:
+    """The median of draws; their spread, with what the simulation of each loop in force misses of the record, and a
+    share of the part itself for what no draw holds."""
+    value = float(np.median(x))
+    spread = max(robust_deviation(x - value), 0.5 * float(np.std(np.clip(x, -4, 4))))
+    return Part(value, math.hypot(spread, missed, limits.model_share * abs(value), limits.model_floor))
+
+
+Model = tuple[Fopdt, LoopNight | None]
+"""A drawn process, and the night whose valve it has, None for a sound one."""
+
+
+def _models(weeks: Weeks, rng: np.random.Generator) -> Iterator[Model]:
+    """Models drawn from what is known of the process: nights in which the valve's fault was seen tell it well; of a
+    loop without one, the spectra under both settings; else the nights, each by its precision."""
+    faulty = [n for n in (*weeks.before, *weeks.after) if n.at_fault and n.constants is not None]
+    shared = None
+    if not faulty and weeks.old != weeks.new:
+        shared = shared_process([_spectra(weeks.before, weeks.old), _spectra(weeks.after, weeks.new)])
+    if (
+        shared is not None
+        and shared.misfit_db <= MOST_MISFIT_DB
+        and shared.covariance[0, 0] <= MOST_SPREAD**2
+    ):
+        spread = np.clip(np.sqrt(np.diag(shared.covariance)), LEAST_DEVIATION, 0.5)
+        unit = shared.covariance / np.sqrt(np.outer(*[np.diag(shared.covariance)] * 2))
+        root = spread[:, None] * np.linalg.cholesky(unit + 1e-6 * np.eye(3))
+        while True:
+            yield _process(shared.mean + root @ rng.standard_normal(3), shared.sign), None
+    among = faulty or [n for n in (*weeks.before, *weeks.after) if n.constants is not None]
+    known = [n.constants for n in among if n.constants is not None]
+    weight = np.array([1.0 / (deviation[0] ** 2 + 0.05**2) for _, deviation in known])
+    while known:
+        k = int(rng.choice(len(among), p=weight / weight.sum()))
+        mean, deviation = known[k]
+        spread = np.clip(deviation, LEAST_DEVIATION, 0.5)
+        yield _process(mean + spread * rng.standard_normal(3), among[k].sign), among[k]
+
+
+def _process(logs: Floats, sign: float) -> Fopdt:
+    slope, lag, dead = np.exp(logs)
+    return Fopdt(sign * slope * lag, lag, dead)
+
+
+def _spectra(side: Sequence[LoopNight], pid: Pid) -> Spectra:
+    """Mean levels of some nights, from the longest period of which eight fit into a night."""
+    f = side[0].frequency[side[0].frequency > 8.0 / side[0].duration_s]
+    levels = [np.interp(np.log(f), np.log(n.frequency), n.level) for n in side]
+    return Spectra(f, np.mean(levels, axis=0), replace(pid, scan_s=max(n.dt_s for n in side)))
+
+
+def _simulated(
+    weeks: Weeks, model: Model, k: int, rng: np.random.Generator, figures: FigureLimits
+) -> tuple[Floats, Floats] | None:
+    """Logs of the figures of a drawn model on two drawn nights, shape (2 loops, 2 loads, figures), and of the
+    recorded errors and OP travels, shape (2 nights, 2); None where the model is unstable under settings in force."""
+    process, night = model
+    nights = tuple(side[int(rng.integers(len(side)))] for side in (weeks.before, weeks.after))
+    h = max(n.dt_s for n in nights)
+    valve = None if night is None else _valve(night)
+    loops = tuple(
+        loop_in_digits(Loop(process, replace(pid, scan_s=h, op_lo=0.0, op_hi=100.0), behind))
+        for pid, behind in ((weeks.old, valve), (weeks.new, None if weeks.repaired else valve))
+    )
+    loads: list[Floats] = []
+    for loop, one in zip(loops, nights, strict=True):
+        if process.slope * loop.controller.kp <= 0.0 or math.isinf(maximum_sensitivity(loop)):
+            return None
+        loads.append(_calibrated(one, loop, h, np.random.default_rng([k, len(loads)]), figures))
+    found = [[_figures(loop, load, figures) for load in loads] for loop in loops]
+    kept = [(n.error, max(n.op_travel, 1e-4)) for n in nights]
+    return np.log(np.maximum(found, 1e-4)), np.log(kept)
+
+
+def _valve(night: LoopNight) -> Valve:
+    if not night.at_fault or night.width <= 0.0:
+        return None
+    return Stiction(night.width, min(night.jump, night.width)) if night.jump > 0.0 else Backlash(night.width)
+
+
+def _calibrated(
+    night: LoopNight, loop: Loop, h: float, rng: np.random.Generator, figures: FigureLimits
+) -> Floats:
+    """A load as that of a night, with the moves of its set point [% PV], shape (STEPS,), so large that the loop in
+    force has the recorded error: a valve's own part of the error is no load."""
+    (load, noise), size = _load(night, loop, h, rng), 1.0
+    moved = rng.random(STEPS) < night.moves * h / 3600.0
+    rest = noise - np.cumsum(night.size * np.where(np.cumsum(moved) % 2, -1.0, 1.0) * moved)
+    for _ in range(CALIBRATED):
+        error = _figures(loop, in_digits(size * load + rest), figures)[0]
+        size *= min(max(night.error / max(error, 1e-9), 0.5), 2.0)
+    return in_digits(size * load + rest)
+
+
+def _load(night: LoopNight, loop: Loop, h: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """A load as that of a night and its noise [% PV], shape (STEPS,) each: the error's spectrum over the sensitivity,
+    less the level at its highest frequencies, and that level; phases drawn."""
+    level = night.level
+    if night.cycle_s > 0.0 and loop.valve is not None:
+        level = _without_cycle(night)
+    f: Floats = np.fft.rfftfreq(STEPS, h)[1:].astype(np.float64)
+    seen = 10.0 ** (np.interp(np.log(f), np.log(night.frequency), level) / 10.0)
+    white = np.full(f.size, 10.0 ** (night.noise_db / 10.0))
+    power = np.maximum(seen * np.abs(1.0 + loop_response(loop, 2 * np.pi * f)) ** 2 - white, 0.0)
+    scale = STEPS * np.sqrt(night.duration_s / (STEPS * h) / (2.0 * WINDOW_POWER)) / 2.0
+    lines = (scale * np.sqrt(x) * (rng.standard_normal((f.size, 2)) @ [1.0, 1.0j]) for x in (power, white))
+    load, noise = (np.fft.irfft(np.r_[0.0, x], STEPS) for x in lines)
+    return load, noise
+
+
+def _without_cycle(night: LoopNight) -> Floats:
+    """The levels with a straight line across the valve's cycle and its harmonics [dB]."""
+    octave = np.log2(night.frequency * night.cycle_s)
+    near = np.min([np.abs(octave - math.log2(k)) for k in HARMONICS], axis=0) < BESIDE_OCTAVES
+    if near.all() or not near.any():
+        return night.level
+    return np.where(near, np.interp(octave, octave[~near], night.level[~near]), night.level)
+
+
+def _figures(loop: Loop, load: Floats, figures: FigureLimits) -> tuple[float, float, float, float]:
+    """FIGURES of a loop under a load."""
+    r = settled(run(loop, load))
+    use, step = np.ones(len(r), dtype=bool), max(round(figures.travel_grid_s / r.dt_s), 1)
+    hours = r.duration_s / 3600.0
+    stem, op = (travel_of(x, use, step, figures.travel_deadband_pct)[0] / hours for x in (r.stem, r.op))
+    return float(np.mean(np.abs(r.error))), 2.0 * float(np.std(r.error)), stem, op
+
+
+def weeks_of(
+    rows: Sequence[Mapping[str, Any]],
+    spans: Sequence[tuple[float, float]],
+    old: tuple[float | None, float | None],
+    new: tuple[float | None, float | None],
+    limits: ComparisonLimits,
+) -> Weeks | None:
+    """A loop's nights within two spans [s], of which nine tenths must lie in one, with the settings in force: those
+    that a change states, else the nights' own; None where a side has no night, or settings are not known."""
+    sides: list[list[Mapping[str, Any]]] = [[], []]
+    for row in rows:
+        if row["start_s"] is None or not row["duration_s"] or row["kp"] is None:
+            continue
+        for side, (first, last) in zip(sides, spans, strict=True):
+            inside = min(row["start_s"] + row["duration_s"], last) - max(row["start_s"], first)
+            if inside >= WHOLE * row["duration_s"]:
+                side.append(row)
+    nights = [tuple(filter(None, map(night_of, side))) for side in sides]
+    if not all(nights):
+        return None
+    pids = pid_of(sides[0][-1], *old), pid_of(sides[1][-1], *new)
+    if pids[0] is None or pids[1] is None:
+        return None
+    weeks = Weeks(nights[0], nights[1], pids[0], pids[1])
+    quiet = abs(weeks.louder_db) <= limits.noise_db  # loud noise moves a stem within its play
+    return replace(weeks, repaired=pids[0] == pids[1] and quiet and weeks.cured)
