@@ -200,7 +200,9 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
     confidence = {c: 100.0 * p for c, p in found.items()}
     if first is Cause.VALVE and (m.size < limits.least_size or not speaks(m, limits, True)):
         confidence[first] = min(confidence[first], 0.9 * limits.named_pct)
-    if m.ringing is not None:  # the law is known, so the model has said that the loop does not ring by itself
+    if m.ringing is not None and m.ringing.is_seen(
+        limits
+    ):  # the model has said that the loop does not ring by itself
         confidence[Cause.TUNING] = min(confidence[Cause.TUNING], 0.9 * limits.named_pct)
     cause = first if confidence[first] >= _least(first, m, limits) else Cause.UNDECIDED
     fault = fault_of(m, limits) if cause is Cause.VALVE else Fault.NONE

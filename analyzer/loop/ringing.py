@@ -36,7 +36,7 @@ class Ringing:
     smooth, the process under a smooth load; lined, under one with a line; ms, maximum sensitivity of the loop under
     the smooth load [-], inf where it is unstable, and period_s, at which it rings [s]; cycle_s, the observed
     period [s]; line_nat and valve_nat, gain in log likelihood of a line in the load, and of a valve's fault,
-    over the smooth load [nat].
+    over the smooth load [nat]; dt_s, interval of the rows [s].
     """
 
     smooth: SmoothFit
@@ -46,6 +46,7 @@ class Ringing:
     cycle_s: float
     line_nat: float
     valve_nat: float
+    dt_s: float
 
     def is_tight(self, m: Regularity, evidence: float, limits: CauseLimits) -> bool:
         """Whether the loop itself makes the cycle: it rings at the observed period, no more regularly than it can,
@@ -67,6 +68,10 @@ class Ringing:
             return True
         implied = math.pi / -math.log(min(max(m.correlation, 1e-3), 1.0 - 1e-9))
         return m.kurtosis >= limits.kept_size and implied <= limits.ringing_decay * self.ms
+
+    def is_seen(self, limits: CauseLimits) -> bool:
+        """Whether the rows are close enough to tell how the identified loop rings."""
+        return self.period_s >= limits.ringing_samples * self.dt_s
 
     def has_line(self, limits: CauseLimits) -> bool:
         """Whether the load has a line that keeps its phase."""
@@ -139,4 +144,5 @@ def ringing_of(
         period_s,
         lined.log_likelihood - smooth.log_likelihood,
         best - smooth.log_likelihood,
+        window.dt_s / window.factor,
     )

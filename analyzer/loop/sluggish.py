@@ -27,6 +27,10 @@ from tuning.forecast import in_digits
 from tuning.from_test import settings_from
 from tuning.search import mean_error, rounded
 
+CLOCKS = (4.0, 16.0)
+"""Times finer than the present settings ask for at which the process is identified: SIMC's integral times of sluggish
+loops are that much shorter."""
+
 
 @dataclass(frozen=True, slots=True)
 class Faster:
@@ -57,7 +61,7 @@ def _known_fit(record: LoopRecord, controller: Pid, kind: str, config: Config) -
     """The fit behind an ideal valve on the first clock that is fine enough for its dead time; None where slope or
     dead time stay unsure on each."""
     limits, scale_s = config.lanes, time_scale(record, None, controller)
-    for finer in limits.sluggish_clocks:
+    for finer in CLOCKS:
         try:
             window = window_of(record, scale_s / finer, config.cause, kind, calm=True)
             fit = fit_linear(window, scale_s / finer)

@@ -35,7 +35,10 @@ from proofs.plant import CONFIG, START_S, series, spec
 CONTRACT = {
     Cause: "valve|tuning|load|none|undecided",
     Fault: "backlash|stiction|none|undecided",
-    Action: "retune|repair valve|see source loop|check settings|check measurement|needs data|none|undecided",
+    Action: (
+        "retune|repair valve|see source loop|find disturbance|check limit|check settings|check measurement|"
+        "needs data|none|undecided"
+    ),
 }
 """Words of `triage rank --format csv` as DESIGN.md states them."""
 NIGHT = Night("2026-03-02", START_S, START_S + 86400.0)

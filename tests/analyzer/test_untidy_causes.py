@@ -64,6 +64,7 @@ def test_loops_that_their_tuning_swings_are_told():
     assert said("tuning")["tuning"] >= 8
 
 
+@pytest.mark.slow
 @pytest.mark.chaotic
 def test_sticking_valves_are_told():
     """Of twelve loops with valves of LuGre friction at least five are told so."""

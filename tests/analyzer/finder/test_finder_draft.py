@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 from analyzer.cli import main
 from analyzer.finder.draft import Row, as_csv, type_of
 from analyzer.loops.spec import LoopSpec, read_loops
-from tests.analyzer.finder.test_pairs import pi_loop, strangers
+from tests.analyzer.finder.test_finder_pairs import pi_loop, strangers
 
 
 def triage(*arguments: object) -> Result:
