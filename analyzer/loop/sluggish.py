@@ -98,15 +98,15 @@ def _proposed(
 ) -> Faster | None:
     limits = config.lanes
     try:
-        robust = settings_from(process, allowed, present.scan_s).robust
+        found = settings_from(process, allowed, present.scan_s)
     except ValueError:  # no delay to speak of
         return None
     most = limits.sluggish_most * abs(present.kp)
-    kp = math.copysign(min(abs(robust.kp), most), present.kp)
-    new = replace(present, kp=rounded(kp), ti_s=rounded(robust.ti_s))
-    times = new.kp / new.ti_s / (present.kp / present.ti_s)
-    if times < limits.sluggish_times:
+    kp = math.copysign(min(abs(found.robust.kp), most), present.kp)
+    new = replace(present, kp=rounded(kp), ti_s=rounded(found.robust.ti_s))
+    if min(abs(pid.kp) / pid.ti_s for pid in (found.simc, new)) < limits.sluggish_times * abs(present.ki):
         return None
+    times = new.kp / new.ti_s / present.ki
     load = in_digits(detrend(load_of(fit, present)))  # a loop at work has long answered what stays, or drifts
     loop = Loop(between_samples(fit.process, fit.window, present), present)  # the one that leaves this load
     change = mean_error((loop,), new, load) / max(mean_error((loop,), present, load), 1e-9) - 1.0
