@@ -20,11 +20,13 @@ from analyzer.loop.measure import time_scale, window_of
 from analyzer.loop.ringing import between_samples
 from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import fit_linear
+from identification.estimation.descent import reaching
 from identification.estimation.window import Fit
 from identification.models import Estimate, Integrator, Loop, Pid, Process
 from identification.record import LoopRecord
 from tuning.forecast import in_digits
 from tuning.from_test import settings_from
+from tuning.rules import simc
 from tuning.search import mean_error, rounded
 
 CLOCKS = (4.0, 16.0)
@@ -49,17 +51,18 @@ def faster(record: LoopRecord, controller: Pid | None, kind: str, config: Config
         return None
     if not math.isfinite(controller.ti_s) or controller.kp == 0.0 or controller.td_s > 0.0:
         return None
-    fit = _known_fit(record, controller, kind, config)
-    if fit is None:
+    fits = _known_fits(record, controller, kind, config)
+    if not fits:
         return None
-    known = intervals(fit, False, config.advice)
+    fit, known = fits[0], intervals(fits[0], False, config.advice)
+    known["dead_time_s"] = reaching(known["dead_time_s"], *(other.dead_time_s for other in fits[1:]))
     process = between_samples(tuned(fit, False, config.advice), fit.window, controller)
     return _proposed(fit, process, _allowed(process, known), controller, config)
 
 
-def _known_fit(record: LoopRecord, controller: Pid, kind: str, config: Config) -> Fit | None:
-    """The fit behind an ideal valve on the first clock that is fine enough for its dead time; None where slope or
-    dead time stay unsure on each."""
+def _known_fits(record: LoopRecord, controller: Pid, kind: str, config: Config) -> list[Fit]:
+    """The fits behind an ideal valve on the clocks on which slope and dead time are sure, the coarsest first."""
+    found: list[Fit] = []
     limits, scale_s = config.lanes, time_scale(record, None, controller)
     for finer in CLOCKS:
         try:
@@ -74,8 +77,8 @@ def _known_fit(record: LoopRecord, controller: Pid, kind: str, config: Config) -
         sure = half_width(slope) <= limits.sluggish_unsure * abs(slope.value)
         late = dead.high <= dead.low * limits.sluggish_late + window.dt_s
         if sure and late:
-            return fit
-    return None
+            found.append(fit)
+    return found
 
 
 def half_width(e: Estimate) -> float:
@@ -104,7 +107,8 @@ def _proposed(
     most = limits.sluggish_most * abs(present.kp)
     kp = math.copysign(min(abs(found.robust.kp), most), present.kp)
     new = replace(present, kp=rounded(kp), ti_s=rounded(found.robust.ti_s))
-    if min(abs(pid.kp) / pid.ti_s for pid in (found.simc, new)) < limits.sluggish_times * abs(present.ki):
+    plain = [simc(p, scan_s=present.scan_s) for p in allowed]
+    if min(abs(pid.ki) for pid in (new, *plain)) < limits.sluggish_times * abs(present.ki):
         return None
     times = new.kp / new.ti_s / present.ki
     load = in_digits(detrend(load_of(fit, present)))  # a loop at work has long answered what stays, or drifts
