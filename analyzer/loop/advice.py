@@ -9,7 +9,7 @@ from analyzer.config import AdviceLimits, Config
 from analyzer.loop.agreement import agreement
 from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
-from analyzer.loop.decisions import Action, Cause, Due, Lack, Need, Needs
+from analyzer.loop.decisions import Action, Cause, Due, Fault, Lack, Need, Needs
 from analyzer.loop.fitness import too_thin
 from analyzer.loop.identified import cautious, load_of, recorded_error, tuned, uncertain
 from analyzer.loop.oscillation import counting
@@ -161,6 +161,9 @@ def withheld(
         )
     if found.needs is not None:
         return _lacking(found.needs)
+    worn = verdict.fault in (Fault.BACKLASH, Fault.STICTION)
+    if worn and verdict.cause in (Cause.LOAD, Cause.UNDECIDED):
+        return Advice(Action.REPAIR_VALVE, SAID["worn_beside"], due=Due.SHUTDOWN)
     if verdict.cause in (Cause.NONE, Cause.LOAD):
         return Advice(WITHOUT_SETTINGS[verdict.cause])
     if counting(found.oscillations) is None:

@@ -180,7 +180,22 @@ def jump_evidence(m: Measured, limits: CauseLimits) -> tuple[float, float]:
 
 
 def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> Verdict:
-    """The verdict on one loop.
+    """The verdict on one loop; the valve of one whose cycle another thing makes may be at fault as well."""
+    found = _judged(m, oscillation, limits)
+    beside = oscillation is not None and found.cause is not Cause.VALVE and is_worn_beside(m, limits)
+    return replace(found, fault=fault_of(m, limits)) if beside else found
+
+
+def is_worn_beside(m: Measured, limits: CauseLimits) -> bool:
+    """Whether a valve is at fault whatever makes the cycle: it explains PV better, it simulates from OP in free run
+    the harmonics of a worn stem and the cycle no worse, and OP moves farther than its width."""
+    small, whole = limits.beside_size, 1.0
+    simulates = m.harmonics_gone >= limits.beside_harmonics and m.cycle_gone >= 0.0
+    return m.evidence >= limits.beside_evidence and small <= m.size <= whole and simulates
+
+
+def _judged(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> Verdict:
+    """What makes the cycle.
 
     Where the controller's law is known the identified loop tells whether it rings by itself. Else, of a loop that
     oscillates, the likeliest cause is named where its probability is high enough; the valve's more so,

@@ -16,6 +16,7 @@ from analyzer.loop.cause import Verdict
 from analyzer.loop.cost import RECORDED, STATED, loss
 from analyzer.loop.decisions import Action, Cause, Cell, Fault, Finding, Needs, Remedy, Status, Swing
 from analyzer.loop.identified import gain_room, intervals, is_known
+from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillations
 from analyzer.loop.setpoint_moves import as_row
 from analyzer.loops.spec import LoopSpec
@@ -146,11 +147,28 @@ def _measured(a: Assessment, limits: AdviceLimits) -> Known:
 def _model_known(verdict: Verdict, limits: AdviceLimits) -> Mapping[str, float | None]:
     """The constants told; gain and time constant apart only where the latter is well inside the window."""
     m = verdict.measured
-    if m is None or verdict.cause not in (Cause.VALVE, Cause.TUNING):
+    if m is None:
         return {}
-    fit = verdict.fit
+    if verdict.cause is not Cause.VALVE and verdict.fault in (Fault.BACKLASH, Fault.STICTION):
+        return _process_known(verdict, limits) | _width_beside(verdict.fault, m)
+    return _process_known(verdict, limits)
+
+
+def _width_beside(fault: Fault, m: Measured) -> dict[str, float | None]:
+    """The width of a valve at fault beside another cause."""
+    if fault is Fault.STICTION and m.stick_slip is not None:
+        valve = m.stick_slip.valve
+        return {"stickband_pct": valve.stickband, "slip_jump_pct": valve.slip_jump}
+    return {"backlash_pct": m.play.valve.stickband}
+
+
+def _process_known(verdict: Verdict, limits: AdviceLimits) -> dict[str, float | None]:
+    """Constants of the process, and of the valve that makes the cycle."""
+    if verdict.cause not in (Cause.VALVE, Cause.TUNING):
+        return {}
+    m, fit = verdict.measured, verdict.fit
     apart, valve = is_known(fit, limits), fit.valve
-    process = {
+    process: dict[str, float | None] = {
         "gain": fit.gain if apart else None,
         "time_constant_s": fit.time_constant_s if apart else None,
         "slope_pct_per_s": fit.slope,
@@ -158,7 +176,7 @@ def _model_known(verdict: Verdict, limits: AdviceLimits) -> Mapping[str, float |
     }
     if verdict.cause is Cause.TUNING:
         return process
-    if fit is m.stick_slip:
+    if m is not None and fit is m.stick_slip:
         return {**process, "stickband_pct": valve.stickband, "slip_jump_pct": valve.slip_jump}
     return {**process, "backlash_pct": valve.stickband}
 

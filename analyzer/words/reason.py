@@ -69,7 +69,8 @@ def _whole(found: Finding) -> str:
     at_once = found.remedy.action in SAID_AT_ONCE or found.lack is Lack.OP_RANGE
     more = found.remedy.text if at_once and found.remedy.text != lacking else None
     first, *others = _cause(found).split("; ")
-    return joined(first, moves, more, to_stroke(found), experiment, *others)
+    worn = valve_text(found) if found.cause is not Cause.VALVE and found.fault in sentences("width") else None
+    return joined(first, worn, moves, more, to_stroke(found), experiment, *others)
 
 
 def _cause(found: Finding) -> str:

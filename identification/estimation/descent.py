@@ -157,4 +157,4 @@ def half_width(deviation: float, least: float = 0.0) -> float:
 
 def reaching(e: Estimate, *ends: float) -> Estimate:
     """An estimate whose interval holds some values too."""
-    return Estimate(e.value, min(e.low, *ends), max(e.high, *ends), e.unit)
+    return Estimate(e.value, min((e.low, *ends)), max((e.high, *ends)), e.unit)

@@ -66,3 +66,9 @@ def test_without_moves_of_the_set_point_nothing_is_said(slow: list[Drawn]) -> No
 def test_a_well_tuned_loop_stays_as_it_is(seed: int) -> None:
     """Of four well tuned loops none gets other settings."""
     assert [faster(recorded(d), stated(d), "", CONFIG) for d in drawn(seed, 4, ("healthy",))] == [None] * 4
+
+
+def test_one_clock_alone_is_enough(slow: list[Drawn], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where one clock alone tells the process, its own interval stands: a loop is told as with two, or not."""
+    monkeypatch.setattr("analyzer.loop.sluggish.CLOCKS", (4.0,))
+    assert sum(faster(recorded(d), stated(d), "", CONFIG) is not None for d in slow) >= 3
