@@ -212,26 +212,14 @@ def _too_thin(found: Assessment, controller: Pid | None, config: Config) -> Advi
 
 
 def sought_for(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loop, Fit, tuple[Loop, ...]]:
-    """The loop that settings are sought for, its fit, and what else it may be.
-
-    Where the loop of a valve at fault does not cycle with its play, and does with the stick-slip that was tried
-    beside it, the stem sticks: something must move it.
-    """
+    """The loop that settings are sought for, its fit, and what else it may be: the fault that is named, also where a
+    load keeps its cycle alive."""
     verdict = verdict.for_settings
-    fit, sticks = verdict.fit, verdict.rests_on.stick_slip
-    if verdict.cause is not Cause.VALVE:
-        model = model_of(verdict, controller)
-        return model, fit, uncertain(fit, model)
-
-    def of(fit: Fit) -> Loop:
-        return Loop(tuned(fit, True, limits), controller, fit.valve.valve)
-
-    loop = of(fit)
-    tried = sticks is not None and sticks is not fit and sticks.valve.slip_jump > 0
-    if sticks is None or not tried or confirm(loop).cycle is not None or confirm(of(sticks)).cycle is None:
-        return loop, fit, uncertain(fit, loop)
-    other = of(sticks)
-    return other, sticks, (loop, *uncertain(sticks, other, 3), *uncertain(fit, loop, 2))
+    fit = verdict.fit
+    loop = model_of(verdict, controller)
+    if verdict.cause is Cause.VALVE:
+        loop = replace(loop, process=tuned(fit, True, limits))
+    return loop, fit, uncertain(fit, loop)
 
 
 def propose(verdict: Verdict, controller: Pid, period_s: float | None, config: Config) -> Proposed:
