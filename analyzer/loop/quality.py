@@ -201,10 +201,11 @@ def _masked(
     """The record, whose bad samples are its gaps, with its masks."""
     op, gap, none = record.op, record.bad, np.zeros(clock.size, dtype=bool)
     stale = constant_stretches(record.pv, record.dt_s, q.stale_s, q.stale_samples) & ~gap
-    if stale.any() and (not op_known or float(np.ptp(op[stale])) == 0.0):
-        stale = none
     ranged = op_known and op_in_range(op, q)
     saturated = (op <= q.limit_pct) | (op >= 100 - q.limit_pct) if ranged else none
+    stands = stale.any() and (not op_known or float(np.ptp(op[stale])) == 0.0)
+    if stands and not _driven_to_limit(record, stale, saturated, q):
+        stale = none
     manual = _manual(mode, clock, record, q) if op_known else none
     masks = {
         "gap": gap,
@@ -215,6 +216,21 @@ def _masked(
         "manual": manual & ~saturated if mode is None else manual,
     }
     return replace(record, bad=gap | stale, masks=MappingProxyType(masks))
+
+
+def _driven_to_limit(record: LoopRecord, stale: Mask, saturated: Mask, q: QualityLimits) -> bool:
+    """Whether OP stands since a frozen PV has driven it to its limit: PV stands for long, off its set point and off
+    the ends of its own range, at which a transmitter stands still too."""
+    off = float(np.abs(record.error[stale]).min())
+    within = q.frozen_ends_pct < float(record.pv[stale].min()) < 100.0 - q.frozen_ends_pct
+    long = float(stale.sum()) * record.dt_s >= q.frozen_s
+    return (
+        bool(saturated[stale].all())
+        and long
+        and within
+        and off > q.frozen_ends_pct
+        and not record.sp_estimated
+    )
 
 
 def _manual(mode: Series | None, clock: Floats, record: LoopRecord, q: QualityLimits) -> Mask:

@@ -257,3 +257,18 @@ def test_too_little_is_told_with_what_it_needs_and_has(pv, text):
     with pytest.raises(NotAssessedError) as error:
         prepare(spec(), tags, LIMITS)
     assert str(error.value) == text
+
+
+def test_a_frozen_pv_stays_frozen_when_op_has_run_to_its_limit():
+    """A PV that stands to the last digit for a quarter of a day, off its set point, with OP at its limit is frozen;
+    one that stands at the end of its own range, or has noise, is not."""
+    stamp = np.arange(0.0, 30_000.0, 5.0)
+    op, sp = series(stamp, np.full(stamp.size, 100.0)), series(stamp, np.full(stamp.size, 50.0))
+
+    def stale(pv: np.ndarray) -> int:
+        return where(ready(pv=series(stamp, pv), op=op, sp=sp), "stale").size
+
+    noise = np.random.default_rng(0).normal(0.0, 0.05, stamp.size)
+    assert stale(np.full(stamp.size, 43.2)) == stamp.size
+    assert stale(np.full(stamp.size, 0.0)) == 0
+    assert stale(43.2 + noise) == 0
