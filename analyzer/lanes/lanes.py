@@ -91,7 +91,7 @@ def _sluggish(found: Finding) -> str:
         return found.remedy.text
     text = f"sluggish: errors last {found.number('error_memory_ti'):.2g} integral times, the gain is small"
     room = found.number("gain_room")
-    return text if room < 2.0 else f"{text}; the process bears about {room:.1g} times as much"
+    return text if room < 2.0 else f"{text}; the gain could be about {room:.1g} times higher"
 
 
 def _winds_up(found: Finding) -> str:

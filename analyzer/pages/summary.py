@@ -73,7 +73,13 @@ def _work(row: words.Row) -> set[str]:
 def _asked(work: str, rows: Sequence[words.Row]) -> str:
     """The sentence of a kind of work on some loops."""
     sticks = sum(r["valve_fault"] == Fault.STICTION for r in rows)
-    fault = "sticks" if sticks == len(rows) else "has play" if sticks == 0 else "sticks or has play"
+    fault = (
+        "has stiction"
+        if sticks == len(rows)
+        else "has backlash"
+        if sticks == 0
+        else "has stiction or backlash"
+    )
     said = words.texts("work")[work]
     text = said["one"] if len(rows) == 1 else said.get("several", said["one"])
     return text.format(names=listed([r["loop"] for r in rows]), fault=fault)

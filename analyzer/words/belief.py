@@ -24,7 +24,7 @@ NOT_YET = re.compile(
     r"\b(to be|not|will be|should be|must be|must|needs? to be|order(ed)?|plan(ned)?|next)\b", re.I
 )
 """Words that say it is not yet done."""
-IS = {Fault.BACKLASH: "plays by", Fault.STICTION: "sticks over"}
+IS = {Fault.BACKLASH: "backlash", Fault.STICTION: "stiction"}
 
 
 def says_repaired(text: str) -> bool:
@@ -37,12 +37,12 @@ def width_text(now: Belief) -> str:
     pool = now.constants.get("width")
     width = None if pool is None else pool.pooled
     fault = now.told.fault if now.told.fault in IS else now.valve.fault(None)
-    verb = IS.get(fault)
-    if verb is None:
+    kind = IS.get(fault)
+    if kind is None:
         return "the valve is worn"
     if width is None:
-        return f"the valve {verb} about {now.valve.width:.2g} % of OP"
-    return f"the valve {verb} {width.value:.2g} % of OP ({width.low:.3g} to {width.high:.3g})"
+        return f"valve {kind} about {now.valve.width:.2g} % of OP"
+    return f"valve {kind} {width.value:.2g} % of OP ({width.low:.3g} to {width.high:.3g})"
 
 
 def wear_text(row: Row) -> str:
@@ -112,8 +112,8 @@ def belief_reason(now: Belief, row: Row) -> str:
     width over the nights where it is worn."""
     t, nights = now.told, now.valve.nights
     worn = nights > 1 and t.fault in IS and now.valve.certain
-    sure = f"certain by {nights} nights" if worn else None
-    over = f"{nights} nights say {width_text(now)}, certain since {now.valve.certain}" if worn else None
+    sure = f"confirmed by {nights} nights" if worn else None
+    over = f"{nights} nights: {width_text(now)}, confirmed since {now.valve.certain}" if worn else None
     differs = not (t.own or t.calmed) and row["cause"] != t.cause
     alone = f"this night alone: {sentences('alone')[row['cause']]}" if differs else None
     text = _calmed(now) if t.calmed else row["reason"] if t.own else _together(now, row)
@@ -145,8 +145,8 @@ def _together(now: Belief, row: Row) -> str:
     beside = "; the valve is worn all the same" if t.fault in IS else ""
     said = {
         Cause.VALVE: f": the valve makes it, by {nights}" if cycles else "",
-        Cause.TUNING: f": too tight for its process, by {nights}",
-        Cause.LOAD: f": driven from outside, by {nights}{beside}",
+        Cause.TUNING: f": tuned too tight, by {nights}",
+        Cause.LOAD: f": external disturbance, by {nights}{beside}",
         Cause.UNDECIDED: f"; cause undecided: {nights} do not agree",
     }
     return cycle + said.get(t.cause, "")
@@ -194,7 +194,7 @@ def _fault_news(before: Belief, now: Belief) -> tuple[str, str] | None:
     """That a valve is known to be worn, or to be sound again; that the cause of a cycle is told as another one, or
     other settings are advised."""
     if now.valve.certain and not before.valve.certain:
-        return f"{width_text(now)}: certain by {now.valve.nights} nights", "worse"
+        return f"{width_text(now)}: confirmed by {now.valve.nights} nights", "worse"
     if before.valve.certain and not now.valve.certain:
         return "no fault of the valve is seen any more", "better"
     then, cause = before.told.cause, now.told.cause

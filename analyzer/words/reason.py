@@ -79,9 +79,9 @@ def _cause(found: Finding) -> str:
     if found.cause is Cause.VALVE:
         return f"{cycle}: {valve_text(found)}"
     if found.cause is Cause.TUNING:
-        return f"{cycle}: too tight for its process; {_strongest(found, 1, SignKind.RINGING, SignKind.AMPLIFICATION)}"
+        return f"{cycle}: tuned too tight; {_strongest(found, 1, SignKind.RINGING, SignKind.AMPLIFICATION)}"
     if found.cause is Cause.LOAD:
-        return f"{cycle}: driven from outside; {_strongest(found, 1, *OF_LOAD)}"
+        return f"{cycle}: external disturbance; {_strongest(found, 1, *OF_LOAD)}"
     if found.cause is Cause.UNDECIDED:
         return f"{cycle}; cause undecided: {found.lacking or 'the signs do not agree'}"
     return cycle

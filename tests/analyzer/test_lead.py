@@ -34,7 +34,7 @@ def test_a_source_is_named_with_whom_it_moves() -> None:
     group = GroupView("1", members, {r["loop"]: r for r in rows[:3]})
     assert first_things(rows, [group]) == (
         "Fix FIC2110's valve: it also moves LIC2103 and TIC2111.",
-        "Stroke the valve of LIC1: it sticks.",
+        "Stroke the valve of LIC1: it has stiction.",
     )
 
 
@@ -46,7 +46,7 @@ def test_only_followers_are_said_to_be_moved() -> None:
     group = GroupView("1", members, {r["loop"]: r for r in rows})
     assert first_things(rows, [group]) == (
         "Fix FIC1's valve: it also moves TIC2.",
-        "Stroke the valve of LIC3: it sticks.",
+        "Stroke the valve of LIC3: it has stiction.",
     )
 
 
@@ -71,7 +71,7 @@ def test_a_valve_that_can_wait_is_told_last():
     """A worn valve whose loop is calm has a sentence of its own, behind all that costs something tonight."""
     rows = [row("A", 0.0, **VALVE | {"due": "next shutdown"}), row("B", 0.1, **VALVE | {"due": "now"})]
     assert first_things(rows) == (
-        "Stroke the valve of B: it sticks.",
+        "Stroke the valve of B: it has stiction.",
         "At the next shutdown look at the valve of A: worn, though its loop is calm.",
     )
 

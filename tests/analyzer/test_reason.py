@@ -14,7 +14,10 @@ from analyzer.words.reason import in_short, reason
         (0.0, "does not oscillate"),
         (6.3, "cycles every 18.1 min, for 6 % of the time"),
         (19.9, "cycles every 18.1 min, for 20 % of the time"),
-        (80.0, "cycles every 18.1 min: driven from outside; the cycle keeps its size and changes its rhythm"),
+        (
+            80.0,
+            "cycles every 18.1 min: external disturbance; the cycle keeps its size and changes its rhythm",
+        ),
     ],
 )
 def test_a_loop_that_cycles_for_a_part_of_the_night_is_not_said_to_be_calm(share: float, said: str) -> None:

@@ -20,22 +20,22 @@ STORED = [
     {
         "points_to": "valve",
         "strength": 0.9,
-        "text": "play or stick-slip explains PV better than an ideal valve, in 75 % of 12 stretches between "
-        "turns of OP",
+        "text": "backlash or stiction predicts PV better than an ideal valve, in 75 % of 12 stretches between "
+        "reversals of OP",
         "name": "evidence",
         "figures": "log likelihood +41",
     },
     {
         "points_to": "load",
         "strength": 0.25,
-        "text": "the load that is left has a peak at the period",
+        "text": "the remaining load has a peak at the period",
         "name": "line_linear",
         "figures": "prominence 2.0, behind a faulty valve 0.5",
     },
     {
         "points_to": "valve",
         "strength": 0.5,
-        "text": "stretch after stretch between moves of the stem says so",
+        "text": "most stretches between moves of the stem agree",
         "name": "",
         "figures": "",
     },

@@ -94,7 +94,7 @@ def test_what_is_told_rests_on_the_nights_and_figures_on_their_own(tmp_path: Pat
         "backlash",
         pytest.approx(0.8, rel=0.05),
     )
-    assert "10 nights say the valve plays by 0.8 % of OP" in listed["reason"]
+    assert "10 nights: valve backlash 0.8 % of OP" in listed["reason"]
     (own,) = store.own_rows("nights", "2026-03-11", ("cause", "valve_fault", "oscillating_pct"))
     assert (own["cause"], own["valve_fault"], own["oscillating_pct"]) == (
         "none",

@@ -84,8 +84,8 @@ def test_a_valve_that_becomes_certain_is_news_once() -> None:
     """The night from which a valve is believed worn says so, with its width; no night after it does."""
     rows = [row(k, CALM, witness=witness(0.8, 6.0)) for k in range(6)]
     told_news = headlines(rows)
-    assert sum("the valve plays by" in text for text in told_news) == 1
-    assert [text for text in told_news if text and "certain by" not in text] == []
+    assert sum("valve backlash" in text for text in told_news) == 1
+    assert [text for text in told_news if text and "confirmed by" not in text] == []
 
 
 @pytest.mark.parametrize(
