@@ -10,13 +10,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
-
 from analyzer.config import OscillationLimits
 from analyzer.loop.decisions import counts
-from analyzer.loop.oscillation import Oscillation, Oscillations, detect, peaks
+from analyzer.loop.oscillation import Oscillation, Oscillations, detect, peaks, where_loud
 from identification.controller.check import runs
-from identification.record import Floats, LoopRecord, Mask
+from identification.record import LoopRecord, Mask
 from identification.signals.spectrum import envelope
 
 Span = tuple[int, int]
@@ -39,27 +37,15 @@ def detect_where_it_cycles(record: LoopRecord, limits: OscillationLimits) -> tup
     for k in peaks(found.bands, limits.shape_prominence):
         line = float(found.bands.line[k])
         period_s = s.duration_s / line
-        active, level, dt_s = _active(*envelope(s, line), period_s, record, limits)
+        level, dt_s = envelope(s, line)
+        usable = record.at_work[len(record) - s.n :]
+        active, _, smooth = where_loud(level, dt_s, s.dt_s, period_s, usable, limits)
         span = _longest(active, dt_s, period_s, record)
         inside = None if span is None else _inside(record, span, period_s, limits)
         if inside is not None and counts(share := 100.0 * float(active.mean())):
             own = replace(inside, oscillating_pct=share)
-            return replace(found, found=(own,), active=active, level=level, active_dt_s=dt_s), span or whole
+            return replace(found, found=(own,), active=active, level=smooth, active_dt_s=dt_s), span or whole
     return found, whole
-
-
-def _active(
-    level: Floats, dt_s: float, period_s: float, record: LoopRecord, limits: OscillationLimits
-) -> tuple[Mask, Floats, float]:
-    """Where a band is loud, shape (m,), its level over two periods [% of span], shape (m,), and the interval [s]."""
-    width = max(round(2 * period_s / dt_s), 1)
-    power = np.convolve(np.pad(level**2, width, mode="reflect"), np.ones(width) / width, mode="same")
-    smooth = np.sqrt(power[width:-width])
-    skipped = len(record) - round(level.size * dt_s / record.dt_s)
-    at = np.minimum(np.arange(level.size) * dt_s / record.dt_s + skipped, len(record) - 1).astype(np.int64)
-    good = record.at_work[at]
-    top = float(np.quantile(smooth[good], 0.9)) if good.any() else math.inf
-    return (smooth >= limits.envelope * top) & good, smooth, dt_s
 
 
 def _longest(active: Mask, dt_s: float, period_s: float, record: LoopRecord) -> Span | None:

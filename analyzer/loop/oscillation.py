@@ -176,20 +176,29 @@ def barely_seen(found: Oscillations, limits: OscillationLimits) -> float | None:
     return seen[0] if seen else None
 
 
+def where_loud(
+    level: Floats, dt_s: float, own_s: float, period_s: float, usable: Mask, limits: OscillationLimits
+) -> tuple[Mask, Mask, Floats]:
+    """Where a band is loud and where it may be used, shape (m,) each, and its level over two periods [% of span],
+    shape (m,); from its level at interval dt_s [s] and where samples at interval own_s [s] may be used, shape (n,).
+    """
+    width = max(round(2 * period_s / dt_s), 1)
+    power = np.convolve(np.pad(level**2, width, mode="reflect"), np.ones(width) / width, mode="same")
+    smooth = np.sqrt(power[width:-width])
+    at = np.minimum((np.arange(level.size) * dt_s / own_s).astype(np.int64), usable.size - 1)
+    good = usable[at]
+    top = float(np.quantile(smooth[good], 0.9)) if good.any() else math.inf
+    return (smooth >= limits.envelope * top) & good, good, smooth
+
+
 def _sized_by_envelope(
     s: Spectrum, o: Oscillation, usable: Mask, limits: OscillationLimits
 ) -> tuple[Oscillation, Mask, Floats, float]:
     """Amplitude, share of time and significance from the envelope of the band."""
     level, dt = envelope(s, o.cycles)
-    width = max(round(2 * o.period_s / dt), 1)
-    kernel = np.ones(width) / width
-    smooth = np.sqrt(np.convolve(np.pad(level**2, width, mode="reflect"), kernel, mode="same")[width:-width])
-    at = np.minimum((np.arange(level.size) * dt / s.dt_s).astype(np.int64), usable.size - 1)
-    good = usable[at]
+    active, good, smooth = where_loud(level, dt, s.dt_s, o.period_s, usable, limits)
     if not good.any():
         return o, good, smooth, dt
-    top = float(np.quantile(smooth[good], 0.9))
-    active = (smooth >= limits.envelope * top) & good
     amplitude = math.sqrt(float(np.mean(level[active] ** 2))) if active.any() else 0.0
     hours = active.sum() * dt / 3600.0
     sized = replace(
