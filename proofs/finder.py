@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 
-from analyzer.finder.pairs import Pair, found_pairs
+from analyzer.finder.pairs import FoundPair, found_pairs
 from analyzer.limits import FINDER
 from analyzer.loops.spec import LoopSpec, read_loops
 from analyzer.loops.tags import controller
@@ -102,7 +102,7 @@ def _names(names: list[str], values: np.ndarray, tag: int) -> set[str]:
     return {names[k] for k in np.flatnonzero((values == values[:, [tag]]).all(axis=0))}
 
 
-def _settings(pair: Pair, spec: LoopSpec, dt_s: float) -> Counter[str]:
+def _settings(pair: FoundPair, spec: LoopSpec, dt_s: float) -> Counter[str]:
     """Whether gain and integral time are those that are stated."""
     span = (spec.pv_hi or 100.0) - (spec.pv_lo or 0.0)
     pid = controller(spec, span)

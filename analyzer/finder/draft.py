@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from analyzer.finder.clock import Sampled, sampled
-from analyzer.finder.pairs import Pair, found_pairs, known_pair
+from analyzer.finder.pairs import FoundPair, found_pairs, known_pair
 from analyzer.history.export import Export
 from analyzer.limits import FINDER
 from analyzer.loops.spec import RECORDED, ROLES, STATED, LoopSpec
@@ -134,7 +134,7 @@ def by_data(held: Sampled) -> list[Row]:
     return [_row(held, pair, outputs) for pair in pairs]
 
 
-def _row(held: Sampled, pair: Pair, outputs: dict[bytes, str]) -> Row:
+def _row(held: Sampled, pair: FoundPair, outputs: dict[bytes, str]) -> Row:
     name = _name(held.tags[pair.pv], held.tags[pair.op])
     master = "" if pair.sp is None else outputs.get(held.values[:, pair.sp].tobytes(), "")
     spec = LoopSpec(
@@ -151,7 +151,7 @@ def _row(held: Sampled, pair: Pair, outputs: dict[bytes, str]) -> Row:
     return Row(replace(spec, **_shown(held, pair)), "data", pair.sure_pct, says)
 
 
-def _shown(held: Sampled, pair: Pair) -> dict[str, Any]:
+def _shown(held: Sampled, pair: FoundPair) -> dict[str, Any]:
     """Columns of loops.csv that the data of a loop show: recorded ranges, and the settings where the law is plain."""
     pv, op = (held.values[:, k] for k in (pair.pv, pair.op))
     (pv_lo, pv_hi), (op_lo, op_hi) = _extremes(pv), _extremes(op)
@@ -164,7 +164,7 @@ def _shown(held: Sampled, pair: Pair) -> dict[str, Any]:
     return {**shown, "kp": pair.kp, "ti": ti, "gain_unit": "engineering"}
 
 
-def _law(held: Sampled, pair: Pair) -> str:
+def _law(held: Sampled, pair: FoundPair) -> str:
     """The law of a pair, in words."""
     way = "direct" if pair.kp < 0 else "reverse"
     law = (

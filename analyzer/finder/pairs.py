@@ -28,7 +28,7 @@ Cause = tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Pair:
+class FoundPair:
     """A loop that the data show; places of tags in the bag.
 
     law : share of OP's moves that the law explains, 0 to 1, in blocks of `width` samples; noise : share of the
@@ -170,7 +170,7 @@ def scored(bag: Bag) -> Scores:
     return Scores(causes, law, noise, moves, each)
 
 
-def found_pairs(values: Matrix) -> list[Pair]:
+def found_pairs(values: Matrix) -> list[FoundPair]:
     """Loops among tags, the surest first, whether sure or not.
 
     Parameters
@@ -238,7 +238,7 @@ def _preferred(bag: Bag, scores: Scores) -> tuple[NDArray[np.float32], set[int]]
     return weight, set_points
 
 
-def _pair(bag: Bag, scores: Scores, c: int, j: int, taken: NDArray[np.float64]) -> Pair:
+def _pair(bag: Bag, scores: Scores, c: int, j: int, taken: NDArray[np.float64]) -> FoundPair:
     """The pair of a cause and a tag at the width where it shows most; one of a PV alone in samples, or in blocks so
     long that no wave is left in them, for between these all that shares a wave looks like a law.
 
@@ -254,7 +254,7 @@ def _pair(bag: Bag, scores: Scores, c: int, j: int, taken: NDArray[np.float64]) 
     law = scores.law[:, c, j]
     told = int(np.argmax(law >= min(FINDER.law_told, law.max())))
     acts = sp is not None and _acts(bag, (pv, sp, tag), scores.widths[told])
-    return Pair(
+    return FoundPair(
         int(pv),
         int(tag),
         sp,
@@ -318,7 +318,7 @@ def _held_elsewhere(bag: Bag, scores: Scores, tag: int, own: Cause) -> bool:
     return bool(scores.noise[0, bag.live.index(tag), others].max(initial=0.0) > FINDER.copied)
 
 
-def _with_set_points(bag: Bag, pairs: Sequence[Pair]) -> list[Pair]:
+def _with_set_points(bag: Bag, pairs: Sequence[FoundPair]) -> list[FoundPair]:
     """The pairs with set points that never move, one each, by how near they lie to the mean of PV; PV and OP change
     places where one lies nearer to OP."""
     taken = {p.sp for p in pairs if p.sp is not None}
@@ -336,7 +336,7 @@ def _with_set_points(bag: Bag, pairs: Sequence[Pair]) -> list[Pair]:
     return sorted((_with_settings(bag, p) for p in out), key=lambda p: -p.weight)
 
 
-def known_pair(values: Matrix) -> Pair:
+def known_pair(values: Matrix) -> FoundPair:
     """The law of a loop whose tags are known: PV, OP and, where there is one, SP, shape (n, 2) or (n, 3)."""
     sp = 2 if values.shape[1] > 2 else None
     error = values[:, 0] - (0.0 if sp is None else values[:, 2])
@@ -345,11 +345,11 @@ def known_pair(values: Matrix) -> Pair:
     law = np.array([explained(m, m)[0, 1] for m in moves])
     told = int(np.argmax(law >= min(FINDER.law_told, law.max())))
     noise = float(shared_noise(moves[told], moves[told])[0, 1])
-    found = Pair(0, 1, sp, float(law[told]), noise, each[told], 1.0, 0.0)
+    found = FoundPair(0, 1, sp, float(law[told]), noise, each[told], 1.0, 0.0)
     return _with_settings(Bag.of(values), replace(found, told=float(law[told]), told_width=each[told]))
 
 
-def _with_settings(bag: Bag, pair: Pair) -> Pair:
+def _with_settings(bag: Bag, pair: FoundPair) -> FoundPair:
     """The pair with gain and integral time of the law, from blocks in which it holds and OP is at no limit."""
     op, low = bag.values[:, pair.op], 0.0 if pair.sp is None else bag.values[:, pair.sp]
     error = bag.values[:, [pair.pv]] - np.reshape(low, (-1, 1))
@@ -375,7 +375,9 @@ def _with_settings(bag: Bag, pair: Pair) -> Pair:
     return replace(pair, kp=kp, ti_samples=1.0 / other if agreed else None)
 
 
-def _with_set_point(pair: Pair, gap: Matrix, k: int | None, free: Sequence[int], loose: list[int]) -> Pair:
+def _with_set_point(
+    pair: FoundPair, gap: Matrix, k: int | None, free: Sequence[int], loose: list[int]
+) -> FoundPair:
     """A pair with the set point at place `k` of the free ones, whose distances from PV and OP are `gap`; the `loose`
     ones are no pair's."""
     if k is None:
@@ -399,7 +401,7 @@ def _gaps(bag: Bag, tag: int, level: Matrix) -> Matrix:
     return np.asarray(near * np.clip(beside, FINDER.nearest, 1.0))
 
 
-def _turned(pair: Pair) -> Pair:
+def _turned(pair: FoundPair) -> FoundPair:
     """The pair the way round for which more speaks."""
     if pair.towards + pair.nearer >= 0.0:
         return pair

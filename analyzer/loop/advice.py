@@ -16,7 +16,7 @@ from analyzer.loop.oscillation import counting
 from analyzer.loop.quality import Prepared
 from analyzer.loop.ringing import between_samples
 from analyzer.loop.settings_side_by_side import Comparison, compared
-from analyzer.loop.sluggish import faster
+from analyzer.loop.sluggish import faster_settings
 from analyzer.loops.slips import slip
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
@@ -109,7 +109,7 @@ def advise(
     return replace(_as_advice(proposal, spec, pv_span), compared=beside)
 
 
-def quickened(
+def advise_if_sluggish(
     found: Assessment, advice: Advice, prepared: Prepared, spec: LoopSpec, controller: Pid, config: Config
 ) -> Advice:
     """The advice on a calm loop of which nothing else is to be said: faster settings where it is sluggish."""
@@ -118,7 +118,7 @@ def quickened(
         return advice
     if not (prepared.op_known and prepared.op_scaled):
         return advice
-    slow = faster(prepared.record, controller, spec.type, config)
+    slow = faster_settings(prepared.record, controller, spec.type, config)
     if slow is None:
         return advice
     kp, ti = as_stated(slow.new, spec, prepared.scale.span)

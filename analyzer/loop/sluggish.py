@@ -35,7 +35,7 @@ loops are that much shorter."""
 
 
 @dataclass(frozen=True, slots=True)
-class Faster:
+class FasterSettings:
     """New settings [%, s] of a sluggish loop, how many times faster they reject a load (Kp/Ti over the present one)
     [-], and the change of the average absolute error that simulation finds [-]."""
 
@@ -44,7 +44,9 @@ class Faster:
     change: float
 
 
-def faster(record: LoopRecord, controller: Pid | None, kind: str, config: Config) -> Faster | None:
+def faster_settings(
+    record: LoopRecord, controller: Pid | None, kind: str, config: Config
+) -> FasterSettings | None:
     """Settings for a loop without a cycle; None where it is not sluggish, is slow on purpose as levels are, or its
     process is not known well enough. controller, its present settings [%, s]; kind, its type."""
     if controller is None or kind.strip().lower() == AVERAGING or record.sp_estimated:
@@ -74,16 +76,11 @@ def _known_fits(record: LoopRecord, controller: Pid, kind: str, config: Config) 
             continue
         known = intervals(fit, False, config.advice)
         slope, dead = known["slope_pct_per_s"], known["dead_time_s"]
-        sure = half_width(slope) <= limits.sluggish_unsure * abs(slope.value)
+        sure = 0.5 * abs(slope.high - slope.low) <= limits.sluggish_unsure * abs(slope.value)
         late = dead.high <= dead.low * limits.sluggish_late + window.dt_s
         if sure and late:
             found.append(fit)
     return found
-
-
-def half_width(e: Estimate) -> float:
-    """Half of an interval."""
-    return 0.5 * abs(e.high - e.low)
 
 
 def _allowed(process: Process, known: dict[str, Estimate]) -> tuple[Process, ...]:
@@ -98,7 +95,7 @@ def _allowed(process: Process, known: dict[str, Estimate]) -> tuple[Process, ...
 
 def _proposed(
     fit: Fit, process: Process, allowed: tuple[Process, ...], present: Pid, config: Config
-) -> Faster | None:
+) -> FasterSettings | None:
     limits = config.lanes
     try:
         found = settings_from(process, allowed, present.scan_s)
@@ -114,4 +111,4 @@ def _proposed(
     load = in_digits(detrend(load_of(fit, present)))  # a loop at work has long answered what stays, or drifts
     loop = Loop(between_samples(fit.process, fit.window, present), present)  # the one that leaves this load
     change = mean_error((loop,), new, load) / max(mean_error((loop,), present, load), 1e-9) - 1.0
-    return Faster(new, times, change) if change <= -limits.sluggish_gain else None
+    return FasterSettings(new, times, change) if change <= -limits.sluggish_gain else None

@@ -225,7 +225,7 @@ def _trend_panels(t: Tuning, new: Pid, title: str) -> Panels:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class TuningReport:
     """What is told of retuning a loop: lines of text, pictures by file name, what the night decided, and the model
     and the forecast as data."""
 
@@ -249,7 +249,7 @@ class Told:
         return data | {"text": self.lines}
 
 
-def proposal(one: PlantLoop, decision: Row, drawn: bool) -> Told:
+def proposal(one: PlantLoop, decision: Row, drawn: bool) -> TuningReport:
     """What is told of one loop over a night of which `decision` is the row, with pictures if wanted. Raises
     InputError where its settings are not known, NotAssessedError where its trends give no model and the night
     decided nothing."""
@@ -264,7 +264,7 @@ def proposal(one: PlantLoop, decision: Row, drawn: bool) -> Told:
         decides = decision["status"] == Status.OK and not isinstance(error, InputError)
         if not known and not decides:
             raise
-        return Told([*head, *shown, f"no model from routine operation: {error}"], {}, decision)
+        return TuningReport([*head, *shown, f"no model from routine operation: {error}"], {}, decision)
     return replace(told, lines=[*head, *shown, *told.lines])
 
 
@@ -288,7 +288,7 @@ def _neighbours(one: PlantLoop, record: LoopRecord) -> tuple[Floats, ...]:
     return tuple(found)
 
 
-def _routine(one: PlantLoop, stated: Pid | None, decision: Row, drawn: bool) -> Told:
+def _routine(one: PlantLoop, stated: Pid | None, decision: Row, drawn: bool) -> TuningReport:
     """The same by what the loop does in automatic."""
     spec, prepared, config, loop = one.spec, one.prepared, one.plant.config, one.spec.loop
     if stated is None:
@@ -313,7 +313,7 @@ def _routine(one: PlantLoop, stated: Pid | None, decision: Row, drawn: bool) -> 
     lines, files = _with_settings_beside(
         tuning, spec, prepared.scale.span, config, decision["night"], text, drawn
     )
-    return Told(lines, files, decision, tuning)
+    return TuningReport(lines, files, decision, tuning)
 
 
 def _with_settings_beside(

@@ -18,7 +18,7 @@ from analyzer.config import Config
 from analyzer.history.plant_clock import stamp
 from analyzer.history.series import Series
 from analyzer.lanes.standing import standing
-from analyzer.loop.advice import Advice, advise, quickened
+from analyzer.loop.advice import Advice, advise, advise_if_sluggish
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.conclusion import Lost, concluded
 from analyzer.loop.decisions import Cell, Finding, Lack, LacksError, Need, Needs, Status
@@ -95,7 +95,9 @@ def assess_loop(
         kp, ti = held[1]
         pair = controller_of(replace(spec, kp=kp, ti=ti), prepared)
     advice = advise(found, spec, stated, prepared.scale.span, config, pair)
-    return found, advice if stated is None else quickened(found, advice, prepared, spec, stated, config)
+    return found, advice if stated is None else advise_if_sluggish(
+        found, advice, prepared, spec, stated, config
+    )
 
 
 @dataclass(slots=True)

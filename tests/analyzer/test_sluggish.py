@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analyzer.config import Config
-from analyzer.loop.sluggish import faster
+from analyzer.loop.sluggish import faster_settings
 from benchmarks.world.draw import Drawn, drawn, run
 from benchmarks.world.simulate import sensitivity
 from identification.models import Pid
@@ -38,7 +38,7 @@ def test_new_settings_take_a_third_off_the_error_of_the_true_plant(slow: list[Dr
     """Most get settings; each takes at least a fifth off the error of the true plant, and is robust there."""
     told = 0
     for d in slow:
-        found = faster(recorded(d), stated(d), "", CONFIG)
+        found = faster_settings(recorded(d), stated(d), "", CONFIG)
         if found is None:
             continue
         told += 1
@@ -53,22 +53,24 @@ def test_new_settings_take_a_third_off_the_error_of_the_true_plant(slow: list[Dr
 def test_a_level_is_slow_on_purpose(slow: list[Drawn]) -> None:
     """Of a level nothing is said: it buffers flow."""
     for d in slow:
-        assert faster(recorded(d), stated(d), "level", CONFIG) is None
+        assert faster_settings(recorded(d), stated(d), "level", CONFIG) is None
 
 
 def test_without_moves_of_the_set_point_nothing_is_said(slow: list[Drawn]) -> None:
     """A load alone does not tell how late PV answers OP."""
     still = replace(slow[0], moves=0.0)
-    assert faster(recorded(still), stated(still), "", CONFIG) is None
+    assert faster_settings(recorded(still), stated(still), "", CONFIG) is None
 
 
 @pytest.mark.parametrize("seed", [41, 42])
 def test_a_well_tuned_loop_stays_as_it_is(seed: int) -> None:
     """Of four well tuned loops none gets other settings."""
-    assert [faster(recorded(d), stated(d), "", CONFIG) for d in drawn(seed, 4, ("healthy",))] == [None] * 4
+    assert [faster_settings(recorded(d), stated(d), "", CONFIG) for d in drawn(seed, 4, ("healthy",))] == [
+        None
+    ] * 4
 
 
 def test_one_clock_alone_is_enough(slow: list[Drawn], monkeypatch: pytest.MonkeyPatch) -> None:
     """Where one clock alone tells the process, its own interval stands: a loop is told as with two, or not."""
     monkeypatch.setattr("analyzer.loop.sluggish.CLOCKS", (4.0,))
-    assert sum(faster(recorded(d), stated(d), "", CONFIG) is not None for d in slow) >= 3
+    assert sum(faster_settings(recorded(d), stated(d), "", CONFIG) is not None for d in slow) >= 3
