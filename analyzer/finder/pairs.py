@@ -253,6 +253,7 @@ def _pair(bag: Bag, scores: Scores, c: int, j: int, taken: NDArray[np.float64]) 
     rivals = scores.weight(w, others, j)
     law = scores.law[:, c, j]
     told = int(np.argmax(law >= min(FINDER.law_told, law.max())))
+    towards = _towards(bag, scores, c, j)
     acts = sp is not None and _acts(bag, (pv, sp, tag), scores.widths[told])
     return FoundPair(
         int(pv),
@@ -263,7 +264,7 @@ def _pair(bag: Bag, scores: Scores, c: int, j: int, taken: NDArray[np.float64]) 
         width=scores.widths[w],
         asked=float(asked[w]),
         runner_up=float(np.max(rivals, where=rivals > FINDER.second * taken[others], initial=0.0)),
-        towards=FINDER.certain if acts else _towards(bag, scores, c, j),
+        towards=towards if not acts else FINDER.certain * (towards >= 0.0),  # signs that differ tell nothing
         acts=acts,
         shared=any(map(bag.twice, (pv, tag))),
         told=float(law[told]) if sp is not None or w == 0 else 0.0,  # SP may have moved both
