@@ -98,22 +98,26 @@ def line(d: Drawn, row: dict[str, Any], said: str) -> str:
     return f"{d.name} {true} {valve}: {said} {row['action']} {seen} {row['reason']}"
 
 
+def _count(loops: list[Drawn], way: str, seed: int, counts: Counter[str], asked: Any) -> None:
+    """Count what is said of one plant's loops, recorded in one way."""
+    rows = told(loops, {d.name: recorded(run(d), way, d.seed) for d in loops}, asked.jobs)
+    for d in loops:
+        row = rows[d.name]
+        said = f"{row['cause']}/{row['valve_fault']}" if row["status"] == "ok" else row["status"]
+        counts[said] += 1
+        counts["right"] += right(d, row)
+        if asked.show and not right(d, row):
+            print(f"{seed} {line(d, row, said)}", file=sys.stderr)
+
+
 def main() -> None:
     """Draw, record, assess, count."""
     asked = command_line(__doc__, seed=[1], each=8, ways=["plain"], jobs=2, kinds=list(KINDS), show=False)
     for way in asked.ways:
         counts: dict[str, Counter[str]] = {k: Counter() for k in asked.kinds}
         for seed in asked.seed:
-            loops = drawn(seed, asked.each, tuple(asked.kinds))
-            records = {d.name: recorded(run(d), way, d.seed) for d in loops}
-            rows = told(loops, records, asked.jobs)
-            for d in loops:
-                row = rows[d.name]
-                said = f"{row['cause']}/{row['valve_fault']}" if row["status"] == "ok" else row["status"]
-                counts[d.kind][said] += 1
-                counts[d.kind]["right"] += right(d, row)
-                if asked.show and not right(d, row):
-                    print(f"{seed} {line(d, row, said)}", file=sys.stderr)
+            for kind in asked.kinds:  # a plant each, for loops of one seed share their load and noise
+                _count(drawn(seed, asked.each, (kind,)), way, seed, counts[kind], asked)
         n = asked.each * len(asked.seed)
         print(f"\n{way}\n")
         print(
