@@ -203,11 +203,7 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
 def _too_thin(found: Assessment, controller: Pid | None, config: Config) -> Advice | None:
     """What sampling it takes, where the controller acts several times between two samples, unseen."""
     m = found.verdict.measured
-    thin = (
-        None
-        if m is None or found.verdict.rings
-        else too_thin(m.window.dt_s / m.window.factor, controller, config)
-    )
+    thin = None if m is None or found.verdict.rings else too_thin(m.window.row_s, controller, config)
     return None if thin is None else _or_repair(found.verdict, _lacking(thin))
 
 
@@ -258,7 +254,7 @@ def _for_tuning(verdict: Verdict, loop: Loop, period_s: float | None, config: Co
     others = (loop, *uncertain(fit, loop)[:2])
     load = load_of(fit, loop.controller)
     error = recorded_error(fit, loop.controller)
-    thin = too_thin(fit.window.dt_s / fit.window.factor, loop.controller, config) is not None
+    thin = too_thin(fit.window.row_s, loop.controller, config) is not None
     found = recommend(slow, verdict.cause, others, load, config.tuning, error, halfway=thin)
     return Proposed(found, loop, load, others)
 

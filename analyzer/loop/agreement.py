@@ -52,9 +52,10 @@ def agreement(loop: Loop, fit: Fit, load: Floats, period_s: float) -> Agreement:
     """The loop with its present settings under a load on its scan [% PV], shape (n,), beside the record of a
     fit, which cycles at a period [s]. Travel of both is that of their samples at the longer of both intervals."""
     sim, window = settled(run(loop_in_digits(loop), in_digits(load))), fit.window
-    dt_s, scan_s = window.dt_s / window.factor, scan_step(loop)
+    dt_s, scan_s = window.step_s, scan_step(loop)
     last = min(window.op.size, math.ceil(len(sim) * scan_s / dt_s))
-    stem = stem_of(Stems(*(window.op,) * 3, window.op, np.empty(0), 1), fit.valve)
+    own = window.op[None]
+    stem = stem_of(Stems(own, own, own, window.op, np.empty(0), 1), fit.valve)
     if window.position is not None:
         stem = window.position
     every = max(round(dt_s / scan_s), 1)

@@ -9,6 +9,7 @@ import numpy as np
 from analyzer.config import AdviceLimits
 from analyzer.limits import LOOP
 from analyzer.loop.measure import Measured
+from identification.estimation.between_samples import without_noise
 from identification.estimation.descent import NINETY, half_width, reaching
 from identification.estimation.gauss_newton import covariance, disturbance
 from identification.estimation.window import Fit, Window
@@ -80,17 +81,20 @@ def load_of(fit: Fit, controller: Pid) -> Floats:
 
     Moves of the set point are taken off it: a PI at a constant set point answers such a load as it does the moves.
 
-    The window's blocks have lost the noise from scan to scan. OP still has it, times the gain, and it dithers the
-    stem; white noise of that size is added.
+    Blocks have lost the noise from scan to scan, rows have it at their own interval only. OP still has it, times the
+    gain, and it dithers the stem; white noise of that size is added.
     """
     window = fit.window
     scan_s = controller.scan_s or window.dt_s
     left = disturbance(fit)
+    lost = window.factor > 1 or window.steps > 1
+    if window.factor == 1 and lost:
+        left = without_noise(left)
     if window.sp is not None:
         left = left - (window.sp - window.sp.mean())
     clock = np.arange(int(window.duration_s / scan_s)) * scan_s
     load = np.interp(clock, np.arange(left.size) * window.dt_s, left)[-LOOP.load_scans :]
-    if window.factor > 1:
+    if lost:
         load += scan_noise(window, controller) * np.random.default_rng(SEED).normal(size=load.size)
     return np.asarray(load, dtype=np.float64)
 
@@ -110,7 +114,7 @@ def scan_noise(window: Window, controller: Pid) -> float:
 
     Those of white noise have sqrt(6) times its deviation; the median leaves steps aside (Rousseeuw, Croux 1993).
     """
-    held = max(round(controller.scan_s * window.factor / window.dt_s), 1)  # OP stands still between two scans
+    held = max(round(controller.scan_s / window.step_s), 1)  # OP stands still between two scans
     jumps = np.abs(np.diff(window.op[::held], 2))
     if jumps.size == 0 or controller.kp == 0:
         return 0.0

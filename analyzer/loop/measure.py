@@ -15,6 +15,7 @@ from analyzer.loop.ringing import Ringing, calm_resonance, ringing_of
 from identification.controller.pid_regression import fit_pi
 from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import better_linear, fit_linear, fit_play, fit_stick_slip
+from identification.estimation.between_samples import Rows, Scans, scans_per_row, settled, with_scans
 from identification.estimation.evidence import (
     Trials,
     evidence,
@@ -132,6 +133,8 @@ def _consistency(fit: Fit, period_s: float) -> float:
     return gain / fit.gain if fit.gain else 0.0
 
 
+Candidates = tuple[Fit, Fit, Fit | None]
+"""Fits behind an ideal valve, behind play, and behind stick-slip if that was tried."""
 Fits = tuple[Fit, Fit, Fit | None, Fit, float, float]
 """Plain fit, play, stick-slip if it was tried, the better valve, its evidence and that of the jump [nat]."""
 
@@ -152,7 +155,8 @@ def measure(
     law = controller or recovered(record, scale, limits.law_known)
     controller = controller or recovered(record, scale)
     due = due_to_answer(record, window, scale)
-    linear, play, stick, best, gained, jump = _fits(window, scale, due, limits, oscillation)
+    scans = _scans_of(record, window, law)
+    linear, play, stick, best, gained, jump = _fits(window, scale, due, limits, oscillation, scans)
     hopeless = oscillation is None and gained < _hopeful(window, due, limits)
     amplification, stable = _amplification(linear.process, controller, scale)
     fine_linear, fine_play, fine_stick = _refined((linear, play, stick), best, hopeless)
@@ -217,13 +221,25 @@ def _of_a_cycle(m: Measured, best: Fit, linear: Fit, law: Pid | None, error: Spe
 
 
 def _fits(
-    window: Window, scale: float, due: Mask, limits: CauseLimits, oscillation: Oscillation | None
+    window: Window,
+    scale: float,
+    due: Mask,
+    limits: CauseLimits,
+    oscillation: Oscillation | None,
+    scans: Scans | None,
 ) -> Fits:
-    """The candidates' fits, by a recorded stem where one shows a fault."""
+    """The candidates' fits, by a recorded stem where one shows a fault; with OP at the controller's scan where its
+    scans within a row are known."""
     shown = None if window.position is None else seen(window.op, window.position)
     if shown is not None:
         return _stem_shown(window, shown, due, scale)
-    return _candidate_fits(replace(window, position=None), scale, due, limits, oscillation)
+    rows = _candidates(replace(window, position=None), scale, due, limits, oscillation)
+    found = (
+        rows
+        if scans is None or oscillation is None
+        else _at_scans(rows, scale, due, limits, oscillation, scans)
+    )
+    return *found, *_compared(found, due, limits, oscillation)
 
 
 def _check_judged(window: Window, limits: CauseLimits) -> None:
@@ -235,17 +251,15 @@ def _check_judged(window: Window, limits: CauseLimits) -> None:
         )
 
 
-def _refined(fits: tuple[Fit, Fit, Fit | None], best: Fit, hopeless: bool) -> tuple[Fit, Fit, Fit | None]:
+def _refined(fits: Candidates, best: Fit, hopeless: bool) -> Candidates:
     """Fits at the record's own interval, where the dead time is no shorter than a block; the valve's are left as they
     are where it is `hopeless` to look for its fault."""
-    window = best.window
-    if window.factor == 1 or best.dead_time_s + window.half_block_s < window.dt_s:
+    if best.window.factor == 1 or best.dead_time_s + best.window.half_block_s < best.window.dt_s:
         return fits
-    fine = replace(window, fine=True)
-    linear, play = (replace(fit, window=fine) for fit in fits[:2])
-    stick = None if fits[2] is None else replace(fits[2], window=fine)
+    linear, play = (replace(f, window=replace(f.window, fine=True)) for f in fits[:2])
+    stick = None if fits[2] is None else replace(fits[2], window=replace(fits[2].window, fine=True))
     if not hopeless:
-        play = descend(play, free_width=window.position is None)
+        play = descend(play, free_width=best.window.position is None)
         stick = None if stick is None else descend(stick)
     return descend(linear), play, stick
 
@@ -256,28 +270,64 @@ def _hopeful(window: Window, due: Mask, limits: CauseLimits) -> float:
     return limits.hopeless * limits.needed(count, bool(due.any()), False)
 
 
-def _candidate_fits(
+def _is_searched(
+    linear: Fit, play: Fit, due: Mask, limits: CauseLimits, oscillation: Oscillation | None
+) -> bool:
+    """Whether a play explains enough for the whole search of the valve's fault."""
+    window, calm = play.window, oscillation is None
+    if calm and window.y.size < FIT.short:
+        return True
+    least = _hopeful(window, due, limits) if calm else FIT.screened
+    return play.log_likelihood - linear.log_likelihood >= least
+
+
+def _candidates(
     window: Window, scale_s: float, due: Mask, limits: CauseLimits, oscillation: Oscillation | None
-) -> Fits:
-    """Plain fit, play, stick-slip if it was tried, the better valve, its evidence and that of the jump [nat]."""
+) -> Candidates:
+    """The fits of one window."""
     linear = fit_linear(window, scale_s)
     short = oscillation is None and window.y.size < FIT.short
     hopeful = None if oscillation is not None or short else _hopeful(window, due, limits)
     play = fit_play(linear, scale_s, hopeful)
+    if not _is_searched(linear, play, due, limits, oscillation):
+        return linear, play, None
     gained = play.log_likelihood - linear.log_likelihood
-    if gained < (FIT.screened if hopeful is None else hopeful) and not short:
-        return linear, play, None, play, gained, 0.0
-    linear = better_linear(linear, play)
-    best, stick, jump = play, None, 0.0
     wide = play.valve.stickband > 0.25 * window.reach
-    if short or oscillation is not None or (wide and gained >= limits.evidence):
-        stick = fit_stick_slip(play, scale_s)
-        jump = evidence(stick, play)
-        jump -= max(play.log_likelihood - stick.log_likelihood, 0.0)
+    sticks = short or oscillation is not None or (wide and gained >= limits.evidence)
+    return better_linear(linear, play), play, fit_stick_slip(play, scale_s) if sticks else None
+
+
+def _at_scans(
+    rows: Candidates, scale_s: float, due: Mask, limits: CauseLimits, oscillation: Oscillation, scans: Scans
+) -> Candidates:
+    """The fits with OP at the controller's scan, each as its own model makes it, unless those of OP at the rows are
+    clearly likelier: a controller that computes no faster holds it between them."""
+    first = _likeliest(rows)
+    within = with_scans(settled(first, scans), scans).window
+    linear, play, stick = _candidates(within, scale_s, due, limits, oscillation)
+    stick = None if stick is None else settled(stick, scans)
+    found = settled(linear, scans), settled(play, scans), stick
+    gained = _likeliest(found).log_likelihood - first.log_likelihood
+    return found if gained > -limits.evidence else rows
+
+
+def _likeliest(fits: Candidates) -> Fit:
+    return max((f for f in fits if f is not None), key=lambda f: f.log_likelihood)
+
+
+def _compared(
+    found: Candidates, due: Mask, limits: CauseLimits, oscillation: Oscillation | None
+) -> tuple[Fit, float, float]:
+    """The better valve, its evidence over an ideal one, and that of the jump over a play [nat]."""
+    linear, play, stick = found
+    if stick is None and not _is_searched(linear, play, due, limits, oscillation):
+        return play, play.log_likelihood - linear.log_likelihood, 0.0
+    best, jump = play, 0.0
+    if stick is not None:
+        jump = evidence(stick, play) - max(play.log_likelihood - stick.log_likelihood, 0.0)
         best = stick if jump > limits.evidence_jump else play
-    plain = with_load_step(linear, due, best.ar)
-    gained = evidence(best, plain) - (limits.evidence_jump if best is stick else 0.0)
-    return linear, play, stick, best, gained, jump
+    gained = evidence(best, with_load_step(linear, due, best.ar))
+    return best, gained - (limits.evidence_jump if best is stick else 0.0), jump
 
 
 def _stem_shown(window: Window, shown: Seen, due: Mask, scale_s: float) -> Fits:
@@ -387,6 +437,17 @@ def window_of(
         sp=None if part.sp_estimated or not np.ptp(part.sp) else block_means(part.sp, factor),
         turn=0 if calm else max(round(2 * scale_s / record.dt_s), 2),
     )
+
+
+def _scans_of(record: LoopRecord, window: Window, law: Pid | None) -> Scans | None:
+    """What the controller did within the rows of a window; None where it computes no faster than they come, or what
+    it acts on is not known."""
+    count = scans_per_row(law, record.dt_s)
+    if law is None or count == 1 or record.sp_estimated:
+        return None
+    part = record.span(window.first, window.first + window.y.size * window.factor)
+    pv, sp, op = across(part.pv, ~part.usable), np.ascontiguousarray(part.sp), np.ascontiguousarray(part.op)
+    return Scans(Rows(pv, sp, op), law, count)
 
 
 def due_to_answer(record: LoopRecord, window: Window, scale_s: float) -> Mask:

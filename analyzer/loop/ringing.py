@@ -96,7 +96,7 @@ def same_period(predicted_s: float, seen_s: float, limits: CauseLimits) -> bool:
 def between_samples(process: Process, window: Window, controller: Pid) -> Process:
     """The process as the controller sees it. What is fitted holds OP from one sample of the record to the next, while
     the controller moves it between them: half an interval of that hold belongs to the dead time."""
-    hold_s = max(window.dt_s / window.factor - controller.scan_s, 0.0)
+    hold_s = max(window.step_s - controller.scan_s, 0.0)
     return replace(process, dead_time_s=process.dead_time_s + 0.5 * hold_s)
 
 
@@ -144,5 +144,5 @@ def ringing_of(
         period_s,
         lined.log_likelihood - smooth.log_likelihood,
         best - smooth.log_likelihood,
-        window.dt_s / window.factor,
+        window.row_s,
     )

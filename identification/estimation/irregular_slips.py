@@ -69,7 +69,7 @@ def _decoded(
     mean : of the stem [% OP]; law, rest : of its friction, and its longest rest [samples]; most : paths side by side.
     """
     window = fit.window
-    lag = unit_lag(fit.time_constant_s, fit.process.dead_time_s, window.dt_s / window.factor)
+    lag = unit_lag(fit.time_constant_s, fit.process.dead_time_s, window.step_s)
     r = Response(lag, fit.gain, slow_terms(fit) - fit.gain * mean)
     f, counts = SlipDistances(law.breakaway, law.sliding, rest), judged(window.usable, noise.ar.size)
     return decoded(window.op, window.centred, counts, r, noise, f, most, least)
@@ -199,8 +199,8 @@ def fit_irregular(play: Fit, noise: Floats, period_s: float, any_gain: bool = Tr
     if play.gain == 0.0:
         return None
     window = play.window
-    rest = max(int(SLIPS.rests * period_s * window.factor / window.dt_s), 1)
-    bands, half = play.valve.stickband, rest // window.factor // 2
+    rest = max(int(SLIPS.rests * period_s / window.step_s), 1)
+    bands, half = play.valve.stickband, rest // (window.factor * window.steps) // 2
     usual: Gains = {(w, s): play.gain for w in SLIPS.widths for s in SLIPS.jumps}
     best = _likeliest(play, noise, rest, usual)
     if best is None and any_gain:

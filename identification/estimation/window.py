@@ -10,7 +10,7 @@ the valve is scanned.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -25,9 +25,9 @@ from identification.simulation.valve import RESTS, StemLaw, first_slip, stem_ste
 
 
 class Stems(NamedTuple):
-    """What the stem of any valve follows from [% OP]: OP at the record's own interval, its extremes in each block of
-    `factor` samples, and in means of such blocks, less their mean, the stem of an ideal valve and the recorded one
-    (of no length where none is)."""
+    """What the stem of any valve follows from [% OP]: paths of OP, shape (m, n * factor), each as likely as the next,
+    their extremes in each block of `factor` samples, shape (m, n), and in means of such blocks and of the paths, less
+    their mean, the stem of an ideal valve and the recorded one (of no length where none is)."""
 
     op: Floats
     low: Floats
@@ -46,14 +46,15 @@ def less_mean(x: Floats) -> Floats:
 class Window:
     """A stretch of a record prepared for fitting; what follows from it alone is computed once.
 
-    y : PV [% PV] in blocks, shape (n,); op : OP [% OP] at the record's own interval, shape (n * factor,);
-    usable : bool, shape (n,), False at gaps; dt_s : interval of the blocks [s]; most_time_constant_s and
-    most_dead_time_s : what is known of such processes [s], inf where nothing is; step_at : block at which the
-    load steps, 0 where it does not; position : stem [% OP], shape of op, where recorded or, `decoded`, told from PV;
-    fine : whether responses are stepped at the record's own interval rather than in blocks. Within a block OP
-    answers PV's noise, which a fine response meets where the dead time is shorter than the block; in blocks it counts
-    from the next one on. first : sample of its record that it begins at. turn : samples of
-    OP in two periods of a cycle, 0 where there is none.
+    y : PV [% PV] in blocks, shape (n,); op : OP [% OP] at `steps` instants of each row of the record, shape
+    (n * factor * steps,); usable : bool, shape (n,), False at gaps; dt_s : interval of the blocks [s];
+    most_time_constant_s and most_dead_time_s : what is known of such processes [s], inf where nothing is; step_at :
+    block at which the load steps, 0 where it does not; position : stem [% OP], shape of op, where recorded or,
+    `decoded`, told from PV; fine : whether responses are stepped at the record's own interval rather than in blocks.
+    Within a block OP answers PV's noise, which a fine response meets where the dead time is shorter than the block;
+    in blocks it counts from the next one on. first : sample of its record that it begins at. turn : samples of OP in
+    two periods of a cycle, 0 where there is none. paths : shape (m, size of op), several paths of OP, each as likely
+    as the next, where OP between the rows is not recorded (between_samples.py); None where `op` is the only one.
     """
 
     y: Floats
@@ -70,6 +71,8 @@ class Window:
     first: int = 0
     sp: Floats | None = None
     turn: int = 0
+    steps: int = 1
+    paths: Floats | None = None
 
     @cached_property
     def extra(self) -> Floats:
@@ -87,24 +90,25 @@ class Window:
     @cached_property
     def op_blocks(self) -> Floats:
         """OP in blocks [% OP], shape (n,)."""
-        return block_means(self.op, self.factor)
+        return block_means(self.op, self.factor * self.steps)
 
     @cached_property
     def stems_in_blocks(self) -> Stems:
         """Stems that are known beforehand, in blocks."""
-        return self._stems(self.factor)
+        return self._stems(self.factor * self.steps)
 
     @cached_property
     def stems(self) -> Stems:
         """The same at the interval at which responses are stepped."""
-        return self._stems(1) if self.fine else self.stems_in_blocks
+        return self._stems(self.steps) if self.fine else self.stems_in_blocks
 
     def _stems(self, factor: int) -> Stems:
         recorded = np.empty(0) if self.position is None else self.position
-        blocks = self.op[: self.op.size // factor * factor].reshape(-1, factor)
-        low, high = blocks.min(axis=1), blocks.max(axis=1)
-        ideal, known = (less_mean(block_means(x, factor)) for x in (self.op, recorded))
-        return Stems(self.op, low, high, ideal, known, factor)
+        paths = self.op[None] if self.paths is None else self.paths
+        blocks = paths[:, : self.op.size // factor * factor].reshape(len(paths), -1, factor)
+        low, high = blocks.min(axis=2), blocks.max(axis=2)
+        ideal = less_mean(blocks.mean(axis=(0, 2)))
+        return Stems(paths, low, high, ideal, less_mean(block_means(recorded, factor)), factor)
 
     @cached_property
     def bounds(self) -> tuple[float, float]:
@@ -117,6 +121,24 @@ class Window:
     def duration_s(self) -> float:
         """Length of the window [s]."""
         return self.y.size * self.dt_s
+
+    @property
+    def of_rows(self) -> Window:
+        """The same with OP at the rows alone."""
+        if self.steps == 1:
+            return self
+        op = np.ascontiguousarray(self.op[:: self.steps])
+        return replace(self, op=op, paths=None, steps=1, turn=self.turn // self.steps)
+
+    @property
+    def row_s(self) -> float:
+        """Interval of the record's rows [s]."""
+        return self.dt_s / self.factor
+
+    @property
+    def step_s(self) -> float:
+        """Interval of OP [s]."""
+        return self.row_s / self.steps
 
     @property
     def half_block_s(self) -> float:
@@ -189,46 +211,55 @@ class Fit:
 
 
 @njit(cache=True)
-def _resting_blocks(s: Stems, law: StemLaw) -> Floats:
-    """`stem_blocks` of a stem that rests after each move, where the direction of motion need not be remembered."""
-    out = np.empty(s.low.size)
-    stem = first_slip(s.op, law)
-    for k in range(s.low.size):
-        if s.high[k] - stem <= law.breakaway and stem - s.low[k] <= law.breakaway:
-            out[k] = stem
+def _resting_blocks(op: Floats, low: Floats, high: Floats, law: StemLaw, out: Floats) -> None:
+    """`_add_path` for a stem that rests after each move, where the direction of motion need not be remembered."""
+    factor = op.size // low.size
+    stem = first_slip(op, law)
+    for k in range(low.size):
+        if high[k] - stem <= law.breakaway and stem - low[k] <= law.breakaway:
+            out[k] += stem
             continue
         total = 0.0
-        for i in range(k * s.factor, (k + 1) * s.factor):
-            gap = s.op[i] - stem
+        for i in range(k * factor, (k + 1) * factor):
+            gap = op[i] - stem
             if gap > law.breakaway:
-                stem = s.op[i] - law.sliding
+                stem = op[i] - law.sliding
             elif gap < -law.breakaway:
-                stem = s.op[i] + law.sliding
+                stem = op[i] + law.sliding
             total += stem
-        out[k] = total / s.factor
-    return out
+        out[k] += total / factor
+
+
+@njit(cache=True)
+def _add_path(op: Floats, low: Floats, high: Floats, law: StemLaw, out: Floats) -> None:
+    """Add the stem behind one path of OP to the means of blocks."""
+    factor = op.size // low.size
+    stem = (first_slip(op, law), 0.0, op[0])
+    for k in range(low.size):
+        if stem[1] == 0.0 and high[k] - stem[0] <= law.breakaway and stem[0] - low[k] <= law.breakaway:
+            out[k] += stem[0]
+            continue
+        total = 0.0
+        for i in range(k * factor, (k + 1) * factor):
+            stem = stem_step(stem, op[i], law)
+            total += stem[0]
+        out[k] += total / factor
 
 
 @njit(cache=True)
 def stem_blocks(s: Stems, law: StemLaw) -> Floats:
-    """Stem behind OP as means of blocks, shape (n // factor,), of a valve with breakaway > 0.
+    """Stem behind OP as means of blocks and of OP's paths, shape (n // factor,), of a valve with breakaway > 0.
 
     A stem at rest within reach of OP's extremes in a block rests on.
     """
-    if law.tolerance == RESTS:
-        return _resting_blocks(s, law)  # type: ignore[no-any-return]
-    out = np.empty(s.low.size)
-    stem = (first_slip(s.op, law), 0.0, s.op[0])
-    for k in range(s.low.size):
-        if stem[1] == 0.0 and s.high[k] - stem[0] <= law.breakaway and stem[0] - s.low[k] <= law.breakaway:
-            out[k] = stem[0]
-            continue
-        total = 0.0
-        for i in range(k * s.factor, (k + 1) * s.factor):
-            stem = stem_step(stem, s.op[i], law)
-            total += stem[0]
-        out[k] = total / s.factor
-    return out
+    paths, n = s.low.shape
+    out = np.zeros(n)
+    for i in range(paths):
+        if law.tolerance == RESTS:
+            _resting_blocks(s.op[i], s.low[i], s.high[i], law, out)
+        else:
+            _add_path(s.op[i], s.low[i], s.high[i], law, out)
+    return out if paths == 1 else out / paths
 
 
 @njit(cache=True)

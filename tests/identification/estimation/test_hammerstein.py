@@ -141,7 +141,7 @@ def test_stem_in_blocks_is_the_mean_of_the_stem():
     """Stem positions of blocks are means of the stem walked sample by sample, whatever it does in motion."""
     op = steps(80, 1200) + np.cumsum(np.random.default_rng(81).normal(0, 0.1, 1200))
     blocks = op.reshape(200, 6)
-    stems = Stems(op, blocks.min(1), blocks.max(1), np.empty(0), np.empty(0), 6)
+    stems = Stems(op[None], blocks.min(1)[None], blocks.max(1)[None], np.empty(0), np.empty(0), 6)
     for constants in product((0.4, 1.0, 4.0), (0.2, 0.4), (RESTS, HALTS, SLIDES, 0.15)):
         law = StemLaw(*constants)
         slow = walk(op, law, first_slip(op, law))

@@ -1,0 +1,155 @@
+"""What the controller did between two rows of a record: OP at its own scan.
+
+A stem behind play follows OP's extremes, and a historian keeps one row in ten of them. Between two rows OP follows
+the control law on PV. PV follows a model of the loop: its valve and process on that OP, a load whose level and slope
+are predicted from the rows before, and noise of the measured size. Each row sets OP and PV right again. No row is
+used before its time: OP would answer PV before PV moves, and no dead time could be identified.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from identification.estimation.gauss_newton import descend
+from identification.estimation.window import Fit
+from identification.models import Pid
+from identification.record import Floats
+from identification.simulation.lag import Lag, stepped, unit_lag
+from identification.simulation.pi import Law, next_op, per_scan
+from identification.simulation.valve import StemLaw, first_slip, stem_step
+
+Gains = tuple[float, float]
+"""Shares of a surprise that the load's level and its slope a row take [-]."""
+_LEVEL = [0.05 + 0.1 * k for k in range(10)]
+_GAINS = [(a, b) for a in _LEVEL for b in (0.0, 2.0 * (2.0 - a) - 4.0 * math.sqrt(1.0 - a))]
+"""Those of the steady Kalman filter of a load that walks at random, or whose slope does (Kalata 1984), under white
+noise, of which the ones that predict the next row best are taken."""
+ROUNDS = 3
+"""Turns of OP and model: ours, of ten worn valves of shared plants sizes move by less than .03 from the third on."""
+PATHS = 6
+"""Paths of OP whose stems are averaged: the noise that is not known must not stand for the one that was."""
+SEED = 11
+"""Of the noise that is drawn: the same record gets the same answer."""
+
+
+class Rows(NamedTuple):
+    """Rows of a record, PV, SP and OP [%], each of shape (n,)."""
+
+    pv: Floats
+    sp: Floats
+    op: Floats
+
+
+class Scans(NamedTuple):
+    """What a controller did within the rows of a window: those rows, its law, and its scans in each."""
+
+    rows: Rows
+    law: Pid
+    count: int
+
+
+class LoopAtScan(NamedTuple):
+    """A loop stepped at its controller's scan: the law, the valve, the process of unit gain and its gain."""
+
+    law: Law
+    valve: StemLaw
+    lag: Lag
+    gain: float
+
+
+def scans_per_row(law: Pid | None, row_s: float) -> int:
+    """Scans of a controller in one row of a record, 1 where it is not known or no faster than the record."""
+    if law is None or not law.scan_s > 0.0:
+        return 1
+    return max(round(row_s / law.scan_s), 1)
+
+
+def settled(fit: Fit, scans: Scans) -> Fit:
+    """A fit with the OP that its own model makes within the rows, each found anew from the other; the likeliest."""
+    best = None
+    for _ in range(ROUNDS):
+        fit = descend(with_scans(fit, scans), free_width=fit.valve.stickband > 0.0)
+        best = fit if best is None or fit.log_likelihood > best.log_likelihood else best
+    return best or fit
+
+
+def with_scans(fit: Fit, scans: Scans) -> Fit:
+    """A fit whose window has OP at the controller's scan, as its model makes it."""
+    window, paths = fit.window, op_at_scans(fit, scans)
+    turn = window.turn // window.steps * scans.count
+    return replace(fit, window=replace(window, op=paths[0], paths=paths, steps=scans.count, turn=turn))
+
+
+def op_at_scans(fit: Fit, scans: Scans) -> Floats:
+    """Paths of OP at every scan [% OP], shape (PATHS, n * scans), each as likely as the next: the recorded OP at each
+    row, within rows what the law makes of PV with noise of its own. Noise is drawn from a fixed seed, each with its
+    opposite.
+    """
+    rows, count = scans.rows, scans.count
+    step_s, process = fit.window.row_s / count, fit.process
+    lag = unit_lag(process.time_constant_s, max(process.dead_time_s, 0.0), step_s)
+    valve = StemLaw(*(float(x) for x in fit.valve))
+    loop = LoopAtScan(per_scan(scans.law, step_s), valve, lag, process.gain)
+    gains, noise_sd = _predictor(rows, loop, count)
+    out = np.empty((PATHS, rows.pv.size * count))
+    drawn = noise_sd * np.random.default_rng(SEED).standard_normal((PATHS // 2, rows.pv.size, count))
+    for i, noise in enumerate((*drawn, *-drawn)):
+        out[i] = _stepped(rows, loop, gains, noise)[0].ravel()
+    return out
+
+
+def without_noise(x: Floats) -> Floats:
+    """A load [% PV], shape (n,), less its white noise: the mean of what is predicted best from both ends."""
+    left = [(float(np.mean(_tracked(x, g)[1] ** 2)), g) for g in _GAINS]
+    gains = min(left)[1]
+    return 0.5 * (_tracked(x, gains)[0] + _tracked(x[::-1].copy(), gains)[0][::-1])
+
+
+@njit(cache=True)
+def _tracked(x: Floats, gains: Gains) -> tuple[Floats, Floats]:
+    """Level by the values up to each one, and the surprise of each, both of shape (n,)."""
+    out, surprise = np.empty_like(x), np.empty_like(x)
+    level, slope = x[0], 0.0
+    for k in range(x.size):
+        e = x[k] - level - slope
+        level, slope = level + slope + gains[0] * e, slope + gains[1] * e
+        out[k], surprise[k] = level, e
+    return out, surprise
+
+
+def _predictor(rows: Rows, loop: LoopAtScan, scans: int) -> tuple[Gains, float]:
+    """The gains that predict the next row best, and the standard deviation of PV's noise [% PV]."""
+    none = np.zeros((rows.pv.size, scans))
+    left, gains = min((float(np.mean(_stepped(rows, loop, g, none)[1] ** 2)), g) for g in _GAINS)
+    return gains, math.sqrt((1.0 - gains[0]) * left)
+
+
+@njit(cache=True)
+def _stepped(rows: Rows, loop: LoopAtScan, gains: Gains, noise: Floats) -> tuple[Floats, Floats]:
+    """One path of OP, shape of noise, (n, scans), and the surprise of each row [% PV], shape (n,)."""
+    n, scans = noise.shape
+    out, surprise, stems = np.empty_like(noise), np.empty(n), np.empty(n * scans)
+    rest = first_slip(rows.op, loop.valve)
+    stem, x, k = (rest, 0.0, rows.op[0]), 0.0, 0
+    memory = (rows.op[0], rows.sp[0], rows.pv[0], 0.0)
+    level, slope = rows.pv[0], 0.0
+    for i in range(n):
+        e = rows.pv[i] - loop.gain * x - level - slope
+        level, slope, surprise[i] = level + slope + gains[0] * e, slope + gains[1] * e, e
+        for j in range(scans):
+            pv = rows.pv[i] if j == 0 else loop.gain * x + level + slope * j / scans + noise[i, j]
+            memory = next_op(memory, loop.law, rows.sp[i], pv)
+            if j == 0:
+                memory = (rows.op[i], memory[1], memory[2], memory[3])
+            out[i, j] = memory[0]
+            stem = stem_step(stem, memory[0], loop.valve)
+            stems[k] = stem[0] - rest
+            late, later = max(k - loop.lag.delay, 0), max(k - loop.lag.delay - 1, 0)
+            x = stepped(x, loop.lag, stems[late], stems[later])
+            k += 1
+    return out, surprise

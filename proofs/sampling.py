@@ -1,0 +1,85 @@
+"""Worn valves by the interval of the rows: python -m proofs.sampling FOLDER ... [--every 1 10 30]
+
+Folders of plants as ../shared/plants has them (export.parquet, loops.csv, truth.json). One row in so many is kept of
+each loop whose valve is worn, and the loop is assessed. Counted are loops whose cycle has fifteen rows or more at
+that interval: named as the valve's fault, width of the play or stickband within 15 %, slope within 25 %, dead time
+within 30 % or half a row, and the 90 % interval of the width holding the truth. Writes proofs/sampling.md.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections import Counter
+from functools import partial
+from multiprocessing import Pool
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+
+from analyzer import api
+from analyzer.loop.decisions import Cause
+from analyzer.loop.identified import intervals
+from identification.errors import NotAssessedError
+from proofs.common import command, command_line, publish
+
+ROWS = 15
+"""Rows a cycle from which a loop counts."""
+KINDS = ("named", "width", "slope", "dead time", "interval")
+
+
+def judged(name: str, export: Path, loops: Path, truth: dict[str, float], every: int) -> Counter[str]:
+    """What of one loop is right; nothing where its cycle has too few rows or is not seen."""
+    try:
+        found = api.assess(api.read(export, loops=loops).loop(name))
+    except NotAssessedError:
+        return Counter()
+    cycle, m = found.oscillations.first, found.verdict.measured
+    if cycle is None or m is None or cycle.period_s < ROWS * every:
+        return Counter()
+    fit = found.verdict.fit if found.verdict.cause is Cause.VALVE else m.play
+    width, slope = truth.get("backlash") or truth["stick_S"], truth["K"] / truth["T"]
+    said = intervals(fit, True, api.Config().advice)
+    held = said.get("stickband_pct") or said.get("backlash_pct")
+    return Counter(
+        {
+            "loops": 1,
+            "named": int(found.verdict.cause is Cause.VALVE),
+            "width": int(abs(fit.valve.stickband / width - 1) <= 0.15),
+            "slope": int(abs(fit.slope / slope - 1) <= 0.25),
+            "dead time": int(abs(fit.process.dead_time_s - truth["L"]) <= max(0.3 * truth["L"], 0.5 * every)),
+            "interval": int(held is not None and held.low <= width <= held.high),
+        }
+    )
+
+
+def of_plant(folder: Path, every: int, jobs: int) -> Counter[str]:
+    """Counts of one plant's worn valves at one interval."""
+    truth = json.loads((folder / "truth.json").read_text("utf-8"))["loops"]
+    worn: dict[str, Any] = {n: t["plant"] for n, t in truth.items() if t["cause"] in ("backlash", "stiction")}
+    with tempfile.TemporaryDirectory() as temporary:
+        export = Path(temporary) / "export.parquet"
+        whole = pq.read_table(folder / "export.parquet")
+        pq.write_table(whole.take(list(range(0, whole.num_rows, every))), export)
+        asked = partial(judged, export=export, loops=folder / "loops.csv", every=every)
+        with Pool(jobs) as pool:
+            each = [pool.apply_async(asked, (n,), {"truth": t}) for n, t in worn.items()]
+            return sum((x.get() for x in each), Counter())
+
+
+def main() -> None:
+    """Count each plant at each interval and write the table beside this file."""
+    options = command_line(__doc__, folders="+", every=[1, 10, 30], jobs=2)
+    lines = ["| plant | every | loops | " + " | ".join(KINDS) + " |", "|---|--:|" + "--:|" * (1 + len(KINDS))]
+    for folder in options.folders:
+        for every in options.every:
+            counts = of_plant(folder, every, options.jobs)
+            cells = " | ".join(str(counts[k]) for k in KINDS)
+            lines.append(f"| {folder.name} | {every} s | {counts['loops']} | {cells} |")
+    places = (f"../shared/plants/{f.name}" for f in options.folders)
+    publish(__file__, "Worn valves by the interval of the rows", command(__file__, *places), "\n".join(lines))
+
+
+if __name__ == "__main__":
+    main()
