@@ -23,6 +23,7 @@ from analyzer.loop.cause import (
     told_apart,
     told_slip_by_slip,
     with_dead_valve,
+    with_worn_valve,
 )
 from analyzer.loop.cycling_span import Span, detect_where_it_cycles
 from analyzer.loop.decisions import Cause, Lack, LacksError, Need, Needs
@@ -118,6 +119,7 @@ def cause_of(
         verdict = verdict_by_measures(measured, prepared, oscillation, config)
         if oscillation is not None:
             verdict = told_slip_by_slip(verdict, oscillation.period_s, config.cause)
+            verdict = with_worn_valve(verdict, oscillation.period_s, config.cause)
     dead = dead_valve(record, config.cause) if prepared.op_known else None
     return with_dead_valve(verdict, dead) if dead and verdict.cause is not Cause.VALVE else verdict
 

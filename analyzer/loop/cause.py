@@ -39,6 +39,7 @@ from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
 from analyzer.loop.ringing import Regularity, Ringing
 from identification.errors import NotAssessedError
+from identification.estimation.beside_line import BesideLine, beside_line
 from identification.estimation.gauss_newton import descend
 from identification.estimation.irregular_slips import SlipPath, fit_irregular, path_evidence
 from identification.estimation.noise import generic_noise
@@ -180,21 +181,6 @@ def jump_evidence(m: Measured, limits: CauseLimits) -> tuple[float, float]:
 
 
 def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> Verdict:
-    """The verdict on one loop; the valve of one whose cycle another thing makes may be at fault as well."""
-    found = _judged(m, oscillation, limits)
-    beside = oscillation is not None and found.cause is not Cause.VALVE and is_worn_beside(m, limits)
-    return replace(found, fault=fault_of(m, limits)) if beside else found
-
-
-def is_worn_beside(m: Measured, limits: CauseLimits) -> bool:
-    """Whether a valve is at fault whatever makes the cycle: it explains PV better, it simulates from OP in free run
-    the harmonics of a worn stem and the cycle no worse, and OP moves farther than its width."""
-    small, whole = limits.beside_size, 1.0
-    simulates = m.harmonics_gone >= limits.beside_harmonics and m.cycle_gone >= 0.0
-    return m.evidence >= limits.beside_evidence and small <= m.size <= whole and simulates
-
-
-def _judged(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> Verdict:
     """What makes the cycle.
 
     Where the controller's law is known the identified loop tells whether it rings by itself. Else, of a loop that
@@ -356,6 +342,27 @@ def _robust(verdict: Verdict, oscillation: Oscillation, config: Config) -> Needs
     if ms is None or ms > config.tuning.ms_most:
         return None
     return Needs(Lack.MANUAL_TEST, Need.TUNING_IN_MANUAL, (ms,))
+
+
+def with_worn_valve(verdict: Verdict, period_s: float, limits: CauseLimits) -> Verdict:
+    """The verdict on a loop that cycles at a period [s] for another cause, its valve worn where play is seen beside
+    the cycle's line: whatever makes the cycle, the valve is to be repaired."""
+    m = verdict.measured
+    if m is None or verdict.cause is Cause.VALVE or m.window.position is not None:
+        return verdict
+    found = beside_line(m.linear, m.play, period_s)
+    if not is_worn_beside(found, m, limits):
+        return verdict
+    return replace(verdict, fault=fault_of(m, limits), measured=replace(m, play=found.play))
+
+
+def is_worn_beside(found: BesideLine, m: Measured, limits: CauseLimits) -> bool:
+    """Whether play is seen beside the cycle's line: enough evidence on which the half-cycles agree, a process that
+    goes the controller's way, and a width that OP crosses."""
+    right_way = m.controller is None or m.controller.kp * found.play.gain > 0.0
+    steady = found.trials is not None and found.trials.steadiness >= limits.beside_steady
+    crossed = limits.beside_size <= found.play.valve.stickband / max(m.window.reach, 1e-9) <= 1.0
+    return found.evidence >= limits.beside_evidence and steady and crossed and right_way
 
 
 def told_slip_by_slip(verdict: Verdict, period_s: float, limits: CauseLimits) -> Verdict:

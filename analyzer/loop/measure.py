@@ -45,8 +45,6 @@ from identification.simulation.valve import IDEAL
 from tuning.frequency_response import is_stable, loop_response
 
 HARMONICS = (2, 3)
-OF_CYCLE, OF_HARMONICS = (0.5, 1.5), (1.5, 6.5)
-"""Bands about the cycle and its harmonics, in its frequency."""
 """Harmonics of a cycle that a valve's model must explain: beyond the third few samples a cycle are left."""
 
 
@@ -85,8 +83,6 @@ class Measured:
     consistency: float = 1.0
     harmonic: float = 0.0
     trials: Trials | None = None
-    cycle_gone: float = 0.0
-    harmonics_gone: float = 0.0
     kurtosis: float = 3.0
     wave_left: float = 0.0
     steady: float = 0.0
@@ -112,18 +108,6 @@ def _harmonics_left(fit: Fit, period_s: float) -> float:
         return 0.0
     left, cycle = spectrum(residual(fit), window.dt_s), spectrum(window.centred, window.dt_s)
     return math.hypot(*(locked_harmonic(left, period_s, order, cycle) for order in HARMONICS))
-
-
-def _gone(linear: Fit, best: Fit, period_s: float, band: tuple[float, float]) -> float:
-    """Share of what an ideal valve leaves of PV in free run, in a band about the cycle's frequency, that a faulty one
-    takes off [-], negative where it leaves more."""
-    first, last = band
-    left = []
-    for fit in (linear, best):
-        s = spectrum(residual(fit), fit.window.dt_s)
-        at = np.arange(s.lines.size) * period_s / s.duration_s
-        left.append(float(np.sum(np.abs(s.lines[(at >= first) & (at <= last)]) ** 2)))
-    return 1.0 - left[1] / max(left[0], 1e-30)
 
 
 def _consistency(fit: Fit, period_s: float) -> float:
@@ -202,8 +186,6 @@ def _of_a_cycle(m: Measured, best: Fit, linear: Fit, law: Pid | None, error: Spe
     dt_s, scale = linear.window.dt_s, m.scale_s
     found = replace(
         m,
-        cycle_gone=_gone(linear, best, scale, OF_CYCLE),
-        harmonics_gone=_gone(linear, best, scale, OF_HARMONICS),
         ringing=ringing_of(linear, (best,) if m.evidence > 0.0 else (), law, scale),
         line_linear=_prominence(residual(linear), dt_s, scale),
         line_valve=_prominence(residual(best), dt_s, scale),

@@ -77,11 +77,11 @@ def trials(ours: Fit, theirs: Fit, period_s: float) -> Trials | None:
     at = turns_of(window.op_blocks, period_s / window.dt_s)
     if at.size < 5:
         return None
-    return _agreement(np.add.reduceat(gains(ours, theirs), at)[:-1])
+    return agreement_of(np.add.reduceat(gains(ours, theirs), at)[:-1])
 
 
-def _agreement(gained: Floats) -> Trials:
-    """How stretches agree of their gains, shape (t,), t > 1."""
+def agreement_of(gained: Floats) -> Trials:
+    """How stretches agree that one model is better, by its gain in each [nat], shape (t,), t > 1."""
     spread = float(gained.std(ddof=1)) / math.sqrt(gained.size)
     return Trials(gained.size, float((gained > 0).mean()), float(gained.mean()) / max(spread, 1e-9))
 
@@ -91,4 +91,4 @@ def trials_between_moves(ours: Fit, theirs: Fit) -> Trials | None:
     move. A ramp of the load while OP runs against it looks once like a stem that rests, and not again."""
     at = moves_begun(ours)
     at = at[at > 0]
-    return _agreement(np.add.reduceat(gains(ours, theirs), np.append(0, at))) if at.size else None
+    return agreement_of(np.add.reduceat(gains(ours, theirs), np.append(0, at))) if at.size else None

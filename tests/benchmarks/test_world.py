@@ -64,3 +64,12 @@ def test_a_simulated_present_is_believed_only_where_it_agrees() -> None:
     name, ratio = agreement(wrong, fit, load, cycle.period_s).worst(limits) or ("", 0.0)
     assert "travel" in name
     assert ratio > 3.0
+
+
+def test_a_worn_valve_is_told_beside_a_load_that_makes_the_cycle() -> None:
+    """Under one sine a valve with play is worn, by the width that it has, and a sound one is not."""
+    worn = replace(SINE, kind="worn-sine", valve=Valve(BACKLASH, 2.0))
+    verdict, sound = (assessed(d)[0].verdict for d in (worn, SINE))
+    assert (verdict.fault, sound.fault) == ("backlash", "none")
+    assert verdict.measured is not None
+    assert verdict.measured.play.valve.stickband == pytest.approx(2.0, rel=0.15)
