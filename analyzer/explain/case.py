@@ -25,7 +25,7 @@ from analyzer.loop.cause import NO_CAUSE, Verdict
 from analyzer.loop.cycling_span import detect_where_it_cycles
 from analyzer.loop.decisions import Cause, Fault
 from analyzer.loop.experiments import Learned, learned
-from analyzer.loop.fitness import pv_that_jumps
+from analyzer.loop.fitness import at_limits, pv_that_jumps
 from analyzer.loop.identified import intervals
 from analyzer.loop.oscillation import counting
 from analyzer.loop.quality import Prepared, prepare
@@ -172,9 +172,9 @@ def case(
         raise NotAssessedError(f"{spec.loop}: needs OP, has none")
     if float(np.ptp(r.op)) == 0 or float(np.ptp(r.pv)) == 0:
         raise NotAssessedError(f"{spec.loop}: needs OP and PV that move, one of them stands still")
-    jumps = pv_that_jumps(r, config.explain.recorder)
-    if jumps is not None:
-        raise NotAssessedError(f"{spec.loop}: {jumps}")
+    lacks = pv_that_jumps(r, config.explain.recorder) or at_limits(r, config.quality)
+    if lacks is not None:
+        raise NotAssessedError(f"{spec.loop}: {lacks}")
     stamps = raw.stamp_s[~raw.bad]
     stamps = stamps[(stamps >= r.start_s - r.dt_s) & (stamps <= r.start_s + r.duration_s)]
     verdict = verdict_on(spec, whole, config)
@@ -214,14 +214,15 @@ def subject_of(
 ) -> Recording:
     """What is explained of a prepared record, beside what a night says of it and the OPs of its neighbours."""
     r = prepared.record
+    judged = float(r.usable.mean()) >= config.quality.usable_share  # else OP is mostly an operator's
     return Recording(
-        None if r.sp_estimated else r.sp,
+        r.sp if judged and not r.sp_estimated else None,
         r.pv,
         r.op,
         ~(r.bad | r.mask("gap")),
         r.dt_s,
         stamps,
-        stated_law(spec, prepared) if prepared.shared is None else None,
+        stated_law(spec, prepared) if judged and prepared.shared is None else None,
         not prepared.scale.recorded,
         others,
         spec.type.strip().lower(),

@@ -19,8 +19,8 @@ from analyzer.pages import loop_pictures, words
 from analyzer.pages.experiments import experiments_section
 from analyzer.pages.reading import BESIDE, Thinned
 from analyzer.pages.words import Row, duration, keys, known_figures, lead, number, page_table, titled
-from analyzer.pages.work import work_order
 from analyzer.words.belief import wear_text
+from analyzer.words.orders import order
 from analyzer.words.reason import in_short
 from analyzer.words.units import row_settings
 from identification.mismatch.words import check
@@ -106,12 +106,12 @@ def _links(
 def _first_section(row: Row, thin: Thinned | None) -> parts.Section:
     """What is wrong, what to do in three lines, and ten periods of it."""
     reason, drawn, scale = words.cell(row, "reason").text, None, words.pv_scale_of(row)
-    order = tuple((f"{head}:", text) for head, text in work_order(row) if text)
+    lines = tuple((f"{head}:", text) for head, text in order(row) if text)
     if thin is not None and thin.time_s.size > 1:
         opening = loop_pictures.close_span(row, thin)
         name = "SP, PV and OP" + (", the last ten periods" if opening else "")
         drawn = loop_pictures.trend_block("trend", name, thin, (), scale, opening)
-    do, events = parts.Listing(order) if order else None, loop_pictures.turn_panels(row, scale)
+    do, events = parts.Listing(lines) if lines else None, loop_pictures.turn_panels(row, scale)
     return parts.Section("What to do", parts.there(lead(reason or "nothing was found"), do, drawn, events))
 
 
