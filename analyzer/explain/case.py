@@ -34,7 +34,7 @@ from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import controller
 from analyzer.night.asked import Asked, guarded
-from analyzer.night.nights import ALWAYS, Night, cut
+from analyzer.night.nights import ALWAYS, Night, Plant, cut
 from identification.controller.check import StatedSettings
 from identification.errors import InputError, NotAssessedError
 from identification.estimation.evidence import trials_between_moves
@@ -274,7 +274,7 @@ def parts_said(judged: Sequence[Part]) -> str:
     return f"Settings changed within the recording: explained on {judged[0].name}, held out on {rest}."
 
 
-def loop_trends(asked: Asked, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...], dict[str, Series]]:
+def loop_trends(plant: Plant, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...], dict[str, Series]]:
     """A loop of an export, all loops of it, and the trends that explaining it reads.
 
     Raises
@@ -282,7 +282,6 @@ def loop_trends(asked: Asked, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...],
     InputError
         The export has no such loop, no PV of it, or no samples of PV in the span that is asked for.
     """
-    plant = guarded(asked)
     specs = plant.specs
     spec = spec_of(specs, tag)
     if spec.pv is None:
@@ -298,15 +297,18 @@ def loop_trends(asked: Asked, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...],
 
 def whole(asked: Asked, tag: str) -> tuple[Case, Series]:
     """A loop's case over all of an export, under its last settings, and its PV."""
-    spec, specs, series = loop_trends(asked, tag)
+    spec, specs, series = loop_trends(guarded(asked), tag)
     pv = series[spec.pv or ""]
     spec = in_force(spec, asked.changes, float(pv.stamp_s[-1]))
     return case(spec, specs, series, asked.config, None), pv
 
 
-def asked_cases(asked: Asked, tag: str, held_out: Sequence[Path]) -> tuple[Case, dict[str, Case]]:
-    """The case to be explained, and those held out by name: parts under other settings, and other exports."""
-    spec, specs, series = loop_trends(asked, tag)
+def asked_cases(
+    asked: Asked, plant: Plant, tag: str, held_out: Sequence[Path]
+) -> tuple[Case, dict[str, Case]]:
+    """The case to be explained, and those held out by name: parts under other settings, and other exports; plant,
+    what is asked, opened."""
+    spec, specs, series = loop_trends(plant, tag)
     judged = parts(spec, series, asked.changes, asked.zone)
     kept: list[tuple[Part, Case]] = []
     for part in judged:

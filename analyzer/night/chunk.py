@@ -213,6 +213,13 @@ def _samples_of(task: Task, spec: LoopSpec) -> dict[str, Series] | Lost:
 def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
     """Assess a chunk and write its pieces; `began` is told the number of each loop that is begun with."""
     be_patient(task.store.path)
+    assessed(task, began)
+    met = task.plant.export.met(tag for spec in task.specs for tag in spec.tags)
+    return Done(task.key, len(task.specs), met)
+
+
+def assessed(task: Task, began: Callable[[int], None] = lambda at: None) -> dict[str, Rows]:
+    """What is kept of a chunk by night, its pieces written."""
     kept, plant = {n.name: Rows() for n in task.nights}, task.plant
     for at, spec in enumerate(task.specs):
         began(at)
@@ -226,7 +233,7 @@ def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
             _loop_row(spec, series, night, plant.config, advising, kept[night.name], plant.changes, held)
     for night in task.nights:
         _write_pieces(task, night.name, kept[night.name])
-    return Done(task.key, len(task.specs), plant.export.met(tag for spec in task.specs for tag in spec.tags))
+    return kept
 
 
 def lose(task: Task, reason: str) -> Done:
