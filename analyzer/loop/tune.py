@@ -304,16 +304,16 @@ def _routine(one: PlantLoop, stated: Pid | None, decision: Decided, drawn: bool)
     if found.verdict.cause is cause:
         signs = [s for s in found.verdict.signs if s.points_to is cause]
         text = [f"sign of {s.points_to}: {sign_in_full(s)}" for s in signs]
-    if row["status"] == Status.OK and cause not in AGAINST and action is not Action.RETUNE:
-        left = [WHY[cause]] if action is WITHOUT_SETTINGS[cause] else []
-        kind = "no_model_of_load" if cause is Cause.LOAD else "no_model"
-        return TuningReport([*text, *left, sentences("settings")[kind]], {}, row)
-    if found.verdict.cause is not cause:  # as the plant, or other nights, have it
+    else:  # as the plant, or other nights, have it
         found = replace(found, verdict=replace(found.verdict, cause=cause))
     if found.verdict.measured is None:
         limited = at_limits(prepared.record, config.quality) if prepared.op_known else None
         needs = limited or unfit_for_cause(prepared, None, config)  # the nearest first
         raise NotAssessedError(f"{loop}: {needs or found.verdict.needs or NO_MOVES}")
+    if cause not in AGAINST and action is not Action.RETUNE:
+        left = [WHY[cause]] if action is WITHOUT_SETTINGS[cause] else []
+        kind = "no_model_of_load" if cause is Cause.LOAD else "no_model"
+        return TuningReport([*text, *left, sentences("settings")[kind]], {}, row)
     new = None
     if action is Action.RETUNE:
         new = controller_of(replace(spec, kp=row["kp_new"], ti=row["ti_new"]), prepared)

@@ -11,7 +11,7 @@ from urllib.parse import quote
 import numpy as np
 
 from analyzer.columns import BY_NAME
-from analyzer.explain.words import agreement, title
+from analyzer.explain.words import beside_night, title
 from analyzer.limits import PAGES
 from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES, Fault, Status
@@ -154,7 +154,7 @@ def _explained_section(found: Row | None, row: Row) -> parts.Section | None:
     """What the plain loop lacks, where the night was explained, and how that goes with the night's verdict."""
     if found is None:
         return None
-    together = agreement(row, found["verdict"], found["block"])
+    together = beside_night(row, found["verdict"], found["block"])
     said = (f"{title(found['verdict']).capitalize()}: {found['reason']}", check(found))
     return parts.Section("What the plain loop lacks", (parts.Text((*said, together) if together else said),))
 

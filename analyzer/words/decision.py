@@ -21,7 +21,7 @@ TOLD = (
         "backlash_pct",
         "stickband_pct",
     ),
-    *("source_loop", "action", "due", "kp", "ti", "kp_new", "ti_new", "reason", "advice"),
+    *("lanes", "source_loop", "action", "due", "kp", "ti", "kp_new", "ti_new", "reason", "advice"),
 )
 """Columns of a decision that commands tell, as the contract of the ranking names them."""
 ABOVE_ACTION = (Cause.VALVE, Cause.TUNING, Cause.LOAD)
