@@ -58,12 +58,15 @@ class Told:
 
 @dataclass(frozen=True, slots=True)
 class Calm:
-    """What the loop did under the settings before: the last night, significance [% h], share [%] and period [s]."""
+    """What a loop did in its last night under some settings: significance [% h], share [%] and period [s] of its
+    oscillation, amplitude of PV and average absolute error [% of span]."""
 
     night: str
     significance: float
     oscillating_pct: float
     period_s: float | None
+    amplitude_pct: float | None = None
+    error_pct: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +149,8 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], config: C
     ended = before is not None and before.cycle.loud and not found.loud
     done = cycle.remedy_with_night(RemedyBelief() if ended else now.remedy, share, row, limits)
     size, share_pct = float(row["oscillation_significance"] or 0.0), float(row["oscillating_pct"])
-    seen = Calm(row["night"], size, share_pct, row["period_s"])
+    sizes = row["period_s"], row["pv_amplitude_pct"], row["average_absolute_error_pct"]
+    seen = Calm(row["night"], size, share_pct, *sizes)
     phases = with_repetitions(now.phases, row, limits.repetitions)
     now = replace(now, night=row["night"], end_s=_span(row)[1], remedy=done, last=seen, phases=phases)
     return replace(now, kp=row["kp"], ti=row["ti"], told=tell(now, row, limits))

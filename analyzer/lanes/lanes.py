@@ -106,7 +106,7 @@ def _frozen(found: Finding) -> str:
 
 
 def _travels(found: Finding) -> str:
-    return f"OP travels {found.number('valve_travel_pct_per_h'):.0f} %/h"
+    return f"{found.text('travel_of') or 'OP'} travels {found.number('valve_travel_pct_per_h'):.0f} %/h"
 
 
 HIDE_SLOW = frozenset({Lane.OSCILLATION, Lane.AT_LIMIT, Lane.FROZEN})

@@ -67,8 +67,16 @@ CASES: Cases = {
     Action.NEEDS_DATA: _of_lack,
 }
 """Which case of an action a row is, where an action has several."""
-RETUNED = {Cause.VALVE: "retune worn", Cause.NONE: "retune sluggish"}
-"""Kinds of work that new settings are, by the cause; of others the loop is too tight."""
+RETUNED = {Cause.VALVE: "retune worn", Cause.NONE: "retune sluggish", Cause.TUNING: "retune"}
+"""Kinds of work that new settings are, by the cause; of others an experiment tells the process."""
+
+
+EXPECTED = {
+    Cause.VALVE: "the cycle comes to rest, by simulation, though the valve stays as it is",
+    Cause.NONE: "PV comes back to its set point several times sooner, and OP moves more",
+    Cause.TUNING: "the swing dies away within a few periods",
+}
+"""What new settings make of a loop of which no cycle is predicted, by the cause."""
 
 
 def case_of(row: Row) -> str:
@@ -82,11 +90,7 @@ def _expected(row: Row) -> str:
     if None not in (row.get("expected_period_s"), row.get("expected_pv_amplitude_pct")):
         swing = f"{row['expected_pv_amplitude_pct']:.2g} % of span"
         return f"a cycle of {duration(row['expected_period_s'])} and {swing}: the valve stays as it is"
-    if row["cause"] == Cause.VALVE:
-        return "the cycle comes to rest, by simulation, though the valve stays as it is"
-    if row["cause"] == Cause.NONE:
-        return "PV comes back to its set point several times sooner, and OP moves more"
-    return "the swing dies away within a few periods"
+    return EXPECTED.get(row["cause"], "PV answers the set point as the model of the experiment does")
 
 
 def order(row: Row) -> tuple[tuple[str, str], ...]:
@@ -109,7 +113,9 @@ def kind_of_work(row: Row) -> str:
     """The kind of work that a row asks for, of which one sentence tells all loops; '' of none."""
     if not row["action"]:
         return ""
-    kind = RETUNED.get(row["cause"], "retune") if row["action"] == Action.RETUNE else case_of(row)
+    kind = (
+        RETUNED.get(row["cause"], "retune by experiment") if row["action"] == Action.RETUNE else case_of(row)
+    )
     return kind if kind in texts("work") else ""
 
 

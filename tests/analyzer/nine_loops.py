@@ -54,7 +54,7 @@ def _steps(seed: int, count: int, size: float = 4.0) -> Floats:
 LOOPS: dict[str, tuple[Process, Controller, Valve]] = {
     FROZEN: (Process(0.9, 15.0, 0.0, 4.0), Controller(0.8, 20.0), Valve()),
     SLUGGISH: (Process(1.2, 240.0, 0.0, 20.0), Controller(0.25, 1200.0), Valve()),
-    TIGHT: (Process(1.2, 60.0, 0.0, 10.0), Controller(5.0, 40.0), Valve()),
+    TIGHT: (Process(1.2, 60.0, 0.0, 10.0), Controller(5.5, 40.0), Valve()),
     SINE: (Process(1.4, 90.0, 0.0, 8.0), Controller(1.5, 90.0), Valve()),
     PLAY_ON_LEVEL: (Process(0.03, 0.0, 0.0, 8.0), Controller(1.2, 120.0), Valve(BACKLASH, PLAY["LC105"])),
     LIMITED: (Process(1.1, 300.0, 0.0, 20.0), Controller(2.0, 250.0), Valve()),
@@ -72,6 +72,8 @@ def _trends(loop: str, seed: int) -> tuple[Trends, np.ndarray]:
     auto, rest = np.ones(N, dtype=bool), 50.0
     if loop == SLUGGISH:
         before, sp = _load(seed, 1.5, 900.0), _steps(seed, 7)
+    elif loop == TIGHT:
+        before = _load(seed, 1.0, 30.0)
     elif loop == SINE:
         before = before + 4.0 * np.sin(2.0 * math.pi * np.arange(N) / SINE_S)
     elif loop == LIMITED:
