@@ -84,14 +84,16 @@ def worst_table(night: ShownNight) -> Table:
 
 def ranking(night: ShownNight) -> Table:
     """All loops of the night."""
-    figures = [c.key for c in words.page_columns("ranking") if c.numeric]
+    declared, by = words.page_columns("ranking"), cost_column(night.rows)
+    shown = declared if by in words.keys("ranking") else (*declared[:4], words.heading(by), *declared[4:])
+    figures = [c.key for c in shown if c.numeric]
 
     def own(row: words.Row) -> Mapping[str, words.Told]:
         return {name: words.marked_cell(row, name) for name in figures} | {
             "cause": words.cause_cell(row["cause"])
         }
 
-    return night.table("ranking", night.rows, own, note=_what_marks(night.rows, *figures))
+    return night.table("ranking", night.rows, own, columns=shown, note=_what_marks(night.rows, *figures))
 
 
 def waiting(night: ShownNight) -> list[tuple[str, str]]:

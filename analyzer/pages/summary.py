@@ -128,10 +128,10 @@ def since(night: ShownNight) -> Section:
 
 
 def _do(row: words.Row) -> str:
-    """What to do: the settings to type in, else the first line of the order; '' of nothing."""
+    """The action with the settings to type in, else with the first line of its order; '' of nothing."""
     if row["kp_new"] is not None or row["ti_new"] is not None:
         return f"{row['action']}: {changed_settings(row)}"
-    return "" if row["action"] in (None, Action.NONE) else dict(order(row))["Do"]
+    return "" if row["action"] in (None, Action.NONE) else f"{row['action']}: {dict(order(row))['Do']}"
 
 
 def _counts(night: ShownNight) -> str:
