@@ -161,7 +161,8 @@ class Plot(Named):
     """Lines and points over two axes, with areas under them and marks.
 
     log : axes that count in powers of ten, of "x" and "y"; all that lies on them is above zero; reach : values that
-    the vertical axis holds at least, so that small things look small
+    the vertical axis holds at least, so that small things look small; day : the date of 0 (ISO) where the horizontal
+    axis counts days, which then shows dates
     """
 
     x_label: str
@@ -173,6 +174,7 @@ class Plot(Named):
     log: str = ""
     reach: tuple[float, ...] = ()
     places: tuple[Place, ...] = ()
+    day: str = ""
 
 
 @dataclass(frozen=True, slots=True)

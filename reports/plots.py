@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime, timedelta
 from zoneinfo import ZoneInfo
 
 import numpy as np
@@ -89,7 +89,9 @@ def plot(p: Plot) -> svg.Drawing:
     """Lines or points over two axes."""
     x, y = _axes(p)
     across, along = (x.first, x.last), (y.last, y.first)
-    body = [svg.tick_x(x.at(v), along, f"{v:.6g}", 16) for v in x.ticks(6)]
+    body = [
+        svg.tick_x(x.at(v), along, _number_or_date(v, p.day), 16) for v in x.ticks(6) if _is_day(v, p.day)
+    ]
     body += [svg.tick_y(y.at(v), across, f"{v:.6g}") for v in y.ticks(5)]
     for a in p.areas:
         outline = svg.between(x.places(_few(a.x)), y.places(_few(a.low)), y.places(_few(a.high)))
@@ -101,6 +103,19 @@ def plot(p: Plot) -> svg.Drawing:
     body.append(svg.written((x.first + x.last) / 2, PLOT[1] - 6, p.x_label, "middle", "axis"))
     body.append(_turned(13, (y.first + y.last) / 2, p.y_label))
     return svg.Drawing(*PLOT, "".join(body), f"{p.title}: {p.y_label} over {p.x_label}", "plot")
+
+
+def _is_day(value: float, day: str) -> bool:
+    """Whether a tick stands at a whole day, where its axis counts days."""
+    return not day or value == round(value)
+
+
+def _number_or_date(value: float, day: str) -> str:
+    """What stands at a tick: a number, or the date so many days after a day."""
+    if not day:
+        return f"{value:.6g}"
+    at = date.fromisoformat(day) + timedelta(days=round(value))
+    return f"{at.day} {at:%b}"
 
 
 def intervals(chart: IntervalChart) -> list[svg.Drawing]:

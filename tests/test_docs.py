@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -68,6 +69,24 @@ def test_each_command_has_help_and_an_example(name):
     assert "Example" in result.output
 
 
+def headings(text: str) -> list[str]:
+    """The headings of the list in a text."""
+    line = next(x for x in text.splitlines() if x.startswith(" Loop "))
+    return re.split(r"\s{2,}", line.strip())
+
+
+@pytest.mark.skipif(os.environ.get("TRIAGE_WALK") != "all", reason="takes minutes: TRIAGE_WALK=all runs it")
+def test_the_list_in_the_readme_is_the_command_s(tmp_path):
+    """The list that the README shows is, to the character, the first lines that its first command prints."""
+    triage, sample = [sys.executable, "-m", "analyzer.cli"], ROOT / "sample_data"
+    run = [*triage, "run", str(sample / "mill.parquet"), "--loops", str(sample / "loops.csv")]
+    more = ["--store", str(tmp_path), "--until", "2026-03-09", "--jobs", "2"]
+    subprocess.run([*run, *more], capture_output=True, text=True, check=True)
+    printed = subprocess.run([*triage, "rank", str(tmp_path)], capture_output=True, text=True, check=True)
+    shown = re.search(r"```\n(Night .*?)```", README, flags=re.DOTALL)[1].splitlines()
+    assert shown == [line.rstrip() for line in printed.stdout.splitlines()[: len(shown)]]
+
+
 def test_main_job_of_the_readme_on_one_day(tmp_path):
     """The README's main job, on one day of the sample mill, ranks the loops that are hidden as faulty first, tells a
     cascade's sticking valve at its slave, and takes the phases of a batch for no cycle."""
@@ -82,6 +101,11 @@ def test_main_job_of_the_readme_on_one_day(tmp_path):
         [*triage, "rank", str(tmp_path)], capture_output=True, text=True, check=True
     ).stdout
     loops = re.findall(r"^ ([A-Z]{3}\d{4})", ranked, flags=re.MULTILINE)
+    wide = subprocess.run(
+        [*triage, "rank", str(tmp_path), "--wide"], capture_output=True, text=True, check=True
+    ).stdout
+    printed, shown = headings(wide), headings(README)
+    assert [name for name in printed if name in shown] == shown
     assert set(loops[:12]) >= {"LIC2102", "LIC2105", "LIC2107", "TIC2104", "TIC2106", "FIC2110", "FIC2122"}
     held = Store(tmp_path)
     columns = ["loop", "cause", "source_loop", "master", "ratio_of", "oscillating_pct"]

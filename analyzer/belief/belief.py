@@ -25,6 +25,7 @@ from analyzer.belief.valve import ValveBelief, Witness
 from analyzer.belief.wear import PhaseKnown, Width, forgotten, with_repetitions
 from analyzer.columns import Row
 from analyzer.config import BeliefLimits, Config
+from analyzer.loop import action
 from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, Status, counts
 from identification.estimation.backlash_stiction import WIDTHS
 
@@ -34,13 +35,6 @@ CONSTANTS = ("slope", "time_constant_s", "gain", "dead_time_s", "width", "slip_j
 """Constants that nights pool."""
 OF_VALVE = ("width", "slip_jump")
 """Those of them that a repair changes."""
-FIRST = (Action.CHECK_MEASUREMENT, Action.CHECK_SETTINGS, Action.CHECK_LIMIT)
-"""What is told in the night that finds it: no settings of other nights hold where these are not known."""
-AGAINST = {
-    Cause.VALVE: (Action.REPAIR_VALVE, Action.CHECK_SETTINGS),
-    Cause.TUNING: (Action.UNDECIDED, Action.CHECK_SETTINGS, Action.NEEDS_DATA),
-}
-"""What is done against a cause where no settings are, the first unless the nights vote for another of them."""
 GIST = attrgetter("cause", "fault", "action", "source")
 """What makes a difference between what two tell."""
 
@@ -64,12 +58,15 @@ class Told:
 
 @dataclass(frozen=True, slots=True)
 class Calm:
-    """What the loop did under the settings before: the last night, significance [% h], share [%] and period [s]."""
+    """What a loop did in its last night under some settings: significance [% h], share [%] and period [s] of its
+    oscillation, amplitude of PV and average absolute error [% of span]."""
 
     night: str
     significance: float
     oscillating_pct: float
     period_s: float | None
+    amplitude_pct: float | None = None
+    error_pct: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +149,8 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], config: C
     ended = before is not None and before.cycle.loud and not found.loud
     done = cycle.remedy_with_night(RemedyBelief() if ended else now.remedy, share, row, limits)
     size, share_pct = float(row["oscillation_significance"] or 0.0), float(row["oscillating_pct"])
-    seen = Calm(row["night"], size, share_pct, row["period_s"])
+    sizes = row["period_s"], row["pv_amplitude_pct"], row["average_absolute_error_pct"]
+    seen = Calm(row["night"], size, share_pct, *sizes)
     phases = with_repetitions(now.phases, row, limits.repetitions)
     now = replace(now, night=row["night"], end_s=_span(row)[1], remedy=done, last=seen, phases=phases)
     return replace(now, kp=row["kp"], ti=row["ti"], told=tell(now, row, limits))
@@ -258,8 +256,7 @@ def tell(now: Belief, row: Row, limits: BeliefLimits) -> Told:
 def _left_alone(told: Told) -> Told:
     """Of a loop whose worn valve makes far less of a cycle since its settings were changed: no further settings, and
     the repair at the next shutdown."""
-    urgent = told.action is Action.RETUNE or (told.action is Action.REPAIR_VALVE and told.due is Due.NOW)
-    if not urgent:
+    if not action.is_urgent(told.action, told.due):
         return told
     return replace(told, action=Action.REPAIR_VALVE, due=Due.SHUTDOWN, pair=None, calmed=True)
 
@@ -267,9 +264,9 @@ def _left_alone(told: Told) -> Told:
 def _own(row: Row) -> Told:
     """What a night says by itself."""
     confidence = {c: row[f"osc_{c}_pct"] for c in CAUSES if row[f"osc_{c}_pct"] is not None}
-    action, due = Action(row["action"]) if row["action"] else None, Due(row["due"]) if row["due"] else None
+    advised, due = Action(row["action"]) if row["action"] else None, Due(row["due"]) if row["due"] else None
     cause, fault, source = Cause(row["cause"]), Fault(row["valve_fault"]), row["source_loop"]
-    return Told(cause, confidence, fault, source, action, due, cycle.advised_pair(row))
+    return Told(cause, confidence, fault, source, advised, due, cycle.advised_pair(row))
 
 
 def _of_calm(now: Belief, own: Told, limits: BeliefLimits) -> Told:
@@ -277,14 +274,14 @@ def _of_calm(now: Belief, own: Told, limits: BeliefLimits) -> Told:
     if now.valve.is_worn(limits):
         fault = now.valve.fault(now.told.fault)
         confidence = {**own.confidence, Cause.VALVE: now.valve.worn_pct(limits)}
-        if own.action in FIRST:
+        if own.action in action.FIRST:
             return Told(Cause.VALVE, confidence, fault, None, own.action)
         due = own.due or Due.SHUTDOWN  # a slave that moves its master cannot wait
         return Told(Cause.VALVE, confidence, fault, None, Action.REPAIR_VALVE, due)
     if own.cause is not Cause.VALVE:
         return own
-    action = Action.NONE if own.action is Action.REPAIR_VALVE else own.action
-    return Told(Cause.NONE, own.confidence, Fault.NONE, None, action)
+    left = Action.NONE if own.action is Action.REPAIR_VALVE else own.action
+    return Told(Cause.NONE, own.confidence, Fault.NONE, None, left)
 
 
 def _of_cycle(now: Belief, own: Told, limits: BeliefLimits) -> Told:
@@ -302,24 +299,13 @@ def _of_cycle(now: Belief, own: Told, limits: BeliefLimits) -> Told:
     if cause is Cause.UNDECIDED and fault is Fault.NONE:
         fault = own.fault if own.fault is Fault.UNDECIDED else Fault.NONE
     told = Told(cause, confidence, fault)
-    return _with_remedy(now, own, told, limits)
+    return _with_remedy(now, own, told)
 
 
-def _with_remedy(now: Belief, own: Told, told: Told, limits: BeliefLimits) -> Told:
+def _with_remedy(now: Belief, own: Told, told: Told) -> Told:
     """What to do about a cycle of a cause."""
-    if own.action in FIRST or own.due is Due.SHUTDOWN:
-        return replace(told, action=own.action, due=own.due)
-    worn = told.fault in (Fault.BACKLASH, Fault.STICTION)
-    if told.cause not in (Cause.VALVE, Cause.TUNING):
-        if worn:
-            return replace(told, action=Action.REPAIR_VALVE, due=Due.SHUTDOWN)
-        if told.cause is Cause.LOAD:
-            followed = own.cause is not Cause.LOAD or own.action is Action.SEE_SOURCE_LOOP
-            return replace(told, action=Action.FIND_DISTURBANCE if followed else own.action)
-        return replace(told, action=now.remedy.abstaining)
-    action, held = now.remedy.action, now.remedy.held
-    if action is Action.RETUNE and held is not None:
-        return replace(told, action=action, pair=held)
-    usual, *others = AGAINST[told.cause]
-    action = action if action in others else usual
-    return replace(told, action=action, due=Due.NOW if action is Action.REPAIR_VALVE else None)
+    worn, done = told.fault in (Fault.BACKLASH, Fault.STICTION), now.remedy
+    voted = None if done.action is Action.RETUNE and done.held is None else done.action
+    alone = own.cause, own.action, own.due
+    chosen, due = action.of_nights(told.cause, worn, alone, voted, action.of_votes(done.votes))
+    return replace(told, action=chosen, due=due, pair=done.held if chosen is Action.RETUNE else None)

@@ -171,12 +171,6 @@ class RemedyBelief:
     advised: int = 0
     settled: int = 0
 
-    @property
-    def abstaining(self) -> Action:
-        """What is told where no cause is: that which most nights lacked something, or that their signs disagree."""
-        lacking, disagreeing = (self.votes.get(a, 0.0) for a in (Action.NEEDS_DATA, Action.UNDECIDED))
-        return Action.NEEDS_DATA if lacking > disagreeing else Action.UNDECIDED
-
 
 def remedy_with_night(before: RemedyBelief, share: float, row: Row, limits: BeliefLimits) -> RemedyBelief:
     """The belief with one night more, of which what came before counts for a share."""

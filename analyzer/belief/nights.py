@@ -28,6 +28,7 @@ READ = (
     *("loop", "night", "status", "start_s", "duration_s"),
     *("kp", "ti", "form", "gain_unit", "ti_unit", "op_unit"),
     *("oscillation_significance", "oscillating_pct", "period_s", "cause", "valve_fault", "source_loop"),
+    *("pv_amplitude_pct", "average_absolute_error_pct"),
     *("master", "lack", *(f"osc_{c}_pct" for c in CAUSES)),
     *("action", "due", "kp_new", "ti_new", "advice", "expected_period_s", "expected_pv_amplitude_pct"),
     *("lanes", "reason", "straight_pct", "witness", "evidence", "settings_changed", "experiment"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,20 +65,25 @@ def explain(
     Example: triage explain export.parquet --loops loops.csv --loop FIC101
     """
     from analyzer.explain.case import asked_cases
-    from analyzer.explain.explained import abstained, explained, with_decision
+    from analyzer.explain.explained import abstained, explained, with_night
     from analyzer.explain.models import read_model
     from analyzer.explain.page import abstention, explanation_page
+    from analyzer.night.asked import guarded
 
+    decision = None
     try:
         with trying() as tell:
             brought = read_model(model, tag) if model is not None else None
-            case, others = asked_cases(asked, tag, held_out)
-            found = with_decision(explained(case, tell, brought, others), decision_of(asked, tag, store))
+            plant = guarded(asked)
+            decision = decision_of(plant, tag, store)
+            case, others = asked_cases(asked, plant, tag, held_out)
+            found = explained(case, tell, brought, others)
     except NotAssessedError as error:
-        data = abstained(tag, str(error))
+        data = with_night(abstained(tag, str(error)), decision)
         _show(data, lambda: abstention(data), form, out)
         click.echo(f"triage: {error}", err=True)
         sys.exit(NOTHING_DONE)
+    found = replace(found, data=with_night(found.data, decision))
     if save_model is not None:
         save_model.write_text(json.dumps(found.model(), indent=1))
     _show(found.data, lambda: explanation_page(found, asked.zone), form, out)

@@ -23,8 +23,8 @@ from reports.whole_file import is_full
 
 if TYPE_CHECKING:
     from analyzer.columns import Row
-    from analyzer.night.asked import Asked
-    from analyzer.night.nights import PlantLoop
+    from analyzer.night.decided import Decided
+    from analyzer.night.nights import Plant, PlantLoop
     from analyzer.store.store import Store
 
 Command = Callable[..., Any]
@@ -153,7 +153,7 @@ DECIDED = click.option(
 )
 
 
-def decision(one: PlantLoop, store: Path | None) -> Row:
+def decision(one: PlantLoop, store: Path | None) -> Decided:
     """What the night of a loop decided of it, by a store or by that night alone."""
     from analyzer.night.decided import decided
 
@@ -161,12 +161,10 @@ def decision(one: PlantLoop, store: Path | None) -> Row:
     return decided(one.plant, one.night, one.spec.loop, None if store is None else opened_store(store))
 
 
-def decision_of(asked: Asked, loop: str, store: Path | None) -> Row | None:
-    """The same of a loop's last night in an export; None where that night has too little of it."""
-    from analyzer.night.asked import guarded
-
+def decision_of(plant: Plant, loop: str, store: Path | None) -> Row | None:
+    """The row of a loop's last night in an export; None where that night has too little of it."""
     with suppress(NotAssessedError):
-        return decision(guarded(asked).last_night(loop), store)
+        return decision(plant.last_night(loop), store).row
     return None
 
 

@@ -25,7 +25,7 @@ from analyzer.loop.cause import NO_CAUSE, Verdict
 from analyzer.loop.cycling_span import detect_where_it_cycles
 from analyzer.loop.decisions import Cause, Fault
 from analyzer.loop.experiments import Learned, learned
-from analyzer.loop.fitness import pv_that_jumps
+from analyzer.loop.fitness import at_limits, pv_that_jumps
 from analyzer.loop.identified import intervals
 from analyzer.loop.oscillation import counting
 from analyzer.loop.quality import Prepared, prepare
@@ -34,7 +34,7 @@ from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import controller
 from analyzer.night.asked import Asked, guarded
-from analyzer.night.nights import ALWAYS, Night, cut
+from analyzer.night.nights import ALWAYS, Night, Plant, cut
 from identification.controller.check import StatedSettings
 from identification.errors import InputError, NotAssessedError
 from identification.estimation.evidence import trials_between_moves
@@ -172,9 +172,9 @@ def case(
         raise NotAssessedError(f"{spec.loop}: needs OP, has none")
     if float(np.ptp(r.op)) == 0 or float(np.ptp(r.pv)) == 0:
         raise NotAssessedError(f"{spec.loop}: needs OP and PV that move, one of them stands still")
-    jumps = pv_that_jumps(r, config.explain.recorder)
-    if jumps is not None:
-        raise NotAssessedError(f"{spec.loop}: {jumps}")
+    lacks = pv_that_jumps(r, config.explain.recorder) or at_limits(r, config.quality)
+    if lacks is not None:
+        raise NotAssessedError(f"{spec.loop}: {lacks}")
     stamps = raw.stamp_s[~raw.bad]
     stamps = stamps[(stamps >= r.start_s - r.dt_s) & (stamps <= r.start_s + r.duration_s)]
     verdict = verdict_on(spec, whole, config)
@@ -214,14 +214,15 @@ def subject_of(
 ) -> Recording:
     """What is explained of a prepared record, beside what a night says of it and the OPs of its neighbours."""
     r = prepared.record
+    judged = float(r.usable.mean()) >= config.quality.usable_share  # else OP is mostly an operator's
     return Recording(
-        None if r.sp_estimated else r.sp,
+        r.sp if judged and not r.sp_estimated else None,
         r.pv,
         r.op,
         ~(r.bad | r.mask("gap")),
         r.dt_s,
         stamps,
-        stated_law(spec, prepared) if prepared.shared is None else None,
+        stated_law(spec, prepared) if judged and prepared.shared is None else None,
         not prepared.scale.recorded,
         others,
         spec.type.strip().lower(),
@@ -273,7 +274,7 @@ def parts_said(judged: Sequence[Part]) -> str:
     return f"Settings changed within the recording: explained on {judged[0].name}, held out on {rest}."
 
 
-def loop_trends(asked: Asked, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...], dict[str, Series]]:
+def loop_trends(plant: Plant, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...], dict[str, Series]]:
     """A loop of an export, all loops of it, and the trends that explaining it reads.
 
     Raises
@@ -281,7 +282,6 @@ def loop_trends(asked: Asked, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...],
     InputError
         The export has no such loop, no PV of it, or no samples of PV in the span that is asked for.
     """
-    plant = guarded(asked)
     specs = plant.specs
     spec = spec_of(specs, tag)
     if spec.pv is None:
@@ -297,15 +297,18 @@ def loop_trends(asked: Asked, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...],
 
 def whole(asked: Asked, tag: str) -> tuple[Case, Series]:
     """A loop's case over all of an export, under its last settings, and its PV."""
-    spec, specs, series = loop_trends(asked, tag)
+    spec, specs, series = loop_trends(guarded(asked), tag)
     pv = series[spec.pv or ""]
     spec = in_force(spec, asked.changes, float(pv.stamp_s[-1]))
     return case(spec, specs, series, asked.config, None), pv
 
 
-def asked_cases(asked: Asked, tag: str, held_out: Sequence[Path]) -> tuple[Case, dict[str, Case]]:
-    """The case to be explained, and those held out by name: parts under other settings, and other exports."""
-    spec, specs, series = loop_trends(asked, tag)
+def asked_cases(
+    asked: Asked, plant: Plant, tag: str, held_out: Sequence[Path]
+) -> tuple[Case, dict[str, Case]]:
+    """The case to be explained, and those held out by name: parts under other settings, and other exports; plant,
+    what is asked, opened."""
+    spec, specs, series = loop_trends(plant, tag)
     judged = parts(spec, series, asked.changes, asked.zone)
     kept: list[tuple[Part, Case]] = []
     for part in judged:

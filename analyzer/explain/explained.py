@@ -88,11 +88,9 @@ def explained(
     return Explained(c, found, said, data, own)
 
 
-def with_decision(found: Explained, decision: Row | None) -> Explained:
-    """The same with what the night decided of the loop, to which the physics may only add."""
-    if decision is None:
-        return found
-    return replace(found, data=found.data | {"night": json_ready(decision_data(decision))})
+def with_night(data: dict[str, Any], decision: Row | None) -> dict[str, Any]:
+    """An answer with what the night decided of the loop, to which the physics may only add."""
+    return data if decision is None else data | {"night": json_ready(decision_data(decision))}
 
 
 def experiment_data(of: Learned) -> dict[str, Any]:

@@ -71,15 +71,18 @@ def _footer(e: Explained) -> str:
 
 def _verdict_blocks(e: Explained) -> tuple[Block | None, ...]:
     brought = None if e.brought is None else Text((e.brought.note,))
-    night = Text((decided(e.data),)) if "night" in e.data else None
-    return Text((e.data["reason"],), "lead"), night, Text((check(e.data),)), brought, Tiles(tuple(_tiles(e)))
+    night = e.data.get("night")
+    first = None if night is None else Text((decided(e.data),), "lead")
+    beside = "" if night is None else words.beside_night(night, e.data["verdict"], e.data["block"])
+    said = tuple(filter(None, (beside, words.no_better(e.data), check(e.data))))
+    return first, Text((e.data["reason"],), "lead"), Text(said), brought, Tiles(tuple(_tiles(e)))
 
 
 def _tiles(e: Explained) -> list[tuple[str, str, str]]:
     d, (plain, better) = e.data, e.found.proven.overall
     seat = "where to look first" if d["verdict"] == "unexplained" else "where it sits"
     tiles = [(d["block"], seat, "")] if d["block"] != "none" else []
-    if e.found.accepted:
+    if e.found.accepted and words.improves(d):
         horizon = d["fit"]["horizon_s"]
         over = f"within windows of {duration(horizon)}" if horizon else "over the recording"
         both, less = f"{rms(plain.rmse)} → {rms(better.rmse)}", "better" if e.found.proven.falls else ""
@@ -88,7 +91,7 @@ def _tiles(e: Explained) -> list[tuple[str, str, str]]:
         rest = ": load and noise" if d["verdict"] == "none" else ""
         tiles.append((rms(plain.rmse), f"rms misfit of the plain simulation{rest}", ""))
     held = next((x["held_out_share"] for x in d["effects"] if x["held_out_share"] is not None), None)
-    if held is not None:
+    if held is not None and not words.no_better(d):
         tiles.append((share(held), "of the misfit on held-out data removed", "better"))
     for first in d["effects"][:1]:
         if first["alternatives"]:

@@ -23,7 +23,13 @@ def answer_lines(data: Mapping[str, Any]) -> list[str]:
     fit = data["fit"]
     head = f"{data['loop']}: {title(data['verdict']) if fit else 'not told'}"
     block = f" ({data['block']})" if data["block"] != "none" else ""
-    out = [head + block, *wrap(decided(data), WIDTH), *wrap(data["reason"], WIDTH), *wrap(check(data), WIDTH)]
+    night = data.get("night")
+    out = [*wrap(decided(data), WIDTH), ""] if night else []
+    beside = words.beside_night(night, data["verdict"], data["block"]) if night and fit else ""
+    out += [
+        head + block,
+        *(line for text in (data["reason"], beside, check(data)) for line in wrap(text, WIDTH)),
+    ]
     out += _part("Parameters (90 % intervals)", _texts(words.parameters(data)), (2,))
     out += _part("Controller, as SP, PV and OP show it", _controller_rows(data), (1,))
     simulations = _headed(("", "fitted", "fit %", "held out", "fit %"), _texts(words.misfits(data)))
@@ -34,10 +40,10 @@ def answer_lines(data: Mapping[str, Any]) -> list[str]:
     removed = [
         f"{first['name']} removes {share(first['held_out_share'])} of the held-out misfit's mean square."
         for first in data["effects"][:1]
-        if first["held_out_share"] is not None
+        if first["held_out_share"] is not None and not words.no_better(data)
     ]
     brought = fit.get("brought", {}).get("note", "")
-    for sentence in filter(None, (*remarks(fit), brought, *removed)):
+    for sentence in filter(None, (words.no_better(data), *remarks(fit), brought, *removed)):
         out += ["", *wrap(sentence, WIDTH)]
     out += _part("Where", _where_rows(data))
     moved = [(name, before, "→", after, unit) for name, before, after, _, unit in _texts(words.moved(data))]

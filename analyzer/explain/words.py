@@ -7,8 +7,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from analyzer.lanes.lanes import lanes_in
 from analyzer.limits import EXPLAIN
-from analyzer.loop.decisions import Cause, Fault
+from analyzer.loop.decisions import Action, Cause, Fault, Lane
 from analyzer.pages.words import duration, number, page_columns, plain_cell, texts
 from identification.mismatch import effect
 from identification.mismatch.catalogue import EFFECTS
@@ -92,23 +93,50 @@ def parameters(data: Data) -> Table:
     return Table("parameters", "Parameters", page_columns("effects_found"), rows)
 
 
+def improves(data: Data) -> bool:
+    """Whether the model with what was found simulates held-out data better than the plain one."""
+    plain, better = (data["fit"].get(k, {}).get("held_out") for k in ("baseline", "explained"))
+    return bool(data["moved"]) and better["rmse"] < plain["rmse"]
+
+
+def no_better(data: Data) -> str:
+    """That a model with what was found is no better on held-out data; '' where it is, or nothing was found."""
+    if not data["moved"] or improves(data):
+        return ""
+    plain, better = (rms(data["fit"][k]["held_out"]["rmse"]) for k in ("baseline", "explained"))
+    return str(NOTES["no_better"].format(name=data["effects"][0]["name"], plain=plain, better=better))
+
+
+def _constants(data: Data) -> dict[str, tuple[float, float]]:
+    """The constants that moved; gain over time constant where these moved so far that only their ratio is known."""
+    known = dict(data["moved"])
+    if any(a and abs(b / a) > EXPLAIN.ratio_alone for a, b in (known["gain"], known["time_constant_s"])):
+        gain, lag = (known.pop(k) for k in ("gain", "time_constant_s"))
+        slope = tuple(k / t if t else math.nan for k, t in zip(gain, lag, strict=True))
+        known = {"slope_pct_per_s": slope, **known}
+    return known
+
+
 def moved(data: Data) -> Table:
-    """The plain loop's constants before and after."""
-    named = TOLD["constants"]
+    """The plain loop's constants before and after, where the model with what was found is the better one."""
+    named, known = TOLD["constants"], _constants(data) if improves(data) else {}
     rows = tuple(
         (Cell(named[k]["title"]), plain_cell(a), plain_cell(b), Cell(change(a, b)), Cell(named[k]["unit"]))
-        for k, (a, b) in data["moved"].items()
+        for k, (a, b) in known.items()
     )
-    most = max((abs(b / a - 1) if a else 0.0 for a, b in data["moved"].values()), default=0.0)
+    most = max((abs(b / a - 1) if a else 0.0 for a, b in known.values()), default=0.0)
     note = NOTES["kept" if most < EXPLAIN.hardly else "bent"]
     return Table("moved", "How the plain loop's constants moved", page_columns("constants_moved"), rows, note)
 
 
 def misfits(data: Data, note: str = "") -> Table:
     """Misfit of the simulations, fitted and held out."""
+    named = {k: ROWS[k] for k in ("baseline", "explained", "brought")}
+    if no_better(data):
+        named["explained"] = ROWS["no_better"]
     rows = [
         (Cell(name), *(cell for m in (fit["fitted"], fit["held_out"]) for cell in (_rms(m), _fit(m))))
-        for key, name in ROWS.items()
+        for key, name in named.items()
         if (fit := data["fit"].get(key)) and (key != "explained" or data["moved"])
     ]
     return Table("fit", "", page_columns("simulations"), tuple(rows), note)
@@ -177,6 +205,18 @@ def _standing(c: Candidate, taken: set[str]) -> str:
     if c.name in taken:
         return "taken"
     return "does not pay" if c.penalised <= 0 else "less, or not proven"
+
+
+def beside_night(row: Mapping[str, Any], verdict: str, block: str) -> str:
+    """One sentence on how what a night found and the explanation go together; '' where there is nothing to say."""
+    told = TOLD["beside_verdict"]
+    if row["action"] == Action.CHECK_MEASUREMENT and Lane.FROZEN in lanes_in(row):
+        return str(told["frozen"])
+    if row["cause"] == Cause.LOAD and block not in (Block.VALVE, Block.LOAD):
+        return str(told["load"])
+    if row["cause"] == Cause.NONE and row["action"] == Action.NONE and verdict != "none":
+        return str(told["calm"])
+    return agreement(row, verdict, block)
 
 
 def agreement(row: Mapping[str, Any], verdict: str, block: str) -> str:

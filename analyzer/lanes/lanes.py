@@ -11,7 +11,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from analyzer.loop.decisions import Action, Cause, Finding, Lack, Lane, Status
+from analyzer.loop.action import decided
+from analyzer.loop.decisions import Action, Cause, Finding, Lack, Lane
 from analyzer.words.units import duration
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ def _frozen(found: Finding) -> str:
 
 
 def _travels(found: Finding) -> str:
-    return f"OP travels {found.number('valve_travel_pct_per_h'):.0f} %/h"
+    return f"{found.text('travel_of') or 'OP'} travels {found.number('valve_travel_pct_per_h'):.0f} %/h"
 
 
 HIDE_SLOW = frozenset({Lane.OSCILLATION, Lane.AT_LIMIT, Lane.FROZEN})
@@ -125,36 +126,21 @@ FIGURE: Mapping[Lane, str] = {r.lane: r.figure for r in RULES}
 """The column that each lane is ranked by, the largest first."""
 SAID: Mapping[Lane, Callable[[Finding], str]] = {r.lane: r.said for r in RULES if r.said is not None}
 """One clause a lane."""
-NOTHING_SURER = (None, Action.NONE, Action.NEEDS_DATA, Action.CHECK_SETTINGS)
-"""Actions in whose place a doubtful measurement is looked at first: what rests on it is doubtful too."""
-
-
-NOTHING_ELSE = (Action.NONE, Action.UNDECIDED)
-"""Actions in whose place it is found out what holds OP at its limit."""
 
 
 def in_lanes(found: Finding, limits: LaneLimits) -> Finding:
-    """A loop with the lanes that its figures put it into."""
+    """A loop with the lanes that its figures put it into, and what they make of its action."""
     standing = {r.lane for r in RULES if r.stands(found, limits)}
-    return replace(
-        found, lanes=tuple(r.lane for r in RULES if r.lane in standing and not r.hidden_by & standing)
-    )
+    lanes = tuple(r.lane for r in RULES if r.lane in standing and not r.hidden_by & standing)
+    told = replace(found, lanes=lanes)
+    return decided(told, is_doubtful(told))
 
 
-def action_of(found: Finding) -> Action | None:
-    """What to do, or what a lane asks for where nothing else is to be done; what holds OP at its limit has to be
-    found out first, and an output that winds up is no matter of gain and integral time."""
-    action, lanes = found.remedy.action, found.lanes
-    if found.status is Status.NOT_ASSESSED and action is None:
-        action = Action.NEEDS_DATA
-    if action in NOTHING_SURER and found.status is not Status.FAILED:
-        asks = [r.lane for r in RULES if r.of_measurement and r.lane in lanes]
-        explained = Lane.AT_LIMIT in lanes or _offset(found)
-        if asks and not (asks == [Lane.LASTING_ERROR] and explained):
-            return Action.CHECK_MEASUREMENT
-    if action in NOTHING_ELSE and {Lane.AT_LIMIT, Lane.WINDUP} & set(lanes):
-        return Action.CHECK_LIMIT
-    return action
+def is_doubtful(found: Finding) -> bool:
+    """Whether a loop's lanes ask for a look at its measurement."""
+    asks = [r.lane for r in RULES if r.of_measurement and r.lane in found.lanes]
+    explained = Lane.AT_LIMIT in found.lanes or _offset(found)
+    return bool(asks) and not (asks == [Lane.LASTING_ERROR] and explained)
 
 
 def lanes_in(row: Mapping[str, Any]) -> tuple[str, ...]:

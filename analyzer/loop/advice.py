@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 
 from analyzer.config import AdviceLimits, Config
+from analyzer.loop import action
 from analyzer.loop.agreement import agreement
 from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
@@ -101,7 +102,7 @@ def advise(
     if proposal.action is Action.UNDECIDED and found.verdict.cause is Cause.VALVE:
         proposal = replace(proposal, action=Action.REPAIR_VALVE)
     elif proposal.action is Action.UNDECIDED:
-        return _lacking(Needs(Lack.LONGER, Need.LONGER, (proposal.reason,)))
+        return _lacking(Needs(Lack.STEP_TEST, Need.STEP_TEST, (proposal.reason,)))
     beside = None
     if proposed.loop is not None and proposed.load is not None:
         known = proposed.loop, proposed.load, held or proposal.new, oscillation.period_s, pv_span
@@ -140,9 +141,7 @@ def _or_repair(verdict: Verdict, other: Advice) -> Advice:
 
 def _lacking(needs: Needs) -> Advice:
     """The advice to get more data, or a test where no data tell, with what is lacking."""
-    others = {Lack.MANUAL_TEST: Action.UNDECIDED, Lack.SWITCHES: Action.NONE}
-    action = others.get(needs.lack, Action.NEEDS_DATA) if needs.lack is not None else Action.NEEDS_DATA
-    return Advice(action, str(needs), lack=needs.lack)
+    return Advice(action.for_lack(needs.lack), str(needs), lack=needs.lack)
 
 
 def withheld(

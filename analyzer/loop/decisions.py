@@ -120,6 +120,8 @@ class Lack(StrEnum):
     FINER = "finer values"
     LONGER = "longer record"
     MANUAL_TEST = "some periods in manual"
+    STEP_TEST = "a step test"
+    NEIGHBOUR = "a night after another loop is mended"
 
 
 class Need(StrEnum):
@@ -150,7 +152,7 @@ class Need(StrEnum):
     OF_SETTINGS = auto()
     FINER = auto()
     HOURS = auto()
-    LONGER = auto()
+    STEP_TEST = auto()
     LOAD_IN_MANUAL = auto()
     TUNING_IN_MANUAL = auto()
     AS_TOLD = auto()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from analyzer.loop.action import OPEN
 from analyzer.loop.conclusion import stated
 from analyzer.loop.decisions import Action, Cause, Cell, Fault, Finding, Needs, Remedy, Status
 from analyzer.loop.experiments import Learned, as_rows, chosen, model_row, with_constants
@@ -16,8 +17,6 @@ from identification.models import Pid
 from tuning.search import rounded
 
 SAID = sentences("experiments")
-OPEN = (None, Action.NEEDS_DATA, Action.UNDECIDED)
-"""Actions in whose place settings from an experiment are proposed."""
 
 
 def remedy_of(of: Learned, spec: LoopSpec, present: Pid | None) -> Remedy:

@@ -25,6 +25,8 @@ FINE_BUCKETS = 6000
 """Buckets a day of a loop that oscillates, so that its cycle can be zoomed into."""
 PERIODS = 10.0
 """Periods of the close view that a page opens on."""
+TYPICAL = 0.2
+"""How far the amplitude of typical periods lies from the usual one, over that [-]; ours."""
 CLOSE_BUCKETS = 600
 """Buckets of the close view at most, 60 a period; fewer where the record has fewer samples."""
 HALVES = 10
@@ -34,15 +36,29 @@ SEARCHED_PERIODS = 30.0
 
 
 def close_view(part: LoopRecord, found: Oscillations, before: int) -> tuple[int, int] | None:
-    """First and last sample (excluded) of the last ten periods of the oscillation in a part of a record, of which so
-    many samples are before it; None where there is none."""
+    """First and last sample (excluded) of the last ten typical periods of the oscillation in a part of a record, of
+    which so many samples are before it; None where there is none."""
     if found.first is None or found.active is None or not found.active.any():
         return None
     skipped = len(part) * part.dt_s - found.active.size * found.active_dt_s
-    end_s = skipped + (int(np.flatnonzero(found.active)[-1]) + 1) * found.active_dt_s
+    count = max(round(PERIODS * found.first.period_s / found.active_dt_s), 1)
+    end_s = skipped + _last_typical(found.active, found.level, count) * found.active_dt_s
     last = min(round(end_s / part.dt_s), len(part))
     first = max(last - round(PERIODS * found.first.period_s / part.dt_s), 0)
     return (before + first, before + last) if last - first > 2 else None
+
+
+def _last_typical(active: np.ndarray, level: np.ndarray | None, count: int) -> int:
+    """End of the last `count` samples in which an oscillation is on all the time and about as large as it mostly is;
+    else the end of what is on."""
+    end = int(np.flatnonzero(active)[-1]) + 1
+    if level is None or active.size <= count:
+        return end
+    sums = [np.concatenate(([0.0], np.cumsum(x))) for x in (active, np.where(active, level, 0.0))]
+    on, size = ((x[count:] - x[:-count]) / count for x in sums)
+    usual = float(np.median(level[active]))
+    typical = np.flatnonzero((on == 1.0) & (np.abs(size - usual) <= TYPICAL * usual))
+    return int(typical[-1]) + count if typical.size else end
 
 
 def _edges(n: int, buckets: int, close: tuple[int, int] | None) -> np.ndarray:
@@ -62,7 +78,8 @@ def _edges(n: int, buckets: int, close: tuple[int, int] | None) -> np.ndarray:
 def thinned(
     record: LoopRecord, a_day: int = BUCKETS, close: tuple[int, int] | None = None
 ) -> Mapping[str, np.ndarray]:
-    """Columns time_s and, for SP, PV and OP, least and greatest of each bucket [% of span], shape (b,).
+    """Columns time_s and, for SP, PV and OP, least and greatest of each bucket [% of span], shape (b,); bad, manual
+    and frozen: True where all of a bucket is; a PV that stands still is not bad, for it is drawn.
 
     Buckets are the record's own samples where there are fewer of these, and finer between the samples of `close`.
     """
@@ -74,8 +91,9 @@ def thinned(
         for end, least_or_greatest in (("min", np.minimum), ("max", np.maximum)):
             found = least_or_greatest.reduceat(getattr(record, name), edges)
             out[f"{name}_{end}"] = found.astype(np.float32)
-    out["bad"] = np.logical_and.reduceat(record.bad, edges)
-    return out
+    frozen = record.mask("stale")
+    masks = {"bad": record.bad & ~frozen, "manual": record.mask("manual"), "frozen": frozen}
+    return out | {name: np.logical_and.reduceat(x, edges) for name, x in masks.items()}
 
 
 def _marks(faulty: Fit | None, fit: Fit | None, period_s: float) -> StemMarks:

@@ -16,6 +16,7 @@ from reports.pages import as_held
 from tuning.forecast import RECOMMENDED, REPAIRED, Tried, alternatives, loop_in_digits, tried
 from tuning.frequency_response import integral_s
 from tuning.harmonic_balance import TravelMap, travel_map
+from tuning.limit_cycle import confirm
 from tuning.limits import TuningLimits
 from tuning.rules import simc
 from tuning.search import Candidate, bench, rejection, try_out
@@ -46,7 +47,7 @@ class Comparison:
     travel, None where the valve is free; pv_span, that of PV in its own unit; peaks, largest error after a unit step
     of load at the valve, over the present one, by name [-]; everywhere, each on all loops that the data allow, by
     name; curve, what no other settings beat in travel and in error, the calmest first; repaired, the present settings
-    behind a free valve, None where it is free or rests.
+    behind a free valve, None where it is free or rests, or the loop does not cycle as it was recorded.
     """
 
     loop: Loop
@@ -96,6 +97,13 @@ def _beaten(name: str, everywhere: Mapping[str, Candidate]) -> bool:
     return best.worst_travel <= own.worst_travel + LOOP.same_travel and best.worst_error <= own.worst_error
 
 
+def cycles_as(loop: Loop, period_s: float) -> bool:
+    """Whether simulation finds the recorded cycle at the present settings, so that what it says of another valve
+    can be believed."""
+    found = confirm(loop).cycle
+    return found is not None and abs(math.log(found.period_s / period_s)) <= math.log(LOOP.cycle_within)
+
+
 def compared(
     loop: Loop,
     load: Floats,
@@ -120,7 +128,9 @@ def compared(
     everywhere = {name: try_out(table, pid) for name, pid in settings.items()} if moves else {}
     settings = {k: pid for k, pid in settings.items() if k not in found.chosen or not _beaten(k, everywhere)}
     now, each = rejection(loop.process, loop.controller), tried(loop, load, settings)
-    free = None if loop.valve is None or not moves else replace(loop, valve=None)
+    free = (
+        replace(loop, valve=None) if loop.valve is not None and moves and cycles_as(loop, period_s) else None
+    )
     return Comparison(
         loop,
         load,

@@ -10,6 +10,7 @@ import numpy as np
 from analyzer.columns import Row
 from analyzer.config import AdviceLimits, Config
 from analyzer.limits import EXPLAIN
+from analyzer.loop.action import AGAINST
 from analyzer.loop.advice import Advice, propose, sought_for, withheld
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.decisions import Action, Cause, Need, Needs, Status
@@ -21,7 +22,7 @@ from analyzer.loop.sample_clock import onto_clock
 from analyzer.loop.settings_side_by_side import compared, middle_ti
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
-from analyzer.words import experiments
+from analyzer.words import experiments, sentences
 from analyzer.words.decision import as_data, decision_lines
 from analyzer.words.reason import sign_in_full
 from analyzer.words.units import number
@@ -34,9 +35,10 @@ from tuning.forecast import Forecast, in_digits, loop_in_digits, predict, run
 from tuning.frequency_response import is_stable, slowest_s
 from tuning.harmonic_balance import curves, travel_map
 from tuning.limit_cycle import Confirmed, confirm
-from tuning.recommend import Proposal
+from tuning.recommend import WHY, WITHOUT_SETTINGS, Proposal
 
 if TYPE_CHECKING:
+    from analyzer.night.decided import Decided
     from analyzer.night.nights import PlantLoop
 
 MAP_POINTS = 36
@@ -203,7 +205,7 @@ def _map_field(t: Tuning, title: str) -> Field:
     found = travel_map(t.model, kp, np.geomspace(now_s / 4, top, MAP_POINTS))
     places = [Place(abs(c.kp), now_s, "now", "now")]
     places += [Place(abs(new.kp), new.ti_s, "proposed", "recommended")] if new else []
-    return travel_field(found, places, f"{title}: predicted travel", "OP")
+    return travel_field(found, places, f"{title}: predicted travel of OP", "OP")
 
 
 def _trend_panels(t: Tuning, new: Pid, title: str) -> Panels:
@@ -249,22 +251,22 @@ class TuningReport:
         return data | {"text": self.lines}
 
 
-def proposal(one: PlantLoop, decision: Row, drawn: bool) -> TuningReport:
-    """What is told of one loop over a night of which `decision` is the row, with pictures if wanted. Raises
-    InputError where its settings are not known, NotAssessedError where its trends give no model and the night
-    decided nothing."""
+def proposal(one: PlantLoop, decision: Decided, drawn: bool) -> TuningReport:
+    """What is told of one loop over a night that decided `decision`, with pictures if wanted. Raises InputError where
+    its settings are not known, NotAssessedError where its trends give no model and the night decided nothing."""
     spec, stated = one.spec, one.controller
     taught = taught_by(one)
     shown = [] if taught is None else list(experiments.lines(taught, spec, stated, one.plant.zone))
     known = taught is not None and taught.model is not None
-    head = decision_lines(decision)
+    row = decision.row
+    head = decision_lines(row)
     try:
         told = _routine(one, stated, decision, drawn)
     except (InputError, NotAssessedError) as error:
-        decides = decision["status"] == Status.OK and not isinstance(error, InputError)
+        decides = row["status"] == Status.OK and not isinstance(error, InputError)
         if not known and not decides:
             raise
-        return TuningReport([*head, *shown, f"no model from routine operation: {error}"], {}, decision)
+        return TuningReport([*head, *shown, f"no model from routine operation: {error}"], {}, row)
     return replace(told, lines=[*head, *shown, *told.lines])
 
 
@@ -288,32 +290,38 @@ def _neighbours(one: PlantLoop, record: LoopRecord) -> tuple[Floats, ...]:
     return tuple(found)
 
 
-def _routine(one: PlantLoop, stated: Pid | None, decision: Row, drawn: bool) -> TuningReport:
-    """The same by what the loop does in automatic."""
+def _routine(one: PlantLoop, stated: Pid | None, decision: Decided, drawn: bool) -> TuningReport:
+    """The same by what the loop does in automatic; without a model where its cause is none of its own, for then the
+    load looks like the process."""
     spec, prepared, config, loop = one.spec, one.prepared, one.plant.config, one.spec.loop
     if stated is None:
         seen = f"{loop}: no kp and ti in loops.csv"
         raise InputError(seen, "both", "state them, so that new ones can be compared")
-    found = assess(prepared, stated, config, spec.type, one.earlier)
-    cause, text = Cause(decision["cause"] or Cause.NONE), []
+    row = decision.row
+    found = decision.found or assess(prepared, stated, config, spec.type, one.earlier)
+    cause, action = Cause(row["cause"] or Cause.NONE), Action(row["action"] or Action.NONE)
+    text = []
     if found.verdict.cause is cause:
-        text = [f"sign of {s.points_to}: {sign_in_full(s)}" for s in found.verdict.signs]
+        signs = [s for s in found.verdict.signs if s.points_to is cause]
+        text = [f"sign of {s.points_to}: {sign_in_full(s)}" for s in signs]
     else:  # as the plant, or other nights, have it
         found = replace(found, verdict=replace(found.verdict, cause=cause))
     if found.verdict.measured is None:
         limited = at_limits(prepared.record, config.quality) if prepared.op_known else None
         needs = limited or unfit_for_cause(prepared, None, config)  # the nearest first
         raise NotAssessedError(f"{loop}: {needs or found.verdict.needs or NO_MOVES}")
+    if cause not in AGAINST and action is not Action.RETUNE:
+        left = [WHY[cause]] if action is WITHOUT_SETTINGS[cause] else []
+        kind = "no_model_of_load" if cause is Cause.LOAD else "no_model"
+        return TuningReport([*text, *left, sentences("settings")[kind]], {}, row)
     new = None
-    if decision["action"] == Action.RETUNE:
-        new = controller_of(replace(spec, kp=decision["kp_new"], ti=decision["ti_new"]), prepared)
+    if action is Action.RETUNE:
+        new = controller_of(replace(spec, kp=row["kp_new"], ti=row["ti_new"]), prepared)
     kept = withheld(found, spec, stated, prepared.scale.span, config)
-    tuning = tune(found, stated, config, kept, (Action(decision["action"] or Action.NONE), new))
+    tuning = tune(found, stated, config, kept, (action, new))
     text += proposal_lines(tuning, spec, prepared.scale.span)
-    lines, files = _with_settings_beside(
-        tuning, spec, prepared.scale.span, config, decision["night"], text, drawn
-    )
-    return TuningReport(lines, files, decision, tuning)
+    lines, files = _with_settings_beside(tuning, spec, prepared.scale.span, config, row["night"], text, drawn)
+    return TuningReport(lines, files, row, tuning)
 
 
 def _with_settings_beside(

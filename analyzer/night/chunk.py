@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 
 from analyzer.belief.nights import Held
@@ -26,7 +27,7 @@ from analyzer.loop.experiments import learned
 from analyzer.loop.experiments_row import by_experiment, with_experiment
 from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
 from analyzer.loop.oscillation import counting
-from analyzer.loop.page_trends import turn_events
+from analyzer.loop.page_trends import thinned, turn_events
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loop.sample_clock import interval
 from analyzer.loop.witness import witness
@@ -102,12 +103,14 @@ def assess_loop(
 
 @dataclass(slots=True)
 class Rows:
-    """What is kept of the loops of one night: findings, settings compared, moves of the signals, and assessments."""
+    """What is kept of the loops of one night: findings, settings compared, moves of the signals, assessments, and
+    thinned trends, of loops too that could not be assessed."""
 
     nights: list[Finding] = field(default_factory=list)
     compared: list[dict[str, Any]] = field(default_factory=list)
     moves: list[Moves] = field(default_factory=list)
     found: list[Assessment] = field(default_factory=list)
+    trends: list[tuple[str, Mapping[str, np.ndarray]]] = field(default_factory=list)
 
 
 def _loop_row(
@@ -128,6 +131,7 @@ def _loop_row(
         "timezone": night.zone,
         "settings_from": settings_from(stated, changes, night.at_end_s, night.zone),
     }
+    prepared = None
     try:
         prepared = prepare(spec, part, config.quality)
         known |= {"pv_lo": prepared.scale.low, "pv_hi": prepared.scale.low + prepared.scale.span}
@@ -142,6 +146,7 @@ def _loop_row(
             if taught is None or taught.model is None:
                 raise
             kept.nights.append(by_experiment(taught, spec, night.name, error.needs, present, known))
+            kept.trends.append((spec.loop, thinned(prepared.record)))
             return
         known |= _typed_in(earlier, spec, found, night.zone)
         known["turns"] = turn_events(prepared, found) if advising else None
@@ -152,8 +157,11 @@ def _loop_row(
         drawn = _settings_row(spec, night.name, advice)
     except Exception as error:  # an error of one loop is that loop's result, never the night's end
         kept.nights.append(_lost(error, config).of(spec, night.name, **known))
+        if prepared is not None:
+            kept.trends.append((spec.loop, thinned(prepared.record)))
         return
     kept.nights.append(told)
+    kept.trends.append((spec.loop, found.trend))
     kept.compared += drawn
     kept.moves += filter(None, [moves_of(prepared.record)])
     kept.found.append(found)
@@ -213,6 +221,13 @@ def _samples_of(task: Task, spec: LoopSpec) -> dict[str, Series] | Lost:
 def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
     """Assess a chunk and write its pieces; `began` is told the number of each loop that is begun with."""
     be_patient(task.store.path)
+    assessed(task, began)
+    met = task.plant.export.met(tag for spec in task.specs for tag in spec.tags)
+    return Done(task.key, len(task.specs), met)
+
+
+def assessed(task: Task, began: Callable[[int], None] = lambda at: None) -> dict[str, Rows]:
+    """What is kept of a chunk by night, its pieces written."""
     kept, plant = {n.name: Rows() for n in task.nights}, task.plant
     for at, spec in enumerate(task.specs):
         began(at)
@@ -226,7 +241,7 @@ def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
             _loop_row(spec, series, night, plant.config, advising, kept[night.name], plant.changes, held)
     for night in task.nights:
         _write_pieces(task, night.name, kept[night.name])
-    return Done(task.key, len(task.specs), plant.export.met(tag for spec in task.specs for tag in spec.tags))
+    return kept
 
 
 def lose(task: Task, reason: str) -> Done:
@@ -240,8 +255,10 @@ def lose(task: Task, reason: str) -> Done:
 
 def _write_pieces(task: Task, night: str, kept: Rows) -> None:
     """The piece of the table of nights comes last, and names the others: where all are, the chunk is whole."""
-    names = (pa.array([a.loop] * len(a.trend["time_s"])).dictionary_encode() for a in kept.found)
-    trends = [pa.table({"loop": loop, **a.trend}) for loop, a in zip(names, kept.found, strict=True)]
+    trends = [
+        pa.table({"loop": pa.array([loop] * len(trend["time_s"])).dictionary_encode(), **trend})
+        for loop, trend in kept.trends
+    ]
     made = {
         "hours": rows_table([row for a in kept.found for row in hour_rows(a, night)], HOURS),
         "trends": pa.concat_tables(trends).unify_dictionaries() if trends else None,

@@ -7,15 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from analyzer.columns import BELIEVED, LISTED, RANKING, Row, names
+from analyzer.loop.assess import Assessment
 from analyzer.loop.oscillation import detect
 from analyzer.loop.quality import prepare
 from analyzer.loops.spec import LoopSpec
-from analyzer.night import batch
+from analyzer.night.chunk import Task, assessed
+from analyzer.night.finish import finish_night
 from analyzer.night.nights import Night, Plant
 from analyzer.plantwide.groups import groups_of
 from analyzer.plantwide.structure import Moves, links_of, moves_of
@@ -23,27 +25,39 @@ from analyzer.plantwide.wave import Wave, waves_of
 from analyzer.store.store import Store
 from identification.errors import InputError, NotAssessedError
 
-COLUMNS = (*names((*RANKING, *LISTED, *BELIEVED)), "lack", "night")
+OF_ORDER = ("lack", "night", "lanes", "expected_period_s", "expected_pv_amplitude_pct")
+"""What an order rests on beside the columns of a list."""
+COLUMNS = tuple(dict.fromkeys((*names((*RANKING, *LISTED, *BELIEVED)), *OF_ORDER)))
 TIES = ("master", "ratio_of", "split_of", "override_with")
 """Columns of loops.csv that tie a loop to another one."""
 MOST_BESIDE = 60
 """Loops of a plant up to which it is looked which of them move together: some seconds."""
 
 
-def decided(plant: Plant, night: Night, loop: str, store: Store | None = None) -> Row:
-    """The row of a loop in a night.
+@dataclass(frozen=True, slots=True)
+class Decided:
+    """The row of a loop in a night, and its assessment where the row was made anew and the loop could be assessed."""
+
+    row: Row
+    found: Assessment | None = None
+
+
+def decided(plant: Plant, night: Night, loop: str, store: Store | None = None) -> Decided:
+    """What a night decided of a loop.
 
     store, one that holds the night: its row, which rests on all nights there; None: the row of a store that holds
     this night alone. Raises InputError where the store has no such night, or the night no such loop.
     """
     if store is not None:
-        return _stored(store, night.name, loop)
+        return Decided(_stored(store, night.name, loop))
     specs = _related(plant, night, loop)
-    alone = replace(plant, specs=specs, span=(night.first_s, night.last_s), notes=())
     with TemporaryDirectory() as folder:
         made = Store(Path(folder) / "store")
-        batch.run(alone, made)
-        return _stored(made, made.nights()[-1], loop)
+        task = Task(replace(plant, specs=specs, notes=()), (night,), made, "alone")
+        kept = assessed(task)[night.name]
+        finish_night(made, night.name, [spec.loop for spec in specs], plant.config, [task.key])
+        found = next((a for a in kept.found if a.loop == loop), None)
+        return Decided(_stored(made, night.name, loop), found)
 
 
 def _stored(store: Store, night: str, loop: str) -> Row:

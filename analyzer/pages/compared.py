@@ -46,7 +46,7 @@ def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
     now, new = c.tried[0], next((t for t in c.tried if t.name == RECOMMENDED), None)
     if new is None:
         offers = "; ".join(
-            _offers(c, [f"{n}: {_priced(c, n)}" for n in OFFERED if n in c.shown], "a repaired valve")
+            _offers(c, [f"{n}: {_priced(c, n)}" for n in OFFERED if n in c.shown], "a repaired valve", unit)
         )
         said = "No settings are recommended: none wins on all that the loop may be without a price."
         return f"{said} {f'To choose between: {offers}.' if offers else ''}"
@@ -68,18 +68,20 @@ def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
 def choices(c: Comparison, spec: LoopSpec) -> list[str]:
     """The settings between which an engineer may choose, a line each, and what a repair would bring."""
     named = [t.name for t in c.tried if t.name in (RECOMMENDED, *OFFERED) and t.name in c.everywhere]
-    lines = _offers(c, [f"{name}: {_typed(c, name, spec)}: {_priced(c, name)}" for name in named], REPAIRED)
+    unit = spec.pv_unit or "PV"
+    told = [f"{name}: {_typed(c, name, spec)}: {_priced(c, name)}" for name in named]
+    lines = _offers(c, told, REPAIRED, unit)
     return ["to choose between, on all that the loop may be:", *(f"  {x}" for x in lines)] if lines else []
 
 
-def _offers(c: Comparison, settings: list[str], repair: str) -> list[str]:
-    """Settings with what they win and cost, and what a repair brings against now, on the identified loop."""
+def _offers(c: Comparison, settings: list[str], repair: str, unit: str) -> list[str]:
+    """Settings with what they win and cost, and what a repair brings, on the identified loop."""
     if c.repaired is None:
         return settings
-    t, now = c.repaired, c.tried[0]
-    ratios = t.stem_travel / max(now.stem_travel, 1e-9), t.error / max(now.error, 1e-9)
-    travel, error = map(_against_now_pct, ratios)
-    return [*settings, f"{repair}: travel {travel}, error {error}"]
+    t, now, scale = c.repaired, c.tried[0], c.pv_span / 100.0
+    travel = f"stem travel {number(now.stem_travel)} to {number(t.stem_travel)} %/h"
+    error = f"average absolute error {number(scale * now.error)} to {number(scale * t.error)} {unit}"
+    return [*settings, f"{repair}: {travel}, {error}"]
 
 
 def _typed(c: Comparison, name: str, spec: LoopSpec) -> str:
@@ -101,7 +103,9 @@ def _priced(c: Comparison, name: str) -> str:
     """What settings win and cost on that of all loops that the data allow where each is worst, and on a load step."""
     found = c.everywhere[name]
     travel, error = map(_against_now_pct, (found.worst_travel, found.worst_error))
-    return f"travel {travel}, error {error} at worst, a load step goes {number(c.peaks[name])} times as far"
+    return (
+        f"stem travel {travel}, error {error} at worst, a load step goes {number(c.peaks[name])} times as far"
+    )
 
 
 def _against_now_pct(ratio: float) -> str:
@@ -153,7 +157,7 @@ def panels(c: Comparison, unit: str) -> parts.Panels:
     for t in c.tried:
         shown = c.shown[t.name]
         line = parts.Line("SP − PV", shown.time_s / 60.0, scale * shown.error)
-        words = f"travel {number(t.stem_travel)} %/h, error {number(scale * t.error)} {unit}"
+        words = f"stem travel {number(t.stem_travel)} %/h, error {number(scale * t.error)} {unit}"
         name, axis = f"tried-{slug(t.name)}", f"SP − PV [{unit}]"
         plots.append(parts.Plot(name, t.name, "minutes", axis, (line,), (), words, reach=(-most, most)))
     return parts.Panels("tried", "The error under each of them, on the same load", tuple(plots))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
+from datetime import date
 from statistics import median
 from typing import Any
 from urllib.parse import quote
@@ -11,16 +12,17 @@ from urllib.parse import quote
 import numpy as np
 
 from analyzer.columns import BY_NAME
-from analyzer.explain.words import agreement, title
+from analyzer.explain.words import beside_night, title
+from analyzer.history.plant_clock import UTC_NAME
 from analyzer.limits import PAGES
 from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES, Fault, Status
 from analyzer.pages import loop_pictures, words
 from analyzer.pages.experiments import experiments_section
 from analyzer.pages.reading import BESIDE, Thinned
-from analyzer.pages.words import Row, duration, keys, known_figures, lead, number, page_table, titled
-from analyzer.pages.work import work_order
+from analyzer.pages.words import Row, duration, keys, known_figures, lead, number, page_table, stamp, titled
 from analyzer.words.belief import wear_text
+from analyzer.words.orders import order
 from analyzer.words.reason import in_short
 from analyzer.words.units import row_settings
 from identification.mismatch.words import check
@@ -70,7 +72,7 @@ def loop_page(
     sections = parts.there(
         _first_section(row, thin),
         parts.section("Notes", words.listing(reversed(notes)) if notes else None),
-        parts.section("What and why", _facts(row), _believed(row) if row["believed_nights"] else None),
+        parts.section("What and why", _facts(row, thin), _believed(row) if row["believed_nights"] else None),
         shared,
         experiments_section(row),
         _explained_section(explained, row),
@@ -106,16 +108,26 @@ def _links(
 def _first_section(row: Row, thin: Thinned | None) -> parts.Section:
     """What is wrong, what to do in three lines, and ten periods of it."""
     reason, drawn, scale = words.cell(row, "reason").text, None, words.pv_scale_of(row)
-    order = tuple((f"{head}:", text) for head, text in work_order(row) if text)
+    lines = tuple((f"{head}:", text) for head, text in order(row) if text)
     if thin is not None and thin.time_s.size > 1:
         opening = loop_pictures.close_span(row, thin)
         name = "SP, PV and OP" + (", the last ten periods" if opening else "")
         drawn = loop_pictures.trend_block("trend", name, thin, (), scale, opening)
-    do, events = parts.Listing(order) if order else None, loop_pictures.turn_panels(row, scale)
+    do, events = parts.Listing(lines) if lines else None, loop_pictures.turn_panels(row, scale)
     return parts.Section("What to do", parts.there(lead(reason or "nothing was found"), do, drawn, events))
 
 
-def _facts(row: Row) -> parts.Facts:
+def manual_since(row: Row, thin: Thinned | None) -> tuple[str, str] | None:
+    """Since when a loop is in manual, as a fact; None where it is not at the end of its trend."""
+    spans = () if thin is None else thin.spans(thin.manual)
+    if thin is None or not spans or spans[-1][1] < thin.time_s[-1]:
+        return None
+    first = spans[-1][0]
+    since = stamp(first, row["timezone"] or UTC_NAME)
+    return "In manual since", since if first > thin.time_s[0] else f"{since} or before"
+
+
+def _facts(row: Row, thin: Thinned | None) -> parts.Facts:
     """What was found of a loop, to what it is tied, and its settings."""
     facts = [titled("action", row["action"] or "–"), titled("cause", row["cause"] or "not assessed")]
     shares = [(name, row[name]) for name in (f"osc_{c}_pct" for c in CAUSES)]
@@ -131,6 +143,7 @@ def _facts(row: Row) -> parts.Facts:
         facts.append(("Settings in force", f"{row_settings(row)} ({row['form']} form{source})"))
     if row["kp_new"] is not None or row["ti_new"] is not None:
         facts.append(("Settings to type in", row_settings(row, "kp_new", "ti_new")))
+    facts += filter(None, (manual_since(row, thin),))
     return parts.Facts(tuple(facts))
 
 
@@ -141,10 +154,10 @@ def _believed(row: Row) -> parts.Facts:
     if row["worn_nights"]:
         certain = f", certain since {row['certain_since']}" if row["certain_since"] else ""
         sure = "> 99" if row["worn_pct"] > PAGES.most_sure_pct else f"{row['worn_pct']:.0f}"
-        out.append(("Worn valve", f"{sure} %{certain}"))
+        out.append(("Chance of a worn valve", f"{sure} %{certain}"))
     if row["certain_since"] and row["width_pct"] is not None:
         ends = f"{number(row['width_low_pct'])} … {number(row['width_high_pct'])}"
-        out.append(("Play or stickband", f"{number(row['width_pct'])} % of OP ({ends})"))
+        out.append(("Backlash or stickband, all nights", f"{number(row['width_pct'])} % of OP ({ends})"))
     if row["wear_pct_per_month"] is not None:
         out.append(("It wears", wear_text(row)))
     return parts.Facts(tuple(out))
@@ -154,7 +167,7 @@ def _explained_section(found: Row | None, row: Row) -> parts.Section | None:
     """What the plain loop lacks, where the night was explained, and how that goes with the night's verdict."""
     if found is None:
         return None
-    together = agreement(row, found["verdict"], found["block"])
+    together = beside_night(row, found["verdict"], found["block"])
     said = (f"{title(found['verdict']).capitalize()}: {found['reason']}", check(found))
     return parts.Section("What the plain loop lacks", (parts.Text((*said, together) if together else said),))
 
@@ -244,17 +257,20 @@ def _figures(row: Row) -> parts.Facts:
 def nights_section(rows: Sequence[Row]) -> parts.Section:
     """A table of a loop's nights, the last first, and pictures of how its oscillation and the width of its valve's
     fault grew or fell."""
+    day = rows[-1]["night"][:10]
     plots = [
-        _over_nights(
-            f"nights-{slug(c)}", BY_NAME[c].title, BY_NAME[c].unit, 0.0, _by_night([r[c] for r in rows])
-        )
+        _over_nights(f"nights-{slug(c)}", BY_NAME[c].title, BY_NAME[c].unit, 0.0, day, _by_night(rows, c))
         for c in keys("figures-over-nights")
     ]
     if rows[-1]["certain_since"]:
         alone = [(json.loads(r["witness"] or "{}").get("width") or [None])[0] for r in rows]
         certain = [r["width_pct"] if r["certain_since"] else None for r in rows]
-        lines = _by_night(alone, joined=False), _by_night(certain, "nights together", kind="op")
-        plots.append(_over_nights("widths", "Width of the valve's fault", "% of OP", 1.0, *lines))
+        told = [{**r, "alone": a, "certain": c} for r, a, c in zip(rows, alone, certain, strict=True)]
+        lines = (
+            _by_night(told, "alone", joined=False),
+            _by_night(told, "certain", "nights together", kind="op"),
+        )
+        plots.append(_over_nights("widths", "Width of the valve's fault", "% of OP", 1.0, day, *lines))
     shown = parts.there(*plots)
     drawn = parts.Panels("nights", "Night by night", shown) if shown else None
     table = page_table("history", map(_night_cells, reversed(rows)))
@@ -267,15 +283,19 @@ def _night_cells(row: Row) -> tuple[words.Told, ...]:
     return words.cells(row, "history", **lost)
 
 
-def _by_night(figures: Sequence[float | None], label: str = "each night", **drawn: Any) -> parts.Line:
-    """A figure of the nights up to this one, where it is known."""
-    known = [(i - len(figures) + 1.0, y) for i, y in enumerate(figures) if y is not None]
+def _by_night(rows: Sequence[Row], column: str, label: str = "each night", **drawn: Any) -> parts.Line:
+    """A figure over the days up to the last night, where it is known."""
+    days = [float(date.fromisoformat(r["night"][:10]).toordinal()) for r in rows]
+    known = [(x - days[-1], r[column]) for x, r in zip(days, rows, strict=True) if r[column] is not None]
     x, y = np.array(known, float).reshape(-1, 2).T
     return parts.Line(label, x, y, **drawn)
 
 
-def _over_nights(name: str, title: str, unit: str, least: float, *lines: parts.Line) -> parts.Plot | None:
-    """Figures over the nights, from 0 to `least` at least; None where fewer than three nights know them."""
+def _over_nights(
+    name: str, title: str, unit: str, least: float, day: str, *lines: parts.Line
+) -> parts.Plot | None:
+    """Figures over the nights up to a day, from 0 to `least` at least; None where fewer than three nights know
+    them."""
     if min(line.x.size for line in lines) < 3:
         return None
-    return parts.Plot(name, title, "nights before this one", unit, lines, reach=(0.0, least))
+    return parts.Plot(name, title, "night", unit, lines, reach=(0.0, least), day=day)

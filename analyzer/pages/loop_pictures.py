@@ -58,10 +58,16 @@ def trend_block(
     step = (thin.time_s[-1] - thin.time_s[0]) / max(thin.time_s.size - 1, 1)
     panels = (f"SP, PV [{scale.label}]", "OP [%]")
     caption, least = CAPTION.format(step=f"{step:.3g} s"), (LEAST_PCT * scale.span / 100.0, LEAST_PCT)
-    times = (thin.time_s, thin.gap)
-    return Trend(
-        name, title, *times, tuple(bands), panels, tuple(marks), caption, opening=opening, least=least
-    )
+    shaded = thin.spans(thin.manual | thin.frozen)
+    if shaded:
+        said = [
+            text
+            for text, mask in (("in manual", thin.manual), ("PV stands still", thin.frozen))
+            if mask.any()
+        ]
+        caption = f"Shaded: {' or '.join(said)}. {caption}"
+    signals, seen = tuple(bands), tuple(marks)
+    return Trend(name, title, thin.time_s, thin.gap, signals, panels, seen, caption, shaded, opening, least)
 
 
 def sparkline(thin: Thinned, span: tuple[float, float] | None = None) -> Sparkline:
@@ -82,7 +88,8 @@ def pv_over_op(thin: Thinned, row: Row) -> Plot:
     """The plane of PV over OP, of the ten periods where the night names them."""
     scale, close = pv_scale_of(row), close_span(row, thin)
     part = thin.between(*close) if close else thin
-    pv, op = scale.of(part.middle("pv")[~part.gap]), part.middle("op")[~part.gap]
+    told = ~(part.gap | part.frozen)
+    pv, op = scale.of(part.middle("pv")[told]), part.middle("op")[told]
     line = Line("PV over OP", op, pv, joined=close is not None)
     caption = "A cloud along a line: a sound valve. An ellipse or a parallelogram: lag, play or stick-slip."
     title = "PV over OP, " + ("the last ten periods" if close else "the last night")
@@ -92,7 +99,8 @@ def pv_over_op(thin: Thinned, row: Row) -> Plot:
 
 def rhythm_plots(thin: Thinned, period_s: float | None) -> tuple[Plot | Text, ...]:
     """Autocorrelation and spectrum of the error, or a sentence on why the trend cannot show them."""
-    if thin.time_s.size < LEAST_SAMPLES or int((~thin.gap).sum()) < LEAST_SAMPLES:
+    told = ~(thin.gap | thin.frozen)
+    if thin.time_s.size < LEAST_SAMPLES or int(told.sum()) < LEAST_SAMPLES:
         return (Text(("Too few samples for autocorrelation and spectrum.",), "note"),)
     step = float(np.median(np.diff(thin.time_s)))
     if period_s is not None and period_s < LEAST_BUCKETS * step:
@@ -100,7 +108,7 @@ def rhythm_plots(thin: Thinned, period_s: float | None) -> tuple[Plot | Text, ..
         return (Text((text,), "note"),)
     # drawn straight where nothing is known
     grid = np.arange(thin.time_s[0], thin.time_s[-1] + 0.5 * step, step)
-    error = np.interp(grid, thin.time_s[~thin.gap], (thin.middle("sp") - thin.middle("pv"))[~thin.gap])
+    error = np.interp(grid, thin.time_s[told], (thin.middle("sp") - thin.middle("pv"))[told])
     error -= error.mean()
     return _correlation(error, step, period_s), _spectrum_plot(error, step, period_s)
 

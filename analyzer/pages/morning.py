@@ -12,7 +12,7 @@ import numpy as np
 from analyzer.columns import BY_NAME
 from analyzer.limits import PAGES
 from analyzer.loop.cost import LOSS, MARK, OF_RECORDED, SIGNIFICANCE, cost, cost_column, mark
-from analyzer.loop.decisions import CAUSES, Cause, Status, counts
+from analyzer.loop.decisions import CAUSES, Action, Cause, Status, counts
 from analyzer.pages import words, work
 from analyzer.pages.groups import morning_table
 from analyzer.pages.loop_pictures import close_span, sparkline
@@ -84,14 +84,16 @@ def worst_table(night: ShownNight) -> Table:
 
 def ranking(night: ShownNight) -> Table:
     """All loops of the night."""
-    figures = [c.key for c in words.page_columns("ranking") if c.numeric]
+    declared, by = words.page_columns("ranking"), cost_column(night.rows)
+    shown = declared if by in words.keys("ranking") else (*declared[:4], words.heading(by), *declared[4:])
+    figures = [c.key for c in shown if c.numeric]
 
     def own(row: words.Row) -> Mapping[str, words.Told]:
         return {name: words.marked_cell(row, name) for name in figures} | {
             "cause": words.cause_cell(row["cause"])
         }
 
-    return night.table("ranking", night.rows, own, note=_what_marks(night.rows, *figures))
+    return night.table("ranking", night.rows, own, columns=shown, note=_what_marks(night.rows, *figures))
 
 
 def waiting(night: ShownNight) -> list[tuple[str, str]]:
@@ -122,9 +124,12 @@ def by_area(rows: Sequence[words.Row]) -> dict[str, list[words.Row]]:
 
 
 def score(rows: Sequence[words.Row]) -> float | None:
-    """Share of assessed loops, by importance, with no fault found [%]; None where none is assessed."""
+    """Share of assessed loops, by importance, at which nothing is to be done [%]; None where none is assessed."""
     weights = [
-        (1.0 if r["importance"] is None else r["importance"], r["cause"] in (Cause.NONE, None))
+        (
+            1.0 if r["importance"] is None else r["importance"],
+            r["cause"] in (Cause.NONE, None) and r["action"] in (Action.NONE, None),
+        )
         for r in rows
         if r["status"] == Status.OK
     ]
@@ -210,12 +215,14 @@ def plant_history(sums: Sequence[NightSum]) -> Panels | None:
     lines = [Line("all that oscillate", day, np.array([s.oscillate for s in sums], float), kind="recorded")]
     kinds = ((Cause.VALVE, "op"), (Cause.TUNING, "baseline"), (Cause.LOAD, "pv"))
     lines += [Line(f"by {c}", day, np.array([s.causes[c] for s in sums], float), kind=k) for c, k in kinds]
-    axis, most = "days before this night", max(s.oscillate for s in sums) + 1.0
-    loops = Plot("oscillating", "Loops that oscillate", axis, "loops", tuple(lines), reach=(0.0, most))
+    most, last = max(s.oscillate for s in sums) + 1.0, sums[-1].name[:10]
+    title = "Loops that oscillate"
+    loops = Plot("oscillating", title, "night", "loops", tuple(lines), reach=(0.0, most), day=last)
     by = sums[-1].by
     cost, named = np.array([s.cost if s.by == by else np.nan for s in sums]), BY_NAME[by].heading.lower()
     title = f"The loops' {named} together, now {words.number(float(cost[-1]))}"
-    costs = Plot("loss", title, axis, named, (Line(named, day, cost, kind="recorded"),), reach=(0.0, 1.0))
+    line = Line(named, day, cost, kind="recorded")
+    costs = Plot("loss", title, "night", named, (line,), reach=(0.0, 1.0), day=last)
     return Panels("over-the-nights", "The plant over the nights", (loops, costs))
 
 

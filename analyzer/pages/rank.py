@@ -77,7 +77,10 @@ def ranked(
         raise InputError(f"column {column!r}", expected, "correct --by")
     name = night or store.require()
     known = notes.read_notes(store.path)
-    rows = [_noted(row, known) for row in store.rows("nights", name, (*KEPT, *LANE_FIGURES, "timezone"))]
+    rows = [
+        _noted(row, known)
+        for row in store.rows("nights", name, (*KEPT, *LANE_FIGURES, "timezone", "travel_of"))
+    ]
     rows = _rows_of_area(rows, area)
     if lane is not None:
         rows = [r for r in rows if lane in lanes_in(r)]

@@ -6,6 +6,7 @@ from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,13 +16,14 @@ from analyzer.comparison.before_after import Span
 from analyzer.comparison.block_bootstrap import Floats
 from analyzer.lanes.lanes import FIGURE
 from analyzer.limits import PAGES
+from analyzer.loop.cost import LOSS, cost, cost_column
 from analyzer.loop.decisions import Cause, Status, counts
 from analyzer.pages.rank import worst_first
 from analyzer.pages.words import Told, cells, keys, page_table
 from analyzer.store import notes
 from analyzer.store.notes import Note, is_hidden, last
 from analyzer.store.store import Store
-from analyzer.store.table import TREND, read_stored
+from analyzer.store.table import SHADED, TREND, read_stored, stored_names
 from analyzer.words.units import Row, row_settings
 from reports.pages import Cell, Table
 from reports.texts import slug
@@ -34,11 +36,14 @@ AROUND_D = 2
 
 @dataclass(frozen=True, slots=True)
 class Thinned:
-    """Thinned signals of a loop: start of each bucket [s], extremes by name ("pv_min") [% of span], gaps."""
+    """Thinned signals of a loop: start of each bucket [s], extremes by name ("pv_min") [% of span], gaps; manual and
+    frozen, where the controller is in manual and PV stands still."""
 
     time_s: Floats
     extremes: Mapping[str, Floats]
     gap: np.ndarray
+    manual: np.ndarray
+    frozen: np.ndarray
 
     def middle(self, signal: str) -> Floats:
         """Middle of each bucket's extremes, shape (b,)."""
@@ -47,7 +52,8 @@ class Thinned:
     def between(self, first_s: float, last_s: float) -> Thinned:
         """The buckets that begin in a span."""
         a, b = np.searchsorted(self.time_s, [first_s, last_s])
-        return Thinned(self.time_s[a:b], {k: v[a:b] for k, v in self.extremes.items()}, self.gap[a:b])
+        masks = (x[a:b] for x in (self.gap, self.manual, self.frozen))
+        return Thinned(self.time_s[a:b], {k: v[a:b] for k, v in self.extremes.items()}, *masks)
 
     def coarser(self, most: int) -> Thinned:
         """At most about `most` buckets, neighbours joined so that no extreme is lost."""
@@ -58,7 +64,14 @@ class Thinned:
         joined = {}
         for name, x in self.extremes.items():
             joined[name] = (np.minimum if name.endswith("_min") else np.maximum).reduceat(x, edges)
-        return Thinned(self.time_s[edges], joined, np.logical_and.reduceat(self.gap, edges))
+        masks = (np.logical_and.reduceat(x, edges) for x in (self.gap, self.manual, self.frozen))
+        return Thinned(self.time_s[edges], joined, *masks)
+
+    def spans(self, mask: np.ndarray) -> tuple[tuple[float, float], ...]:
+        """First and last time [s] of each stretch in which a mask of the buckets is True."""
+        ends = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int)))
+        stamps = np.append(self.time_s, self.time_s[-1:])
+        return tuple((float(stamps[a]), float(stamps[b])) for a, b in zip(ends[::2], ends[1::2], strict=True))
 
 
 def nights_within(store: Store, span: Span) -> list[str]:
@@ -94,7 +107,7 @@ def _figures(
 ) -> dict[str, dict[str, Floats]]:
     """Columns of numbers by loop, in the order of the nights that have the table, NaN where not known."""
     paths = [store.file(table, night) for night in nights] if loops else []
-    tables = [read_stored(p, columns, [("loop", "in", sorted(loops))]) for p in paths if p.exists()]
+    tables = [_read_loops(p, columns, sorted(loops)) for p in paths if p.exists()]
     if not tables:
         return {}
     names = dict.fromkeys(n for t in tables for n in t.column_names if n not in ("loop", "night"))
@@ -104,6 +117,13 @@ def _figures(
     held = {n: joined.column(n).to_numpy(zero_copy_only=False) for n in ("loop", *names)}
     tags = held.pop("loop")
     return {str(tag): {n: x[tags == tag] for n, x in held.items()} for tag in dict.fromkeys(tags)}
+
+
+def _read_loops(path: Path, columns: Sequence[str] | None, loops: Sequence[str]) -> pa.Table:
+    """The rows of some loops in a table, with those of some columns that it has."""
+    held = None if columns is None else set(stored_names(path))
+    wanted = None if held is None else [c for c in columns or () if c in held]
+    return read_stored(path, wanted, [("loop", "in", loops)])
 
 
 def read_hours(store: Store, loops: Collection[str], nights: Sequence[str]) -> dict[str, dict[str, Floats]]:
@@ -119,7 +139,7 @@ def read_hours(store: Store, loops: Collection[str], nights: Sequence[str]) -> d
 
 def read_trends(store: Store, loops: Collection[str], nights: Sequence[str]) -> dict[str, Thinned]:
     """Thinned trends by loop, in order of time; a bucket of a gap stands where nothing was recorded."""
-    found = _figures(store, "trends", loops, nights, ("loop", *TREND))
+    found = _figures(store, "trends", loops, nights, ("loop", *TREND, *SHADED))
     return {tag: _thinned_from(held) for tag, held in found.items()}
 
 
@@ -128,10 +148,13 @@ def _thinned_from(held: Mapping[str, Floats]) -> Thinned:
     step = np.diff(time_s)
     jumps = np.flatnonzero(step > 3 * np.median(step)) + 1 if step.size else np.array([], int)
     extremes = {name: held[name][order] for name in TREND if name not in ("time_s", "bad")}
+    unknown = np.zeros(held["bad"].size)
+    gap, *shaded = (held.get(name, unknown)[order] > 0.5 for name in ("bad", *SHADED))
     return Thinned(
         np.insert(time_s, jumps, time_s[jumps - 1] + 1.0),
         {name: np.insert(x, jumps, x[jumps - 1]) for name, x in extremes.items()},
-        np.insert(held["bad"][order] > 0.5, jumps, True),
+        np.insert(gap, jumps, True),
+        *(np.insert(x, jumps, False) for x in shaded),
     )
 
 
@@ -205,6 +228,14 @@ def needs_a_look(row: Row) -> bool:
     )
 
 
+def largest_loss(rows: Sequence[Row]) -> str:
+    """The loop that costs most of all, which the morning's list holds whatever was found of it; '' where losses are
+    not compared."""
+    if cost_column(rows) != LOSS:
+        return ""
+    return str(max(rows, key=lambda r: cost(r, LOSS))["loop"])
+
+
 def followers_under(rows: Sequence[Row]) -> list[Row]:
     """Rows in their order, each loop that follows another one right under it."""
     present = {r["loop"] for r in rows}
@@ -227,7 +258,12 @@ def read_night(store: Store, name: str | None, top: int, drawn: bool = True) -> 
     remembered = by_loop(read_nights(store, earlier[-PAGES.usual_nights :], REMEMBERED))
     remembered = {loop: told for loop, told in remembered.items() if told[-1]["night"] == earlier[-1]}
     known = notes.read_notes(store.path)
-    looked = [r for r in rows if needs_a_look(r) and not is_hidden(last(known, r["loop"]), night)]
+    most = largest_loss(rows)
+    looked = [
+        r
+        for r in rows
+        if (needs_a_look(r) or r["loop"] == most) and not is_hidden(last(known, r["loop"]), night)
+    ]
     worst = tuple(followers_under(looked)[:top])
     paged = tuple(dict.fromkeys(r["loop"] for r in (*worst, *rows)))[:top]
     trends = read_trends(store, {r["loop"] for r in worst}, [night]) if drawn else {}

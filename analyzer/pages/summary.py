@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from analyzer.lanes.lanes import FIGURE, lanes_in
 from analyzer.limits import PAGES
 from analyzer.loop.cost import SIGNIFICANCE, cost, cost_column
-from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole, Lane, Status
+from analyzer.loop.decisions import CAUSES, Action, Cause, Due, GroupRole, Lane, Status
 from analyzer.pages import words
 from analyzer.pages.reading import ShownNight, action_text, needs_a_look, oscillates, read_night
-from analyzer.pages.work import work_order
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
+from analyzer.words import orders
+from analyzer.words.orders import order
 from analyzer.words.units import changed_settings
 from reports.pages import Block, Cell, Page, Section, Table, Text, section, there
 
@@ -41,48 +42,13 @@ def first_things(rows: Sequence[words.Row], groups: Sequence[GroupView] = ()) ->
         told |= set(members)
         found.append((sum(cost(by_loop[m], by) for m in members), _of_group(source, others)))
     left = sorted((r for r in rows if r["loop"] not in told), key=lambda r: (-cost(r, by), r["loop"]))
-    for work in words.texts("work"):
-        mine = [r for r in left if work in _work(r)]
+    for work in orders.texts("work"):
+        mine = [r for r in left if orders.kind_of_work(r) == work]
         if mine:  # what waits for a shutdown is worth nothing tonight
-            worth = 0.0 if work == "shutdown" else sum(cost(r, by) for r in mine)
-            found.append((worth, _asked(work, mine)))
+            worth = 0.0 if work == Due.SHUTDOWN else sum(cost(r, by) for r in mine)
+            found.append((worth, orders.asked(work, mine, listed([r["loop"] for r in mine]))))
     ordered = sorted(found, key=lambda pair: -pair[0])
     return tuple(text for _, text in ordered[: PAGES.sentences]) or (CALM,)
-
-
-RETUNED = {Cause.VALVE: "retune a worn valve's loop", Cause.NONE: "retune a sluggish loop"}
-"""Kinds of work that new settings are, by the cause; of others the loop is too tight."""
-
-
-def _work(row: words.Row) -> set[str]:
-    """The kinds of work that a row asks for."""
-    tuning = row["cause"] == Cause.TUNING
-    kinds = {
-        Action.RETUNE: RETUNED.get(row["cause"], "retune"),
-        Action.REPAIR_VALVE: "shutdown" if row["due"] == Due.SHUTDOWN else "stroke",
-        Action.CHECK_MEASUREMENT: "measurement",
-        Action.CHECK_SETTINGS: "unstated" if None in (row["kp"], row["ti"]) else "settings",
-        Action.NEEDS_DATA: "halve" if tuning else "",
-        Action.FIND_DISTURBANCE: "disturbance",
-    }
-    at_limit = Lane.AT_LIMIT in lanes_in(row) and not tuning
-    winds_up = Lane.WINDUP in lanes_in(row)
-    return {kinds.get(row["action"], ""), "limit" if at_limit else "", "windup" if winds_up else ""}
-
-
-def _asked(work: str, rows: Sequence[words.Row]) -> str:
-    """The sentence of a kind of work on some loops."""
-    sticks = sum(r["valve_fault"] == Fault.STICTION for r in rows)
-    fault = (
-        "has stiction"
-        if sticks == len(rows)
-        else "has backlash"
-        if sticks == 0
-        else "has stiction or backlash"
-    )
-    said = words.texts("work")[work]
-    text = said["one"] if len(rows) == 1 else said.get("several", said["one"])
-    return text.format(names=listed([r["loop"] for r in rows]), fault=fault)
 
 
 def _of_group(source: words.Row, others: Sequence[str]) -> str:
@@ -162,11 +128,10 @@ def since(night: ShownNight) -> Section:
 
 
 def _do(row: words.Row) -> str:
+    """The action with the settings to type in, else with the first line of its order; '' of nothing."""
     if row["kp_new"] is not None or row["ti_new"] is not None:
         return f"{row['action']}: {changed_settings(row)}"
-    if row["action"] == Action.UNDECIDED:
-        return dict(work_order(row))["Do"]
-    return "" if row["action"] in (None, Action.NONE) else row["action"]
+    return "" if row["action"] in (None, Action.NONE) else f"{row['action']}: {dict(order(row))['Do']}"
 
 
 def _counts(night: ShownNight) -> str:

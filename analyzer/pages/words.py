@@ -130,7 +130,9 @@ def cell(row: Row, name: str) -> Cell:
         return Cell(in_short(value or "")[0])
     if not _declared(name).is_number:
         return Cell(value or "")
-    return Cell(duration(value) if name == "period_s" else number(value), value)
+    of_stem = name == "valve_travel_pct_per_h" and row.get("travel_of") == "stem" and value is not None
+    text = duration(value) if name == "period_s" else number(value)
+    return Cell(f"{text} stem" if of_stem else text, value)
 
 
 def cells(row: Row, columns: str | Iterable[Column], **own: Told) -> tuple[Told, ...]:

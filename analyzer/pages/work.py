@@ -1,5 +1,5 @@
-"""What is to be done: a loop's order in three lines, the hand-over sheet for maintenance, and the work list, which
-says how far what people noted has come and what the nights since say of it."""
+"""The hand-over sheet for maintenance, and the work list, which says how far what people noted has come and what the
+nights since say of it."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from analyzer.history.plant_clock import stamp
-from analyzer.lanes.lanes import lanes_in
 from analyzer.limits import PAGES
-from analyzer.loop.decisions import Action, Cause, Fault, Lane, Status
+from analyzer.loop.decisions import Action, Cause, Fault, Status
 from analyzer.pages.reading import ShownNight, by_loop, oscillates, read_nights
-from analyzer.pages.words import ALL_LOOPS, Row, Told, cause_cell, duration, texts, with_noun
+from analyzer.pages.words import ALL_LOOPS, Row, Told, cause_cell, with_noun
 from analyzer.store.notes import FINISHED, Work, work_on
 from analyzer.store.store import Store
 from analyzer.words.belief import wear_text
-from analyzer.words.units import changed_settings
+from analyzer.words.orders import fault_width, stroke
 from reports.pages import Cell, Page, Section, Table, Text, Tiles, section, there
 
 MAINTENANCE, WORK = "maintenance", "work"
@@ -31,61 +30,10 @@ FIGURES = {
 READ = ("loop", "status", "oscillating_pct", *FIGURES)
 
 
-def _fault_width(row: Row) -> float | None:
-    """Stickband or play [% of OP]; None where there is none."""
-    return row["stickband_pct"] or row["backlash_pct"] or None
-
-
-def _stroke(row: Row) -> tuple[str, str]:
-    """Steps of the stroke test of a valve at fault [%], and what it does in them; '' where it does not answer."""
-    width, kind = _fault_width(row) or 0.0, texts("by_hand").get(row["valve_fault"], "")
-    return f"{width / PAGES.stroke_steps:.2g}", kind.format(width=width) if width else ""
-
-
 def valve_test(row: Row) -> str:
     """The stroke test of a valve at fault in a few words; its order says how it is done."""
-    step, answer = _stroke(row)
+    step, answer = stroke(row)
     return f"steps of {step} %: {answer}" if answer else "steps of 5 %: PV, or the stem, does not answer"
-
-
-def _case(row: Row) -> str:
-    """The order that a row asks for."""
-    action = Action(row["action"])
-    if action is Action.REPAIR_VALVE and not _stroke(row)[1]:
-        return "dead valve"
-    winds_up = Lane.WINDUP in lanes_in(row) and Lane.AT_LIMIT not in lanes_in(row)
-    return "winds up" if action is Action.CHECK_LIMIT and winds_up else action
-
-
-def _expected(row: Row) -> str:
-    """What new settings make of the cycle."""
-    if None not in (row["expected_period_s"], row["expected_pv_amplitude_pct"]):
-        swing = f"{row['expected_pv_amplitude_pct']:.2g} % of span"
-        return f"a cycle of {duration(row['expected_period_s'])} and {swing}: the valve stays as it is"
-    if row["cause"] == Cause.VALVE:
-        return "the cycle comes to rest, by simulation, though the valve stays as it is"
-    if row["cause"] == Cause.NONE:
-        return "PV comes back to its set point several times sooner, and OP moves more"
-    return "the swing dies away within a few periods"
-
-
-def work_order(row: Row) -> tuple[tuple[str, str], ...]:
-    """Lead and text of three lines, '' where there is nothing to say; none for a night that advised nothing."""
-    if not row["action"]:
-        return ()
-    said = {name: row.get(name) or "" for name in ("loop", "advice", "reason")}
-    said |= {
-        "form": row.get("form") or "ideal",
-        "source": row.get("source_loop") or "the loop that it follows",
-    }
-    said |= {"lack": f": {row['lack']}" if row.get("lack") else "", "period": duration(row.get("period_s"))}
-    if row["action"] == Action.REPAIR_VALVE:
-        said |= dict(zip(("step", "answer"), _stroke(row), strict=True))
-    if row["action"] == Action.RETUNE:
-        said |= {"settings": changed_settings(row), "expected": _expected(row)}
-    order = {part: text.format(**said) for part, text in texts("orders")[_case(row)].items()}
-    look = order["look"] or order.get("else", "")
-    return ("Do", order["do"]), ("Look for", look), ("Then", order["after"])
 
 
 def wearing(night: ShownNight) -> Table:
@@ -100,15 +48,15 @@ def faulty(night: ShownNight) -> Table:
     assessed = [r for r in night.rows if r["status"] == Status.OK]
     faults = (Fault.BACKLASH, Fault.STICTION)
     rows = [r for r in assessed if r["cause"] == Cause.VALVE or r["valve_fault"] in faults]
-    rows.sort(key=lambda r: (r["action"] != Action.REPAIR_VALVE, -(_fault_width(r) or 0.0)))
+    rows.sort(key=lambda r: (r["action"] != Action.REPAIR_VALVE, -(fault_width(r) or 0.0)))
     return night.table("valves", rows, _of_valve)
 
 
 def _of_valve(row: Row) -> dict[str, Told]:
     """What the store does not hold of a valve, and place for what is found."""
     fault = "" if row["valve_fault"] in (None, Fault.NONE) else row["valve_fault"]
-    width = row["stickband_pct"] or row["backlash_pct"]
-    return {"valve_fault": Cell(fault, kind="valve"), "width": width, "test": valve_test(row), "found": ""}
+    known = {"width": fault_width(row), "test": valve_test(row), "found": ""}
+    return {"valve_fault": Cell(fault, kind="valve"), **known}
 
 
 def worn(night: ShownNight) -> Table:

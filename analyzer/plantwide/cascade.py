@@ -8,12 +8,14 @@ from dataclasses import replace
 from typing import Any
 
 from analyzer.config import PlantLimits
+from analyzer.loop.action import ACTING
 from analyzer.loop.decisions import (
     Action,
     Cause,
     Due,
     Finding,
     GroupRole,
+    Lack,
     Remedy,
     Root,
     SignKind,
@@ -30,7 +32,6 @@ OWN = (Cause.VALVE, Cause.TUNING)
 """Causes that are a loop's own."""
 HARMONICS = (1, 2, 3)
 """Parts of a master's period in which a slave's error may cycle: its SP is a wave of any shape."""
-ACTING = (Action.RETUNE, Action.REPAIR_VALVE)
 
 
 def linked(
@@ -68,7 +69,7 @@ def _with_halves(own: Finding, halves: Sequence[Finding], limits: PlantLimits) -
     times = max(size) / min(size)
     apart = stronger.loop, weaker.loop, times, 100.0 * times / (1.0 + times)
     text = sentences("settings")["halves_apart"].format(*apart)
-    return replace(own, remedy=Remedy(Action.UNDECIDED, text))
+    return replace(own, remedy=Remedy(Action.NEEDS_DATA, text), lack=Lack.NEIGHBOUR)
 
 
 def _send_on(done: dict[str, Finding], led: Sequence[str], above: str, root: Root) -> None:
@@ -130,7 +131,8 @@ def _judged_together(
             moved = replace(below, moves=_moves_with(below, above.loop), remedy=remedy)
             return following(above, root, above.swing, seen, limits), moved
         if above.remedy.action in ACTING:
-            return replace(above, remedy=Remedy(Action.UNDECIDED, below_first(below, tie))), below
+            remedy = Remedy(Action.NEEDS_DATA, below_first(below, tie))
+            return replace(above, remedy=remedy, lack=Lack.NEIGHBOUR), below
         return above, below
     if not faulty and below.oscillates and above.oscillates and _alike(above, below, limits):
         root = Root(above.loop, level, None, max(above.confidence.values(), default=0.0))

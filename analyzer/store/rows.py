@@ -12,7 +12,6 @@ from dataclasses import asdict, astuple
 from typing import TYPE_CHECKING, Any
 
 from analyzer.columns import Row, row_of
-from analyzer.lanes.lanes import action_of
 from analyzer.loop.decisions import (
     CAUSES,
     Action,
@@ -74,7 +73,7 @@ def piece_row(found: Finding) -> dict[str, Any]:
         "source_loop": found.follows.loop if found.follows else None,
         "lanes": ", ".join(found.lanes) or None,
         "group": found.group,
-        "action": action_of(found),
+        "action": found.remedy.action,
         "advice": found.remedy.text if ok else None,
         "kp_new": found.remedy.kp_new,
         "ti_new": found.remedy.ti_new,

@@ -52,6 +52,8 @@ OF_A_NIGHT = (
 KEPT = tuple(t for t in OF_A_NIGHT if t.kept)
 TREND = ("time_s", *(f"{signal}_{end}" for signal in ("sp", "pv", "op") for end in ("min", "max")), "bad")
 """Columns of a table of trends beside `loop`, all of them numbers."""
+SHADED = ("manual", "frozen")
+"""Further ones, which earlier versions did not keep."""
 DECLARED = {c.name: c for table in reversed(OF_A_NIGHT) for c in table.columns}
 """Every column that a table of results may have, by name, but for those of trends."""
 WITH_JSON = *declared.NIGHTS, *declared.GROUPS, *declared.BELIEFS
@@ -170,7 +172,7 @@ def _require_declared(path: Path, schema: pa.Schema, wanted: list[str] | None) -
         raise no_column(path, "loop")
     for field in schema:
         column = DECLARED.get(field.name)
-        if column is None and field.name not in TREND:
+        if column is None and field.name not in (*TREND, *SHADED):
             continue
         numbers = column is None or column.is_number
         if not _holds(field.type, numbers):

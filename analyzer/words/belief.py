@@ -12,7 +12,7 @@ from analyzer.words.reason import joined
 from analyzer.words.units import Row, duration, number
 
 if TYPE_CHECKING:
-    from analyzer.belief.belief import Belief
+    from analyzer.belief.belief import Belief, Calm
     from analyzer.belief.wear import Growth, PhaseKnown
 
 REPAIRED = re.compile(
@@ -126,13 +126,19 @@ def _calmed(now: Belief) -> str:
     left, then = now.last, now.before
     assert left is not None
     assert then is not None
-    share = 100.0 * left.significance / max(then.significance, 1e-9)
-    slower = "slower and " if (left.period_s or 0.0) > (then.period_s or 0.0) else ""
-    before = f"every {duration(then.period_s)} until {then.night}"
     return (
-        f"cycles every {duration(left.period_s)}, {slower}{share:.0f} % as much as before its settings were changed; "
-        f"at the next shutdown stroke it; {width_text(now)}; it cycled {before}"
+        f"cycles every {duration(left.period_s)} with {_sizes(left)} since its settings were changed; "
+        f"at the next shutdown stroke it; {width_text(now)}; it cycled every {duration(then.period_s)} with "
+        f"{_sizes(then)} until {then.night}"
     )
+
+
+def _sizes(seen: Calm | None) -> str:
+    """How large a cycle and the error are."""
+    if seen is None:
+        return "an amplitude that is not known"
+    error = f", average absolute error {number(seen.error_pct)} %" if seen.error_pct is not None else ""
+    return f"±{number(seen.amplitude_pct or 0.0)} % of span{error}"
 
 
 def _together(now: Belief, row: Row) -> str:
@@ -181,12 +187,11 @@ def _swing_news(before: Belief, now: Belief, row: Row) -> tuple[str, str] | None
         return f"began to oscillate{after}", "worse"
     if before.cycle.loud and not now.cycle.loud:
         cycles = counts(row["oscillating_pct"])
-        share = 100.0 * (row["oscillation_significance"] or 0.0) / max(now.cycle.top, 1e-9)
-        what = f"oscillates {share:.0f} % as much as before" if cycles else "stopped oscillating"
-        return what + after, "better"
+        what = f"oscillates less: {_sizes(now.last)}; it was {_sizes(before.last)}"
+        return (what if cycles else "stopped oscillating") + after, "better"
     if now.cycle.shift > 0.0:
-        tone = "worse" if now.cycle.shift > 1.0 else "better"
-        return f"oscillates {100 * now.cycle.shift:.0f} % as much as it used to", tone
+        more, tone = ("more", "worse") if now.cycle.shift > 1.0 else ("less", "better")
+        return f"oscillates {more} than it used to: {_sizes(now.last)}", tone
     return None
 
 

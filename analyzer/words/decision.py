@@ -7,6 +7,7 @@ from typing import Any
 
 from analyzer.columns import Row
 from analyzer.loop.decisions import Action, Cause, Due, Fault
+from analyzer.words.orders import order
 from analyzer.words.units import number
 
 TOLD = (
@@ -20,31 +21,33 @@ TOLD = (
         "backlash_pct",
         "stickband_pct",
     ),
-    *("source_loop", "action", "due", "kp", "ti", "kp_new", "ti_new", "reason", "advice"),
+    *("lanes", "source_loop", "action", "due", "kp", "ti", "kp_new", "ti_new", "reason", "advice"),
 )
 """Columns of a decision that commands tell, as the contract of the ranking names them."""
 ABOVE_ACTION = (Cause.VALVE, Cause.TUNING, Cause.LOAD)
 
 
 def as_data(row: Row) -> Row:
-    """A decision as plain data."""
-    return {name: row[name] for name in TOLD}
+    """A decision as plain data, with what to do in words."""
+    return {name: row[name] for name in TOLD} | {"do": _do(row)}
 
 
 def decided(data: Mapping[str, Any]) -> str:
-    """What the night decided of an explained loop, in a sentence; '' where that is not known."""
+    """What the night decided of an explained loop, in sentences; '' where that is not known."""
     row = data.get("night")
     if row is None:
         return ""
     cause = row["cause"] or "not told"
-    action = f"action: {row['action'] or 'none'}{_due(row)}"
-    return f"The night of {row['night']} found: cause {cause}{_fault(row)}; {action}."
+    said = f"The night of {row['night']} found: cause {cause}{_fault(row)}; {row['reason'] or 'no reason'}."
+    return f"{said} Action: {row['action'] or 'none'}{_due(row)}. {_sentence(row['do'])}".strip()
 
 
 def decision_lines(row: Row) -> list[str]:
     """Cause, fault and action with what they rest on, a line each."""
     at = f"{row['loop']}, night {row['night']}: cause {row['cause'] or 'not told'}{_surely(row)}"
     lines = [at + _fault(row), f"action: {row['action'] or 'none'}{_due(row)}"]
+    if _do(row):
+        lines.append(f"do: {_do(row)}")
     if row["action"] == Action.RETUNE:
         ti = f"{number(row['ti_new'])} {row['ti_unit'] or 's'}"
         form = f"{row['gain_unit'] or 'percent'}, {row['form'] or 'ideal'}"
@@ -52,6 +55,15 @@ def decision_lines(row: Row) -> list[str]:
     if row["reason"]:
         lines.append(f"reason: {row['reason']}")
     return lines
+
+
+def _do(row: Row) -> str:
+    """What to do, '' of a loop of which nothing is to be done."""
+    return dict(order(row))["Do"] if row["action"] not in (None, Action.NONE) else ""
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 
 def _surely(row: Row) -> str:

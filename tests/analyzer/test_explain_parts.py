@@ -16,7 +16,7 @@ from analyzer.history.series import Series
 from analyzer.limits import EXPLAIN
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.spec import LoopSpec
-from analyzer.night.asked import Asked
+from analyzer.night.asked import Asked, guarded
 from analyzer.night.nights import ALWAYS
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
@@ -78,7 +78,7 @@ def test_part_in_which_op_stands_still_is_left_out(tmp_path: Path, still: int) -
     start = stamp[0].timestamp()
     changes = (changed(start + 2500, 1.0, 1.5), changed(start + 4000, 1.5, 2.0))
     request = Asked((tmp_path / "x.parquet",), None, changes, ALWAYS, Config(), "UTC", {})
-    explained, others = asked_cases(request, "A", ())
+    explained, others = asked_cases(request, guarded(request), "A", ())
     moving = [n for i, n in enumerate(lengths) if i != still]
     assert [len(c.prepared.record) for c in (explained, *others.values())] == moving
 

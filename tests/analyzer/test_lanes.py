@@ -7,14 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analyzer.lanes.lanes import FIGURE, action_of, in_lanes
+from analyzer.lanes.lanes import FIGURE, in_lanes
+from analyzer.loop.action import decided
 from analyzer.loop.decisions import Action, Finding, Lane, Need, Needs, Remedy, Status
 from analyzer.loops.spec import LoopSpec
 from analyzer.night import chunk
 from analyzer.night.nights import Night
 from analyzer.pages.rank import worst_first
-from analyzer.pages.work import work_order
 from analyzer.store.rows import night_row
+from analyzer.words.orders import order
 from proofs.plant import CONFIG, START_S, Sketch, series, simulate, spec
 from tests.identification.signals import hand_loop
 
@@ -198,8 +199,8 @@ def test_an_op_that_rests_at_its_limit_is_not_nothing_to_do():
     row = {"status": "ok", "action": "none", "cause": "none", "loop": "TIC1", "lanes": "at limit"}
     lanes = (Lane.AT_LIMIT, Lane.LASTING_ERROR)
     idle = Finding("TIC1", "2026-03-02", Status.OK, remedy=Remedy(Action.NONE))
-    assert action_of(replace(idle, lanes=lanes)) is Action.CHECK_LIMIT
-    assert action_of(idle) is Action.NONE
-    (_, do), (_, look), _ = work_order({**row, "action": "check limit"})
+    assert decided(replace(idle, lanes=lanes), False).remedy.action is Action.CHECK_LIMIT
+    assert decided(idle, False).remedy.action is Action.NONE
+    (_, do), (_, look), _ = order({**row, "action": "check limit"})
     assert "limit" in do
     assert "valve's size" in look

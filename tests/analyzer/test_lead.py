@@ -12,6 +12,7 @@ from analyzer.plantwide.view import GroupView
 ROW: dict[str, Any] = {
     **{"loss": None, "oscillation_significance": 0.0, "action": "none", "cause": "none", "lanes": None},
     **{"valve_fault": "none", "period_s": 600.0, "importance": None, "kp": 1.0, "ti": 60.0, "due": None},
+    **{"stickband_pct": None, "backlash_pct": None, "lack": None},
 }
 
 
@@ -53,10 +54,10 @@ def test_only_followers_are_said_to_be_moved() -> None:
 def test_three_at_most_by_what_they_gain() -> None:
     """Of five kinds of work the three that gain most are told; importance counts where it is stated."""
     rows = [
-        row("A", 1.0, action="retune", cause="valve", loss=9.0, importance=3.0),
+        row("A", 1.0, action="retune", cause="valve", valve_fault="backlash", loss=9.0, importance=3.0),
         row("B", 50.0, action="retune", cause="tuning", loss=1.0),
-        row("C", 2.0, action="check measurement", loss=8.0),
-        row("D", 0.0, lanes="at limit", loss=20.0),
+        row("C", 2.0, action="check measurement", lanes="lasting error", loss=8.0),
+        row("D", 0.0, action="check limit", lanes="at limit", loss=20.0),
         row("E", 99.0, action="check settings", loss=0.5),
     ]
     found = first_things(rows)
@@ -68,11 +69,11 @@ def test_three_at_most_by_what_they_gain() -> None:
 
 
 def test_a_valve_that_can_wait_is_told_last():
-    """A worn valve whose loop is calm has a sentence of its own, behind all that costs something tonight."""
+    """A worn valve that can wait has a sentence of its own, behind all that costs something tonight."""
     rows = [row("A", 0.0, **VALVE | {"due": "next shutdown"}), row("B", 0.1, **VALVE | {"due": "now"})]
     assert first_things(rows) == (
         "Stroke the valve of B: it has stiction.",
-        "At the next shutdown look at the valve of A: worn, though its loop is calm.",
+        "At the next shutdown look at the valve of A: worn, and it can wait until then.",
     )
 
 

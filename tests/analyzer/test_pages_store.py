@@ -154,9 +154,10 @@ def test_autocorrelation_equals_its_definition() -> None:
 
 def test_area_score_weighs_importance() -> None:
     """The score is the share of sound loops by importance; an area in which none is assessed has none."""
-    row = {"status": "ok", "importance": 3.0, "cause": "none"}
+    row = {"status": "ok", "importance": 3.0, "cause": "none", "action": "none"}
     bad = {**row, "importance": 1.0, "cause": "valve"}
-    assert score([row, bad]) == 75.0
+    frozen = {**row, "importance": 1.0, "action": "check measurement"}
+    assert score([row, bad]) == score([row, frozen]) == 75.0
     assert score([{**row, "status": "failed"}]) is None
 
 

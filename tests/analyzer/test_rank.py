@@ -229,7 +229,7 @@ def test_wide_has_every_column(small):
     """--wide shows all columns of the table."""
     head = asked(small, "--wide").stdout.splitlines()[2]
     assert all(
-        title in head for title in ("Signif.", "Valve %", "Load %", "Travel %/h", "Kp", "Ti", "Reason")
+        title in head for title in ("Signif.", "Valve %", "Load %", "OP travel %/h", "Kp", "Ti", "Reason")
     )
 
 

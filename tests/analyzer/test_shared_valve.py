@@ -10,7 +10,7 @@ import pytest
 
 from analyzer.config import AdviceLimits, Config, QualityLimits
 from analyzer.explain.case import as_given
-from analyzer.lanes.lanes import action_of, in_lanes
+from analyzer.lanes.lanes import in_lanes
 from analyzer.loop import conclusion
 from analyzer.loop.decisions import CAUSES, Action, Cause, Finding, Lane, Remedy, Status
 from analyzer.loop.oscillation import counting, detect
@@ -126,7 +126,7 @@ def test_a_loop_that_winds_up_is_to_be_set_right() -> None:
     assert told.lanes == (Lane.WINDUP,)
     from analyzer.words.reason import reason
 
-    assert action_of(told) is Action.CHECK_LIMIT
+    assert told.remedy.action is Action.CHECK_LIMIT
     assert "winds up while PIC1 has the valve, takes it back 75 s late" in reason(told)
 
 

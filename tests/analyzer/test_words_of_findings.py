@@ -63,7 +63,7 @@ BOTH_WAYS = {
     SignKind.EVIDENCE: ((0.0,), (9.0,), (9.0, 0.5, 4)),
     SignKind.WIDTH: ((0.0, 0.3), (9.0, 0.3)),
     SignKind.LOAD_LEFT: ((2.0, 0.5), (0.5, 0.5)),
-    SignKind.AMPLIFICATION: ((), (None,), (2.0,), (0.5,)),
+    SignKind.AMPLIFICATION: ((), (None,), (2.0,), (0.5,), (50.0,)),
     SignKind.LOOP_GAIN: ((), (1.2,)),
     SignKind.PROCESS: ((0.9,), (0.1,)),
     SignKind.HARMONIC: ((0.1,),),

@@ -296,7 +296,7 @@
         legend: { show: false }, series, bands,
         scales: { x: { time: true, auto: false, min: whole.min, max: whole.max, range: () => [now.min, now.max] },
           y: { range: reached(panel) } },
-        axes: [axis({ space: 70, values: ticks }), axis({ label, labelSize: 18, labelFont: "11px sans-serif", size: 48 })],
+        axes: [axis({ space: 70, values: ticks }), axis({ label, labelSize: 18, labelFont: "11px sans-serif", size: 48, space: panel === 0 ? 30 : 16 })],
         cursor: { sync: { key: sync.key }, drag: { x: true, y: false, setScale: false }, y: false, focus: { prox: -1 } },
         hooks: {
           drawClear: [(u) => spansOn(u, data.spans)],

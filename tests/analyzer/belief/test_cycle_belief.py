@@ -45,24 +45,40 @@ def test_undecided_nights_that_lean_one_way_decide_together() -> None:
     assert followed(lacking)[-1].told.cause == "undecided"
 
 
+LESS = "oscillates less: ±0.2 % of span"
+
+
+def sizes_of(significance: float) -> dict[str, float]:
+    """A cycle of so much significance, with an amplitude of a tenth and an error of a twentieth of it."""
+    sizes = {"pv_amplitude_pct": significance / 10, "average_absolute_error_pct": significance / 20}
+    return {"oscillation_significance": float(significance), **sizes}
+
+
+def test_a_smaller_cycle_is_told_by_amplitude_and_error() -> None:
+    """Of a cycle that became smaller both amplitudes and both errors are told, and no ratio of scores."""
+    rows = [row(k, LOAD, sizes_of(s)) for k, s in enumerate((20, 21, 2))]
+    before = "it was ±2.1 % of span, average absolute error 1.05 %"
+    assert headlines(rows)[-1] == f"{LESS}, average absolute error 0.1 %; {before}"
+
+
 @pytest.mark.parametrize(
     ("nights", "expected"),
     [
         ([20, 21, 0, 0, 0], ["", "stopped oscillating", "", ""]),
-        ([20, 21, 2, 0, 3, 0, 2], ["", "oscillates 10 % as much as before", "", "", "", ""]),
+        ([20, 21, 2, 0, 3, 0, 2], ["", LESS, "", "", "", ""]),
         ([20, 20, 0, 20], ["", "stopped oscillating", "began to oscillate"]),
         ([20, 8, 20, 8, 20], ["", "", "", ""]),
-        ([20, 20, 8, 8, 8], ["", "", "oscillates 40 % as much as it used to", ""]),
-        ([20, 20, 60, 60, 60], ["", "", "oscillates 300 % as much as it used to", ""]),
+        ([20, 20, 8, 8, 8], ["", "", "oscillates less than it used to: ±0.8 % of span", ""]),
+        ([20, 20, 60, 60, 60], ["", "", "oscillates more than it used to: ±6 % of span", ""]),
     ],
 )
 def test_news_of_the_swing_have_a_memory(nights: list[float], expected: list[str]) -> None:
     """What is small beside what there was neither begins nor ends again, and another size takes two nights."""
     rows = [
-        row(k, LOAD if s else CALM, oscillation_significance=float(s), oscillating_pct=95.0 if s else 0.0)
+        row(k, LOAD if s else CALM, sizes_of(s), oscillating_pct=95.0 if s else 0.0)
         for k, s in enumerate(nights)
     ]
-    assert headlines(rows) == expected
+    assert [text.split(", average")[0] for text in headlines(rows)] == expected
 
 
 def test_a_loop_that_cycles_for_a_part_of_the_night_has_not_stopped() -> None:

@@ -102,7 +102,7 @@ def test_a_master_gets_no_settings_while_its_slave_has_a_fault() -> None:
     """Cycles of other periods are each loop's own, yet the master waits for its slave."""
     slave = found("FIC1", Cause.VALVE, 60.0, Action.REPAIR_VALVE)
     master, _ = night(found("TIC1", Cause.TUNING, 1000.0, Action.RETUNE), slave)
-    assert (master.follows, master.cause, master.remedy.action) == (None, Cause.TUNING, Action.UNDECIDED)
+    assert (master.follows, master.cause, master.remedy.action) == (None, Cause.TUNING, Action.NEEDS_DATA)
     assert "FIC1" in master.remedy.text
 
 

@@ -1,0 +1,128 @@
+"""What to do: the order of a loop in three lines by its row, the same on every page and in every command, and the
+sentence for several loops of one kind of work. The texts stand in orders.toml."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from analyzer.columns import Row
+from analyzer.lanes.lanes import lanes_in
+from analyzer.limits import PAGES
+from analyzer.loop.decisions import Action, Cause, Due, Fault, Lane
+from analyzer.words import toml_of
+from analyzer.words.units import changed_settings, duration
+
+Cases = Mapping[Action, Callable[[Row], str]]
+
+
+def texts(part: str) -> dict[str, Any]:
+    """A part of orders.toml."""
+    found: dict[str, Any] = toml_of("analyzer.words", "orders.toml")[part]
+    return found
+
+
+def fault_width(row: Row) -> float | None:
+    """Stickband or backlash [% of OP]; None where there is none."""
+    return row["stickband_pct"] or row["backlash_pct"] or None
+
+
+def stroke(row: Row) -> tuple[str, str]:
+    """Steps of the stroke test of a valve at fault [%], and what it does in them; '' where it does not answer."""
+    width, kind = fault_width(row), texts("by_hand").get(row["valve_fault"], "")
+    if width is None:
+        return "5", kind.format(width="some steps")
+    return f"{width / PAGES.stroke_steps:.2g}", kind.format(width=f"about {width:.2g} %")
+
+
+def _of_valve(row: Row) -> str:
+    if not stroke(row)[1]:
+        return "dead valve"
+    return "next shutdown" if row.get("due") == Due.SHUTDOWN else Action.REPAIR_VALVE
+
+
+def _of_limit(row: Row) -> str:
+    lanes = lanes_in(row)
+    return "winds up" if Lane.WINDUP in lanes and Lane.AT_LIMIT not in lanes else Action.CHECK_LIMIT
+
+
+def _of_lack(row: Row) -> str:
+    lanes = lanes_in(row)
+    if Lane.MANUAL in lanes:
+        return "manual"
+    if row["cause"] == Cause.TUNING:
+        return "too tight"
+    return "sluggish" if Lane.SLUGGISH in lanes else Action.NEEDS_DATA
+
+
+CASES: Cases = {
+    Action.REPAIR_VALVE: _of_valve,
+    Action.CHECK_LIMIT: _of_limit,
+    Action.CHECK_MEASUREMENT: lambda row: (
+        "frozen" if Lane.FROZEN in lanes_in(row) else Action.CHECK_MEASUREMENT
+    ),
+    Action.CHECK_SETTINGS: lambda row: (
+        "unstated" if None in (row["kp"], row["ti"]) else Action.CHECK_SETTINGS
+    ),
+    Action.NEEDS_DATA: _of_lack,
+}
+"""Which case of an action a row is, where an action has several."""
+RETUNED = {Cause.VALVE: "retune worn", Cause.NONE: "retune sluggish", Cause.TUNING: "retune"}
+"""Kinds of work that new settings are, by the cause; of others an experiment tells the process."""
+
+
+EXPECTED = {
+    Cause.VALVE: "the cycle comes to rest, by simulation, though the valve stays as it is",
+    Cause.NONE: "PV comes back to its set point several times sooner, and OP moves more",
+    Cause.TUNING: "the swing dies away within a few periods",
+}
+"""What new settings make of a loop of which no cycle is predicted, by the cause."""
+
+
+def case_of(row: Row) -> str:
+    """The case of a row's action: of some actions the row says which."""
+    action = Action(row["action"])
+    return CASES[action](row) if action in CASES else action
+
+
+def _expected(row: Row) -> str:
+    """What new settings make of the cycle."""
+    if None not in (row.get("expected_period_s"), row.get("expected_pv_amplitude_pct")):
+        swing = f"{row['expected_pv_amplitude_pct']:.2g} % of span"
+        return f"a cycle of {duration(row['expected_period_s'])} and {swing}: the valve stays as it is"
+    return EXPECTED.get(row["cause"], "PV answers the set point as the model of the experiment does")
+
+
+def order(row: Row) -> tuple[tuple[str, str], ...]:
+    """Lead and text of three lines, '' where there is nothing to say; none for a night that advised nothing."""
+    if not row["action"]:
+        return ()
+    said = {name: row.get(name) or "" for name in ("loop", "advice", "reason")}
+    said |= {"form": row.get("form") or "ideal", "period": duration(row.get("period_s"))}
+    said |= {"source": row.get("source_loop") or "the loop that it follows"}
+    said |= {"lack": texts("lacks")[row.get("lack") or ""].format(**said)}
+    if row["action"] == Action.REPAIR_VALVE:
+        said |= dict(zip(("step", "answer"), stroke(row), strict=True))
+    if row["action"] == Action.RETUNE:
+        said |= {"settings": changed_settings(row), "expected": _expected(row)}
+    parts = {part: text.format(**said) for part, text in texts("orders")[case_of(row)].items()}
+    return ("Do", parts["do"]), ("Look for", parts["look"] or parts.get("else", "")), ("Then", parts["after"])
+
+
+def kind_of_work(row: Row) -> str:
+    """The kind of work that a row asks for, of which one sentence tells all loops; '' of none."""
+    if not row["action"]:
+        return ""
+    kind = (
+        RETUNED.get(row["cause"], "retune by experiment") if row["action"] == Action.RETUNE else case_of(row)
+    )
+    return kind if kind in texts("work") else ""
+
+
+def asked(work: str, rows: Sequence[Row], names: str) -> str:
+    """The sentence of a kind of work on some loops, which `names` lists."""
+    sticks = sum(r["valve_fault"] == Fault.STICTION for r in rows)
+    kinds = {len(rows): "has stiction", 0: "has backlash"}
+    said, period = texts("work")[work], duration(rows[0]["period_s"])
+    text = said["one"] if len(rows) == 1 else said.get("several", said["one"])
+    return str(text.format(names=names, fault=kinds.get(sticks, "has stiction or backlash"), period=period))
