@@ -50,7 +50,7 @@ class Scans(NamedTuple):
 
     rows: Rows
     law: Pid
-    count: int
+    per_row: int
 
 
 class LoopAtScan(NamedTuple):
@@ -81,8 +81,8 @@ def settled(fit: Fit, scans: Scans) -> Fit:
 def with_scans(fit: Fit, scans: Scans) -> Fit:
     """A fit whose window has OP at the controller's scan, as its model makes it."""
     window, paths = fit.window, op_at_scans(fit, scans)
-    turn = window.turn // window.steps * scans.count
-    return replace(fit, window=replace(window, op=paths[0], paths=paths, steps=scans.count, turn=turn))
+    turn = window.turn // window.steps * scans.per_row
+    return replace(fit, window=replace(window, op=paths[0], paths=paths, steps=scans.per_row, turn=turn))
 
 
 def op_at_scans(fit: Fit, scans: Scans) -> Floats:
@@ -90,7 +90,7 @@ def op_at_scans(fit: Fit, scans: Scans) -> Floats:
     row, within rows what the law makes of PV with noise of its own. Noise is drawn from a fixed seed, each with its
     opposite.
     """
-    rows, count = scans.rows, scans.count
+    rows, count = scans.rows, scans.per_row
     step_s, process = fit.window.row_s / count, fit.process
     lag = unit_lag(process.time_constant_s, max(process.dead_time_s, 0.0), step_s)
     valve = StemLaw(*(float(x) for x in fit.valve))
