@@ -67,6 +67,8 @@ def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompar
     for seen in _ways(x, LAW.longest_filter * period_s, stated):
         if seen.does(gains):
             return LawsCompared(with_shape(stated, seen.shape), 1.0, 1.0, True)
+        if not seen.is_law(gains):
+            continue
         if best is None or seen.poorness(seen.free) < best.poorness(best.free) - LAW.worth:
             best = seen
         if given is None or seen.poorness(gains) < given.poorness(gains):

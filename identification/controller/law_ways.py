@@ -32,6 +32,8 @@ from identification.simulation.pi import Law, acting_error
 
 ON_ERROR = ((1.0, 1.0), (1.0, 0.0), (0.0, 0.0))
 """What gain and derivative take of the set point's moves: the usual three [-]."""
+LATE = ((0, 0), (1, 0), (1, 1))
+"""By how many samples OP's stamps may be later than those of PV and of SP."""
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 Shape = tuple[float, float, bool]
 """Gap [% PV], gain inside it [-], and whether the error is squared."""
@@ -41,12 +43,18 @@ STRAIGHT: Shape = (0.0, 0.0, False)
 @dataclass(frozen=True, slots=True)
 class Seen:
     """A record as one way of the law's sees it: products of increments by their length in samples, what each weighs,
-    the freest law, and the shape of the error."""
+    the freest law, the shape of the error, and whether its gain takes nothing of the set point's moves."""
 
     moves: dict[int, Floats]
     weight: Floats
     free: Floats
     shape: Shape = STRAIGHT
+    without_sp: bool = False
+
+    def is_law(self, gains: Floats) -> bool:
+        """Whether the freest law may be a controller's beside stated gains: without the set point's moves, one of the
+        other sign is how PV answers OP."""
+        return not self.without_sp or bool(self.free[0] * gains[0] >= 0.0)
 
     def left(self, gains: Floats) -> Floats:
         """Share of OP's variance that gains leave at each length of increments [-]."""
@@ -135,7 +143,7 @@ class Look:
     out: Mask
     lengths: tuple[int, ...]
 
-    def seen(self, rows: Floats, shape: Shape) -> Seen | None:
+    def seen(self, rows: Floats, shape: Shape, without_sp: bool = False) -> Seen | None:
         """One way of it; None where no length tells a law."""
         every = len(self.record) // LAW.most_increments
         of = {k: increments(rows, self.out, k, max(k // 8, every, 1), True) for k in self.lengths}
@@ -148,7 +156,7 @@ class Look:
             free[2] * free[0] < 0.0
         ):  # no controller has such a derivative: it mends a filter that is not the true one
             free = best_gains(found.values(), weight, np.eye(3)[:2], np.zeros(3))
-        return Seen(found, weight, free, shape)
+        return Seen(found, weight, free, shape, without_sp)
 
     def plainly(self, shape: Shape) -> Seen | None:
         """The plainest way, of an error of that shape."""
@@ -169,29 +177,32 @@ def usual_ways(x: Look, longest_s: float, stated: Pid, shape: Shape) -> Iterator
     narrow = LAW.slope_filters + (LAW.more_slope_filters if stated.td_s > 0 else ())
     moves = float(np.ptp(record.sp)) > 0 and not record.sp_estimated
     filters = [f for f in LAW.pv_filters if f == 0.0 or f * record.dt_s <= longest_s]
-    for smooth, late in product(filters, (0, 1)):
-        pv = first_order(record.pv, smooth)
-        pv = np.concatenate((pv[:1], pv[:-1])) if late else pv
-        for rows in _slopes(record, pv, narrow, moves, shape):
-            found = x.seen(rows, shape)
+    for smooth, (late_pv, late_sp) in product(filters, LATE if moves else LATE[:2]):
+        pv, sp = delayed(first_order(record.pv, smooth), late_pv), delayed(record.sp, late_sp)
+        for rows, without_sp in _slopes(record, sp, pv, narrow, moves, shape):
+            found = x.seen(rows, shape, without_sp)
             if found is not None:
                 yield found
 
 
+def delayed(x: Floats, samples: int) -> Floats:
+    """A signal so many samples later, shape (n,)."""
+    return np.concatenate((np.repeat(x[:1], samples), x[: x.size - samples]))
+
+
 def _slopes(
-    record: LoopRecord, pv: Floats, narrow: Iterable[float], moves: bool, shape: Shape
-) -> Iterator[Floats]:
-    """Rows of every slope filter and of every weight of the set point; one that nothing is known of goes with the set
-    point's moves."""
-    sp = record.sp
+    record: LoopRecord, sp: Floats, pv: Floats, narrow: Iterable[float], moves: bool, shape: Shape
+) -> Iterator[tuple[Floats, bool]]:
+    """Rows, and whether the gain takes nothing of the set point's moves, of every slope filter and every weight of
+    the set point; one that nothing is known of goes with the set point's moves."""
     for (on_gain, on_slope), filtered in product(ON_ERROR if moves else ON_ERROR[:1], narrow):
         slope = np.diff(on_slope * sp - pv, prepend=on_slope * sp[0] - pv[0]) / record.dt_s
         rows = rows_of(record, shaped(sp - pv, shape), first_order(slope, filtered))
         rows[0] += (on_gain - 1.0) * sp
-        yield rows
+        yield rows, on_gain == 0.0
     if moves:
         slope = np.diff(-pv, prepend=-pv[0]) / record.dt_s
-        yield np.vstack((rows_of(record, shaped(sp - pv, shape), slope), sp))
+        yield np.vstack((rows_of(record, shaped(sp - pv, shape), slope), sp)), True
 
 
 def rough_ways(x: Look, shape: Shape) -> Iterator[Seen]:
@@ -204,7 +215,7 @@ def rough_ways(x: Look, shape: Shape) -> Iterator[Seen]:
     if float(np.ptp(record.sp)) > 0:
         rows.append(np.vstack((rows[0], record.sp)))
     for each in rows:
-        found = x.seen(each, shape)
+        found = x.seen(each, shape, each is not rows[0])
         if found is not None:
             yield found
 

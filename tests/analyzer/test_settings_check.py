@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from analyzer.config import Config
-from analyzer.loop.judged_stretch import differing
+from analyzer.history.export import open_export
+from analyzer.loop.judged_stretch import controller_of, differing
+from analyzer.loop.measure import time_scale
+from analyzer.loop.quality import prepare
+from analyzer.loops.tags import match, read_loops
 from identification.models import Pid
 from identification.record import LoopRecord
 
+TEP = Path(__file__).parents[2].parent / "shared" / "recordings" / "tep"
 N = 4000
 PI = Pid(2.0, 80.0)
 P = Pid(2.0, math.inf)
@@ -82,3 +88,18 @@ def test_a_constant_error_of_pv_is_no_other_integral_time():
     """PV a little off all night, as its rounding makes it, leaves the true settings alone."""
     record = recorded(PI)
     assert told(replace(record, pv=record.pv + 0.05), PI) is None
+
+
+@pytest.mark.skipif(not TEP.exists(), reason="the recordings lie outside the repository")
+@pytest.mark.parametrize("loop", ["FIC3", "FIC6"])
+def test_a_flow_that_answers_op_is_not_taken_for_the_law(loop):
+    """In a cascade of the Tennessee Eastman plant OP is stamped a sample after SP and PV, and PV follows OP at once:
+    the gain stated is let be, and no gain of the other sign is told."""
+    export = open_export([TEP / "idv14.parquet"])
+    specs, *_ = match(read_loops(TEP / "loops.csv"), export.tags)
+    spec = next(s for s in specs if s.loop == loop)
+    prepared = prepare(spec, export.read(spec.tags), Config().quality)
+    stated = controller_of(spec, prepared)
+    assert stated is not None
+    scale = time_scale(prepared.record, None, stated)
+    assert differing(prepared.record, stated, scale, Config().settings) is None
