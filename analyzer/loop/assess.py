@@ -27,7 +27,7 @@ from analyzer.loop.cause import (
 from analyzer.loop.cycling_span import Span, detect_where_it_cycles
 from analyzer.loop.decisions import Cause, Lack, LacksError, Need, Needs
 from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
-from analyzer.loop.judged_stretch import Earlier, Stretch, differing, judged_stretch
+from analyzer.loop.judged_stretch import Earlier, Stretch, as_recorded, differing, judged_stretch
 from analyzer.loop.measure import Measured, measure, ringing_period, time_scale
 from analyzer.loop.oscillation import Oscillation, Oscillations, barely_seen, counting, detect
 from analyzer.loop.page_trends import BUCKETS, FINE_BUCKETS, close_view, thinned
@@ -179,8 +179,12 @@ def _known_without_op(figures: Assessments, op: bool) -> Assessments:
 
 
 def hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, config: Config) -> Needs | None:
-    """Why what is seen, or not, says nothing: the loop's cycles are too fast for the sampling; None where not."""
+    """Why what is seen, or not, says nothing: the loop's cycles are too fast for the sampling; None where not. An
+    integral time that is stated says so only where the record shows no other."""
     samples = config.oscillation.samples
+    if controller is not None and config.advice.cycle_per_ti * controller.ti_s < samples * record.dt_s:
+        scale_s = time_scale(record, counting(found), controller)
+        controller = as_recorded(record, controller, scale_s, config.settings)
     if found.first is not None:
         folded = None if controller is None else config.advice.cycle_per_ti * controller.ti_s
         if folded is None or folded >= NYQUIST * record.dt_s:

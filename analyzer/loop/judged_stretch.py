@@ -134,6 +134,15 @@ def differing(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsL
     return None
 
 
+def as_recorded(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits) -> Pid:
+    """The controller whose integral time says whether a record's samples suffice: the recorded one where the record
+    shows a law with a gain, however little that differs from the stated one, else the stated one."""
+    seen = compare_laws(record, scale_s, stated)
+    if seen is None or seen.explained < limits.explained or seen.found.kp == 0.0:
+        return stated
+    return seen.found
+
+
 def _of_another_form(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits) -> Pid | None:
     """The controller whose settings were stated in another form, series for ideal or the reverse, where the record
     obeys it; the stated one is known not to be it."""

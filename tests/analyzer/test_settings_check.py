@@ -11,8 +11,10 @@ import pytest
 
 from analyzer.config import Config
 from analyzer.history.export import open_export
+from analyzer.loop.assess import hidden
 from analyzer.loop.judged_stretch import controller_of, differing
 from analyzer.loop.measure import time_scale
+from analyzer.loop.oscillation import detect
 from analyzer.loop.quality import prepare
 from analyzer.loops.tags import match, read_loops
 from identification.models import Pid
@@ -88,6 +90,22 @@ def test_a_constant_error_of_pv_is_no_other_integral_time():
     """PV a little off all night, as its rounding makes it, leaves the true settings alone."""
     record = recorded(PI)
     assert told(replace(record, pv=record.pv + 0.05), PI) is None
+
+
+def thinned(record: LoopRecord, every: int) -> LoopRecord:
+    """One sample of so many."""
+    of = slice(0, None, every)
+    return LoopRecord("L", 0.0, every * 1.0, record.sp[of], record.pv[of], record.op[of], record.bad[of])
+
+
+@pytest.mark.parametrize(("true_s", "stated_s", "lacks"), [(80.0, 80.0 / 60.0, False), (4.0, 4.0, True)])
+def test_a_short_integral_time_hides_a_cycle_only_where_the_record_agrees(true_s, stated_s, lacks):
+    """At a sample every 10 s a loop of 80 s that is stated in minutes is seen to oscillate or not; one of 4 s is
+    not."""
+    config = Config()
+    record = thinned(recorded(replace(PI, ti_s=true_s, kp=PI.kp if true_s > 10.0 else 0.1)), 10)
+    needs = hidden(record, detect(record, config.oscillation), replace(PI, ti_s=stated_s), config)
+    assert (needs is not None) == lacks
 
 
 @pytest.mark.skipif(not TEP.exists(), reason="the recordings lie outside the repository")
