@@ -24,7 +24,7 @@ from analyzer.loops.changes import TuningChange, settings_before
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller as stated_controller
 from identification.controller.check import runs
-from identification.controller.law_comparison import LawsCompared, compare_laws
+from identification.controller.law_comparison import LawsCompared, best_of, compare_laws
 from identification.models import Pid
 from identification.record import LoopRecord, Mask
 
@@ -125,7 +125,9 @@ def differing(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsL
         if seen is None:
             continue
         if seen.agree:
-            return None
+            forms = other_forms(stated) if stated.scan_s >= record.dt_s else ()
+            best = best_of(part, scale_s, (stated, *forms)) if forms else stated
+            return None if best is stated else best
         if _plainly(seen, stated, record.dt_s, limits):
             return seen.found
         form = _of_another_form(part, stated, scale_s, limits)

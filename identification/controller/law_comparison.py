@@ -3,7 +3,7 @@ states."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
@@ -46,14 +46,14 @@ class LawsCompared:
 def _ways(x: Look, longest_s: float, stated: Pid) -> Iterator[Seen]:
     """All ways, the stated shape's first, then those of what no list states."""
     own, gains = shape_of(stated), gains_of(stated)
-    yield from usual_ways(x, longest_s, stated, own)
+    yield from usual_ways(x, longest_s, own, stated)
     if stated.scan_s < x.record.dt_s:
         yield from rough_ways(x, own)
     if own == STRAIGHT:
         for shape in bent_shapes(x, gains):
-            yield from chain(usual_ways(x, 0.0, replace(stated, td_s=0.0), shape), rough_ways(x, shape))
+            yield from chain(usual_ways(x, 0.0, shape), rough_ways(x, shape))
     else:
-        yield from usual_ways(x, longest_s, stated, STRAIGHT)
+        yield from usual_ways(x, longest_s, STRAIGHT, stated)
 
 
 def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompared | None:
@@ -79,6 +79,20 @@ def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompar
         return None
     found = _simplest(best, gains, record.duration_s, with_shape(stated, best.shape))
     return None if found is None else _most_apart(best, given, gains, *found)
+
+
+def best_of(record: LoopRecord, period_s: float, laws: Sequence[Pid]) -> Pid:
+    """The one of some laws with a derivative that gives OP plainly best, the first where none does.
+
+    Laws that agree with a record on a law's usual uncertainty are told apart here by what they leave of an OP whose
+    every scan is recorded.
+    """
+    poor = np.full(len(laws), np.inf)
+    for seen in usual_ways(look(record, period_s, laws[0]), 0.0, STRAIGHT, *laws):
+        left = np.stack([seen.left(gains_of(law)) for law in laws])
+        poor = np.minimum(poor, np.log(np.maximum(left, LAW.rounding)).mean(axis=1))
+    best = int(np.argmin(poor))
+    return laws[best] if poor[0] - poor[best] > LAW.plainly_better else laws[0]
 
 
 def _settled(best: Seen, given: Seen, gains: Floats) -> bool:

@@ -171,10 +171,15 @@ def look(record: LoopRecord, scale_s: float, stated: Pid) -> Look:
     return Look(record, no_law(record, stated), lengths)
 
 
-def usual_ways(x: Look, longest_s: float, stated: Pid, shape: Shape) -> Iterator[Seen]:
-    """The usual ways of a law on an error of that shape, the plainest first; longest_s : filter of PV [s]."""
-    record = x.record
-    narrow = LAW.slope_filters + (LAW.more_slope_filters if stated.td_s > 0 else ())
+def slope_filters(dt_s: float, laws: Iterable[Pid]) -> tuple[float, ...]:
+    """Time constants of the slope's filter [samples]: usual parts of the laws' derivative times, then others."""
+    parts = {n * dt_s / c.td_s for c in laws if c.td_s > 0 for n in LAW.filter_parts}
+    return (*(float(1.0 / np.log1p(part)) for part in sorted(parts)), *LAW.slope_filters)
+
+
+def usual_ways(x: Look, longest_s: float, shape: Shape, *laws: Pid) -> Iterator[Seen]:
+    """The usual ways of laws on an error of that shape, the plainest first; longest_s : filter of PV [s]."""
+    record, narrow = x.record, slope_filters(x.record.dt_s, laws)
     moves = float(np.ptp(record.sp)) > 0 and not record.sp_estimated
     filters = [f for f in LAW.pv_filters if f == 0.0 or f * record.dt_s <= longest_s]
     for smooth, (late_pv, late_sp) in product(filters, LATE if moves else LATE[:2]):

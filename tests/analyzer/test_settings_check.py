@@ -92,6 +92,17 @@ def test_a_constant_error_of_pv_is_no_other_integral_time():
     assert told(replace(record, pv=record.pv + 0.05), PI) is None
 
 
+def test_a_series_law_stated_as_ideal_is_told_where_every_scan_is_recorded():
+    """The series law of Kp 2, Ti 80 s, Td 4 s is the ideal one of 2.1, 84 and 3.81; read as an ideal law of 2, 80 and
+    4 it is told though its gain is 5 % off, and stated as it is it is let be."""
+    as_it_is, as_read = Pid(2.1, 84.0, 80.0 * 4.0 / 84.0), Pid(2.0, 80.0, 4.0)
+    record = recorded(as_it_is)
+    assert told(record, as_it_is) is None
+    found = told(record, as_read)
+    assert found is not None
+    assert (found.kp, found.ti_s, found.td_s) == pytest.approx((2.1, 84.0, as_it_is.td_s), rel=1e-6)
+
+
 def thinned(record: LoopRecord, every: int) -> LoopRecord:
     """One sample of so many."""
     of = slice(0, None, every)
