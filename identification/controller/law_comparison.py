@@ -13,9 +13,11 @@ from identification.controller.law_ways import (
     STRAIGHT,
     Look,
     Seen,
+    Way,
     bent_shapes,
     gains_of,
     look,
+    recognized,
     rough_ways,
     shape_of,
     usual_ways,
@@ -60,13 +62,13 @@ def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompar
     """A stated law, and the one that the record shows, which differs in as few settings as explain OP.
 
     period_s : period, or other time scale on which the loop moves [s]. None where the record tells none; the
-    stated law, with the shape of error that the record shows, where that does.
+    stated law, with what the record shows beside, where that does.
     """
     gains, x = gains_of(stated), look(record, period_s, stated)
     best, given = None, None
     for seen in _ways(x, LAW.longest_filter * period_s, stated):
         if seen.does(gains):
-            return LawsCompared(with_shape(stated, seen.shape), 1.0, 1.0, True)
+            return LawsCompared(recognized(x, stated, _way_needed(seen, given, stated)), 1.0, 1.0, True)
         if not seen.is_law(gains):
             continue
         if best is None or seen.poorness(seen.free) < best.poorness(best.free) - LAW.worth:
@@ -77,8 +79,17 @@ def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompar
             break
     if best is None or given is None:
         return None
-    found = _simplest(best, gains, record.duration_s, with_shape(stated, best.shape))
+    found = _simplest(best, gains, record.duration_s, with_shape(stated, best.way.shape))
     return None if found is None else _most_apart(best, given, gains, *found)
+
+
+def _way_needed(seen: Seen, before: Seen | None, stated: Pid) -> Way:
+    """The way in which the stated law gives OP; with the stated shape where that does about as well."""
+    own, gains = shape_of(stated), gains_of(stated)
+    if seen.way.shape == own or before is None:
+        return seen.way
+    bent = before.poorness(gains) - seen.poorness(gains) > LAW.plainly_better
+    return seen.way if bent else replace(seen.way, shape=own)
 
 
 def best_of(record: LoopRecord, period_s: float, laws: Sequence[Pid]) -> Pid:

@@ -41,20 +41,29 @@ STRAIGHT: Shape = (0.0, 0.0, False)
 
 
 @dataclass(frozen=True, slots=True)
+class Way:
+    """What a law has beside its gains: the shape of the error, a filter of PV [samples], and what the gain takes of
+    the set point's moves [-], None where that is not known."""
+
+    shape: Shape = STRAIGHT
+    pv_filter: float = 0.0
+    sp_weight: float | None = 1.0
+
+
+@dataclass(frozen=True, slots=True)
 class Seen:
     """A record as one way of the law's sees it: products of increments by their length in samples, what each weighs,
-    the freest law, the shape of the error, and whether its gain takes nothing of the set point's moves."""
+    the freest law, and what beside gains the way has."""
 
     moves: dict[int, Floats]
     weight: Floats
     free: Floats
-    shape: Shape = STRAIGHT
-    without_sp: bool = False
+    way: Way
 
     def is_law(self, gains: Floats) -> bool:
         """Whether the freest law may be a controller's beside stated gains: without the set point's moves, one of the
         other sign is how PV answers OP."""
-        return not self.without_sp or bool(self.free[0] * gains[0] >= 0.0)
+        return self.way.sp_weight == 1.0 or bool(self.free[0] * gains[0] >= 0.0)
 
     def left(self, gains: Floats) -> Floats:
         """Share of OP's variance that gains leave at each length of increments [-]."""
@@ -88,7 +97,8 @@ def fastest(op: Floats) -> Mask:
     top = float(size.max())
     at = size >= LAW.at_rate * top
     nearly = np.count_nonzero((size >= LAW.near_rate * top) & ~at)
-    limited = top > 0.0 and np.count_nonzero(at) > LAW.clamped * (nearly + LAW.end_samples)
+    coarse = top < LAW.rate_steps * float(np.min(size, where=size > 0.0, initial=np.inf))
+    limited = not coarse and np.count_nonzero(at) > LAW.clamped * (nearly + LAW.end_samples)
     return _spread(at) if limited else np.zeros(op.size, dtype=bool)
 
 
@@ -143,7 +153,7 @@ class Look:
     out: Mask
     lengths: tuple[int, ...]
 
-    def seen(self, rows: Floats, shape: Shape, without_sp: bool = False) -> Seen | None:
+    def seen(self, rows: Floats, way: Way) -> Seen | None:
         """One way of it; None where no length tells a law."""
         every = len(self.record) // LAW.most_increments
         of = {k: increments(rows, self.out, k, max(k // 8, every, 1), True) for k in self.lengths}
@@ -156,11 +166,11 @@ class Look:
             free[2] * free[0] < 0.0
         ):  # no controller has such a derivative: it mends a filter that is not the true one
             free = best_gains(found.values(), weight, np.eye(3)[:2], np.zeros(3))
-        return Seen(found, weight, free, shape, without_sp)
+        return Seen(found, weight, free, way)
 
     def plainly(self, shape: Shape) -> Seen | None:
         """The plainest way, of an error of that shape."""
-        return self.seen(rows_of(self.record, shaped(self.record.error, shape)), shape)
+        return self.seen(rows_of(self.record, shaped(self.record.error, shape)), Way(shape))
 
 
 def look(record: LoopRecord, scale_s: float, stated: Pid) -> Look:
@@ -184,8 +194,8 @@ def usual_ways(x: Look, longest_s: float, shape: Shape, *laws: Pid) -> Iterator[
     filters = [f for f in LAW.pv_filters if f == 0.0 or f * record.dt_s <= longest_s]
     for smooth, (late_pv, late_sp) in product(filters, LATE if moves else LATE[:2]):
         pv, sp = delayed(first_order(record.pv, smooth), late_pv), delayed(record.sp, late_sp)
-        for rows, without_sp in _slopes(record, sp, pv, narrow, moves, shape):
-            found = x.seen(rows, shape, without_sp)
+        for rows, weight in _slopes(record, sp, pv, narrow, moves, shape):
+            found = x.seen(rows, Way(shape, smooth, weight))
             if found is not None:
                 yield found
 
@@ -197,17 +207,17 @@ def delayed(x: Floats, samples: int) -> Floats:
 
 def _slopes(
     record: LoopRecord, sp: Floats, pv: Floats, narrow: Iterable[float], moves: bool, shape: Shape
-) -> Iterator[tuple[Floats, bool]]:
-    """Rows, and whether the gain takes nothing of the set point's moves, of every slope filter and every weight of
-    the set point; one that nothing is known of goes with the set point's moves."""
+) -> Iterator[tuple[Floats, float | None]]:
+    """Rows of every slope filter and every weight of the set point, and that weight; None with the rows in which what
+    goes with the set point's moves is left out."""
     for (on_gain, on_slope), filtered in product(ON_ERROR if moves else ON_ERROR[:1], narrow):
         slope = np.diff(on_slope * sp - pv, prepend=on_slope * sp[0] - pv[0]) / record.dt_s
         rows = rows_of(record, shaped(sp - pv, shape), first_order(slope, filtered))
         rows[0] += (on_gain - 1.0) * sp
-        yield rows, on_gain == 0.0
+        yield rows, on_gain
     if moves:
         slope = np.diff(-pv, prepend=-pv[0]) / record.dt_s
-        yield np.vstack((rows_of(record, shaped(sp - pv, shape), slope), sp)), True
+        yield np.vstack((rows_of(record, shaped(sp - pv, shape), slope), sp)), None
 
 
 def rough_ways(x: Look, shape: Shape) -> Iterator[Seen]:
@@ -219,8 +229,8 @@ def rough_ways(x: Look, shape: Shape) -> Iterator[Seen]:
     rows = [np.vstack((rows_of(record, shaped(record.error, shape), slope), pv - beside))]
     if float(np.ptp(record.sp)) > 0:
         rows.append(np.vstack((rows[0], record.sp)))
-    for each in rows:
-        found = x.seen(each, shape, each is not rows[0])
+    for each, weight in zip(rows, (1.0, None), strict=False):
+        found = x.seen(each, Way(shape, sp_weight=weight))
         if found is not None:
             yield found
 
@@ -254,3 +264,32 @@ def _best_gap(x: Look, size: float, inside: float, gains: Floats | None) -> floa
         a, b = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
         low, high = (low, b) if poor(a) < poor(b) else (a, high)
     return 0.5 * (low + high)
+
+
+def recognized(x: Look, stated: Pid, way: Way) -> Pid:
+    """A stated controller with what the record shows beside: what the way has in which it obeys the stated gains, and
+    limits of OP and of its rate at which it is seen."""
+    record, c = x.record, with_shape(stated, way.shape)
+    if way.pv_filter >= LAW.seen_filter and not stated.pv_filter_s:
+        c = replace(c, pv_filter_s=_best_filter(x, way, stated) * record.dt_s)
+    if way.sp_weight == 0.0 and c.kp and c.scan_s >= record.dt_s:
+        c = replace(c, sp_weight=0.0)
+    if fastest(record.op).any():
+        c = replace(c, op_rate=min(c.op_rate, float(np.abs(np.diff(record.op)).max()) / record.dt_s))
+    at_end, middle = record.op[clamped(record.op)], 0.5 * float(record.op.min() + record.op.max())
+    low, high = at_end[at_end < middle], at_end[at_end > middle]
+    return replace(c, op_lo=float(max([c.op_lo, *low[:1]])), op_hi=float(min([c.op_hi, *high[:1]])))
+
+
+def _best_filter(x: Look, way: Way, stated: Pid) -> float:
+    """The filter of PV near that of a way with which the stated gains give OP best [samples]; the way's own beside a
+    derivative, which has a filter too."""
+    if stated.td_s:
+        return way.pv_filter
+
+    def poor(smooth: float) -> float:
+        error = x.record.sp - first_order(x.record.pv, smooth)
+        seen = x.seen(rows_of(x.record, shaped(error, way.shape)), way)
+        return np.inf if seen is None else seen.poorness(gains_of(stated))
+
+    return float(min(way.pv_filter * np.geomspace(0.5, 2.0, LAW.filters_near), key=poor))
