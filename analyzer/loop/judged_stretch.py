@@ -25,6 +25,7 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller as stated_controller
 from identification.controller.check import runs
 from identification.controller.law_comparison import LawsCompared, best_of, compare_laws
+from identification.controller.pid_regression import fit_pi
 from identification.models import Pid
 from identification.record import LoopRecord, Mask
 
@@ -111,15 +112,26 @@ def _factor(a: float, b: float) -> float:
     return max(a / b, b / a)
 
 
-def differing(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits) -> Pid | None:
-    """The recorded settings, in percent and seconds, where they are plainly not the stated ones, in the whole record
-    or in its later half.
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What a record shows of a controller, in percent and seconds: settings other than the stated ones, None where
+    they agree or the record cannot tell; and the stated ones with what the controller has beside, or where none are
+    stated those recorded, None where the record shows no more than is stated."""
+
+    other: Pid | None = None
+    beside: Pid | None = None
+
+
+def shown(record: LoopRecord, stated: Pid | None, scale_s: float, limits: SettingsLimits) -> Shown:
+    """What a record shows of its controller, in the whole of it or in its later half.
 
     Settings that were changed within the record show in its later half, and those are the ones in force. scale_s is
-    the period, or another time scale on which the loop moves [s]. None where they agree or the record cannot tell.
+    the period, or another time scale on which the loop moves [s].
     """
     if record.mask("compressed").mean() > limits.straight_share:
-        return None
+        return Shown()
+    if stated is None:
+        return Shown(beside=recorded(record, scale_s, limits))
     for part in (record.span(len(record) // 2, len(record)), record):
         seen = compare_laws(part, scale_s, stated)
         if seen is None:
@@ -127,13 +139,31 @@ def differing(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsL
         if seen.agree:
             forms = other_forms(stated) if stated.scan_s >= record.dt_s else ()
             best = best_of(part, scale_s, (stated, *forms)) if forms else stated
-            return None if best is stated else best
+            beside = None if seen.found == stated else seen.found
+            return Shown(beside=beside) if best is stated else Shown(best)
         if _plainly(seen, stated, record.dt_s, limits):
-            return seen.found
+            return Shown(seen.found)
         form = _of_another_form(part, stated, scale_s, limits)
         if form is not None:
-            return form
-    return None
+            return Shown(form)
+    return Shown()
+
+
+def differing(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits) -> Pid | None:
+    """The recorded settings where they are plainly not the stated ones; None where they agree or none can be told."""
+    return shown(record, stated, scale_s, limits).other
+
+
+def recorded(record: LoopRecord, scale_s: float, limits: SettingsLimits) -> Pid | None:
+    """The controller that a record shows where none is stated; None where no law with a gain gives nearly all of
+    OP."""
+    first = fit_pi(record, scale_s)
+    if first is None or first.kp == 0.0 or first.explained < limits.explained:
+        return None
+    seen = compare_laws(record, scale_s, Pid(first.kp, first.ti_s, scan_s=record.dt_s))
+    if seen is None or seen.explained < limits.explained_alone or seen.found.kp == 0.0:
+        return None
+    return seen.found if seen.found.ti_s >= limits.ti_samples * record.dt_s else None
 
 
 def as_recorded(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits) -> Pid:

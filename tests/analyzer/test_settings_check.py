@@ -12,7 +12,7 @@ import pytest
 from analyzer.config import Config
 from analyzer.history.export import open_export
 from analyzer.loop.assess import hidden
-from analyzer.loop.judged_stretch import controller_of, differing
+from analyzer.loop.judged_stretch import controller_of, differing, shown
 from analyzer.loop.measure import time_scale
 from analyzer.loop.oscillation import detect
 from analyzer.loop.quality import prepare
@@ -101,6 +101,18 @@ def test_a_series_law_stated_as_ideal_is_told_where_every_scan_is_recorded():
     found = told(record, as_read)
     assert found is not None
     assert (found.kp, found.ti_s, found.td_s) == pytest.approx((2.1, 84.0, as_it_is.td_s), rel=1e-6)
+
+
+def test_what_the_list_does_not_state_is_shown():
+    """A limit of OP at 53 % is shown beside true settings; where none are stated those recorded are, within 10 %."""
+    limits = Config().settings
+    beside = shown(recorded(PI, top=53.0), PI, 320.0, limits).beside
+    assert beside is not None
+    assert beside == replace(PI, op_hi=beside.op_hi)
+    assert beside.op_hi == pytest.approx(53.0)
+    alone = shown(recorded(PI), None, 320.0, limits).beside
+    assert alone is not None
+    assert (alone.kp, alone.ti_s) == pytest.approx((2.0, 80.0), rel=0.1)
 
 
 def thinned(record: LoopRecord, every: int) -> LoopRecord:
