@@ -116,7 +116,7 @@ def advise_if_sluggish(
     calm = counting(found.oscillations) is None and found.verdict.cause is Cause.NONE
     if advice.action is not Action.NONE or not calm or found.outdated or found.settings is not None:
         return advice
-    if not (prepared.op_known and prepared.op_scaled):
+    if not (prepared.op_known and prepared.op_scaled) or found.scheduled_over is not None:
         return advice
     slow = faster_settings(prepared.record, controller, spec.type, config)
     if slow is None:
@@ -130,6 +130,9 @@ def with_controller_told(
     found: Assessment, spec: LoopSpec, stated: Pid | None, prepared: Prepared
 ) -> Assessment:
     """The assessment with a note on what the record shows of the controller and loops.csv does not state."""
+    if found.scheduled_over is not None:
+        said = SAID["scheduled"].format(found.scheduled_over.upper())
+        return replace(found, notes=(*found.notes, said))
     if found.shown is None:
         return found
     span = prepared.scale.span
@@ -215,6 +218,9 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
         return _lacking(found.for_settings)
     if controller is None:
         return _or_repair(found.verdict, Advice(Action.CHECK_SETTINGS, SAID["not_stated"]))
+    if found.scheduled_over is not None:
+        said = SAID["scheduled"].format(found.scheduled_over.upper())
+        return _or_repair(found.verdict, Advice(Action.NONE, said))
     if controller.kp == 0.0:
         return _or_repair(found.verdict, Advice(Action.NONE, SAID["integral_alone"]))
     if found.judged_h < config.advice.least_h:

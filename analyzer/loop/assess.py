@@ -55,7 +55,8 @@ class Assessment:
 
     loop; start_s, duration_s of the record [s]; night, the figures of the whole span; hours, of each clock
     hour; oscillations; verdict; settings, the controller's where they are not the stated ones; shown, the stated
-    controller with what the record shows of it beside, or the recorded one where none is stated; harris index (1:
+    controller with what the record shows of it beside, or the recorded one where none is stated;
+    scheduled_over, as in Shown; harris index (1:
     minimum variance) where known; moves of the set point; waves, its part in the plant-wide pass; trend, thinned;
     notes, plain sentences about the data; needs, what the record lacks to tell whether the loop oscillates, None
     where that is told; close_s, first and last time [s] of the last ten periods; for_settings, what
@@ -73,6 +74,7 @@ class Assessment:
     verdict: Verdict
     settings: Pid | None = None
     shown: Pid | None = None
+    scheduled_over: str | None = None
     harris: float | None = None
     moves: tuple[Move, ...] = ()
     waves: tuple[Wave, ...] = ()
@@ -292,6 +294,7 @@ def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: C
         verdict=judged.verdict,
         settings=judged.shown.other,
         shown=judged.shown.beside,
+        scheduled_over=judged.shown.scheduled_over,
         harris=harris_index(record.error, record.usable, record.dt_s, dead_time) if dead_time else None,
         moves=moves(record, night.noise_band_pct or 0.0, config.figures),
         waves=waves_of(record.tag, judged.of_all, end_s, config.plant),

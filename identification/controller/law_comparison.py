@@ -92,6 +92,26 @@ def _way_needed(seen: Seen, before: Seen | None, stated: Pid) -> Way:
     return seen.way if bent else replace(seen.way, shape=own)
 
 
+def scheduled_over(record: LoopRecord, period_s: float, stated: Pid) -> str | None:
+    """The signal, 'op', 'pv' or 'sp', in a part of whose range the stated law gives OP; None where in none: a gain
+    that is scheduled over it has the stated value there alone.
+
+    A part counts where the integral is seen in it, on increments of half an integral time.
+    """
+    gains, whole = gains_of(stated), look(record, period_s, stated)
+    for name in ("op", "pv", "sp"):
+        x = getattr(record, name)
+        for low, high in LAW.parts:
+            a, b = (float(np.quantile(x[record.usable], share)) for share in (low, high))
+            within = replace(whole, out=whole.out | (x < a) | (x > b))
+            seen = within.plainly(shape_of(stated)) if b > a else None
+            if seen is None or (stated.ki and max(seen.moves) * record.dt_s < 0.5 * stated.ti_s):
+                continue
+            if seen.does(gains):
+                return name
+    return None
+
+
 def best_of(record: LoopRecord, period_s: float, laws: Sequence[Pid]) -> Pid:
     """The one of some laws with a derivative that gives OP plainly best, the first where none does.
 
