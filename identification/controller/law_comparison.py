@@ -45,17 +45,17 @@ class LawsCompared:
         return (1.0 - self.explained_stated) / max(1.0 - self.explained, 1e-9)
 
 
-def _ways(x: Look, longest_s: float, stated: Pid) -> Iterator[Seen]:
+def _ways(x: Look, stated: Pid) -> Iterator[Seen]:
     """All ways, the stated shape's first, then those of what no list states."""
     own, gains = shape_of(stated), gains_of(stated)
-    yield from usual_ways(x, longest_s, own, stated)
+    yield from usual_ways(x, own, stated)
     if stated.scan_s < x.record.dt_s:
         yield from rough_ways(x, own)
     if own == STRAIGHT:
         for shape in bent_shapes(x, gains):
-            yield from chain(usual_ways(x, 0.0, shape), rough_ways(x, shape))
+            yield from chain(usual_ways(x, shape, smoothing=False), rough_ways(x, shape))
     else:
-        yield from usual_ways(x, longest_s, STRAIGHT, stated)
+        yield from usual_ways(x, STRAIGHT, stated)
 
 
 def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompared | None:
@@ -66,7 +66,7 @@ def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompar
     """
     gains, x = gains_of(stated), look(record, period_s, stated)
     best, given = None, None
-    for seen in _ways(x, LAW.longest_filter * period_s, stated):
+    for seen in _ways(x, stated):
         if seen.does(gains):
             return LawsCompared(recognized(x, stated, _way_needed(seen, given, stated)), 1.0, 1.0, True)
         if not seen.is_law(gains):
@@ -119,7 +119,7 @@ def best_of(record: LoopRecord, period_s: float, laws: Sequence[Pid]) -> Pid:
     every scan is recorded.
     """
     poor = np.full(len(laws), np.inf)
-    for seen in usual_ways(look(record, period_s, laws[0]), 0.0, STRAIGHT, *laws):
+    for seen in usual_ways(look(record, period_s, laws[0]), STRAIGHT, *laws, smoothing=False):
         left = np.stack([seen.left(gains_of(law)) for law in laws])
         poor = np.minimum(poor, np.log(np.maximum(left, LAW.rounding)).mean(axis=1))
     best = int(np.argmin(poor))

@@ -187,11 +187,13 @@ def slope_filters(dt_s: float, laws: Iterable[Pid]) -> tuple[float, ...]:
     return (*(float(1.0 / np.log1p(part)) for part in sorted(parts)), *LAW.slope_filters)
 
 
-def usual_ways(x: Look, longest_s: float, shape: Shape, *laws: Pid) -> Iterator[Seen]:
-    """The usual ways of laws on an error of that shape, the plainest first; longest_s : filter of PV [s]."""
+def usual_ways(x: Look, shape: Shape, *laws: Pid, smoothing: bool = True) -> Iterator[Seen]:
+    """The usual ways of laws on an error of that shape, the plainest first; smoothing : behind
+    filters of PV, too."""
     record, narrow = x.record, slope_filters(x.record.dt_s, laws)
     moves = float(np.ptp(record.sp)) > 0 and not record.sp_estimated
-    filters = [f for f in LAW.pv_filters if f == 0.0 or f * record.dt_s <= longest_s]
+    stated = sorted({c.pv_filter_s / record.dt_s for c in laws} - {0.0})
+    filters = [*stated, *LAW.pv_filters] if smoothing else [0.0]
     for smooth, (late_pv, late_sp) in product(filters, LATE if moves else LATE[:2]):
         pv, sp = delayed(first_order(record.pv, smooth), late_pv), delayed(record.sp, late_sp)
         for rows, weight in _slopes(record, sp, pv, narrow, moves, shape):
