@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from analyzer.loop.quality import beyond_gap
 from analyzer.loops.slips import slip
 from analyzer.loops.spec import LoopSpec, read_loops
 from analyzer.loops.tags import as_stated, controller
@@ -112,3 +114,11 @@ def test_what_the_record_shows_is_written_as_loops_csv_takes_it(tmp_path):
     head, filled = "pv_lo,pv_hi,op_lo,op_hi,kp,ti", "100,300,4,20,2,60"
     again = row(tmp_path, f"{head},{','.join(columns)}", f"{filled},{','.join(cells)}")
     assert controller(again, 200.0) == seen
+
+
+def test_an_op_that_stands_within_a_stated_gap_is_not_in_manual():
+    """Of two spans in which OP stands still, the one in which the error leaves the gap is manual."""
+    manual, error = np.zeros(40, dtype=bool), np.zeros(40)
+    manual[5:15] = manual[20:30] = True
+    error[5:15], error[20:30] = 0.4, np.linspace(0.0, 0.9, 10)
+    assert np.flatnonzero(beyond_gap(manual, error, 0.5)).tolist() == list(range(20, 30))
