@@ -180,7 +180,7 @@ def main() -> None:
 
 def _told(of: list[list[Judged]], what: str, place: int = 1) -> str:
     """In how many of all recordings a way to state them is told as wrong, or its slip named (place 2)."""
-    each = [way[place] for judged in of for j in judged for way in j.ways if way[0] == what]
+    each = [bool(way[place]) for judged in of for j in judged for way in j.ways if way[0] == what]
     return f"{sum(each)} of {len(each)}" if each and (place == 1 or what in MISTAKES) else ""
 
 

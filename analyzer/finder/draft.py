@@ -115,8 +115,8 @@ def _named(held: Sampled, spec: LoopSpec) -> Row:
 
 def _stated(held: Sampled, spec: LoopSpec, with_tags: LoopSpec | None) -> Row:
     """A stated loop; of one without settings, given here with its tags, those that its data show."""
-    known = [] if with_tags is None else [with_tags.pv, with_tags.op, with_tags.sp]
-    known = [tag for tag in known if tag in held.tags]
+    own_tags = () if with_tags is None else (with_tags.pv, with_tags.op, with_tags.sp)
+    known = [tag for tag in own_tags if tag is not None and tag in held.tags]
     if len(known) < 2 or len(held.values) < FINDER.least_blocks:
         return Row(spec, "stated", 100.0, "stated")
     own = held.of(known)
