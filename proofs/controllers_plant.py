@@ -1,6 +1,6 @@
 """Three days of loops under controllers as plants have them, simulated with no code of the package.
 
-Fourteen controllers, in position form with an integral that stops or tracks at a limit, before a lag with dead time
+Fifteen controllers, in position form with an integral that stops or tracks at a limit, before a lag with dead time
 under a load that walks and steps; the valve is healthy or has play, the set point rests or steps. Recorded at every
 second or at every tenth.
 """
@@ -29,6 +29,7 @@ FORMS = (
     "limit of OP",
     "set point weight",
     "fast PI",
+    "gain schedule",
 )
 SCENES = ("healthy", "worn", "set point moves")
 SCAN_S, DAY_S = 1.0, 86_400
@@ -62,12 +63,13 @@ def _run(sp, load, noise, plant, gains, extras, limits, out):  # type: ignore[no
     """Fill PV and OP, shape (2, n), scan by scan of one second."""
     gain, lag, dead, play = plant
     kp, ki, kd, slope_lag = gains
-    filter_s, gap, squared, weight, hold = extras
+    filter_s, gap, squared, weight, hold, upper = extras
     low, high, rate, tracks = limits
     n, late = sp.size, int(dead)
     op = integral = stem = 50.0
     y, seen, last, slope = sp[0], sp[0], sp[0], 0.0
     integral -= kp * (weight - 1.0) * sp[0]
+    share = 1.0
     for k in range(n):
         behind = out[2, k - late] if k >= late else 50.0
         y += (50.0 + gain * (behind - 50.0) + load[k] - y) / lag
@@ -83,7 +85,10 @@ def _run(sp, load, noise, plant, gains, extras, limits, out):  # type: ignore[no
             slope += (-(seen - last) / h - slope) * h / (slope_lag + h)
             last = seen
             proportional = kp * (e + (weight - 1.0) * sp[k])
-            trial = integral + ki * e * h
+            now = upper if op > 50.0 else 1.0
+            integral, share = integral + (share - now) * proportional, now
+            proportional *= share
+            trial = integral + share * ki * e * h
             wanted = proportional + trial + kd * slope
             held = min(max(wanted, low, op - rate * h), high, op + rate * h)
             if wanted == held or ki == 0.0:
@@ -117,13 +122,21 @@ def _lag(drive, pole, out):  # type: ignore[no-untyped-def]
         out[k] = x
 
 
-def controlled(form: str, scene: str, seed: int, days: float = 3.0) -> Controlled:
-    """One loop of a form in a scene."""
+def controlled(
+    form: str,
+    scene: str,
+    seed: int,
+    days: float = 3.0,
+    tight: float = 1.0,
+    typed: tuple[float, float] | None = None,
+) -> Controlled:
+    """One loop of a form in a scene, with so many times the gain; with other gain and integral time typed into the
+    controller under the same load, where they are given."""
     rng = np.random.default_rng([seed, FORMS.index(form), SCENES.index(scene)])
     n = int(days * DAY_S)
     gain, lag, dead = rng.uniform(0.7, 2.0), 10 ** rng.uniform(1.7, 2.7), 10 ** rng.uniform(0.7, 1.5)
     aim = dead * rng.uniform(1.2, 3.0)
-    kp = min(lag / (gain * (aim + dead)), 12.0)
+    kp = tight * min(lag / (gain * (aim + dead)), 12.0)
     ti = min(lag, 4 * (aim + dead)) * rng.uniform(0.8, 1.3)
     td = dead * rng.uniform(0.3, 1.0) if "PID" in form else 0.0
     kp, ti, td = float(f"{kp:.3g}"), float(f"{ti:.3g}"), float(f"{td:.3g}")
@@ -138,7 +151,7 @@ def controlled(form: str, scene: str, seed: int, days: float = 3.0) -> Controlle
         sp[:7200] = 50.0
     row: dict[str, object] = {"kp": kp, "ti": ti, "td": td, "form": "ideal"}
     ideal, kd, ki, extra = (kp, ti, td), kp * td, kp / ti, {}
-    filter_s, gap, squared, weight, hold = 0.0, 0.0, 0.0, 1.0, 1.0
+    filter_s, gap, squared, weight, hold, upper = 0.0, 0.0, 0.0, 1.0, 1.0, 1.0
     low, high, rate = 0.0, 100.0, math.inf
     narrow = rng.choice([4.0, 8.0, 10.0])
     if "PID" in form:
@@ -175,7 +188,12 @@ def controlled(form: str, scene: str, seed: int, days: float = 3.0) -> Controlle
     elif form == "set point weight":
         weight = round(rng.uniform(0.0, 0.6), 1)
         extra = {"sp_weight": weight}
+    elif form == "gain schedule":  # the gain stated is that below an OP of 50 %
+        upper = round(rng.uniform(0.2, 0.6), 1)
     row["scan_s"] = SCAN_S * hold
+    if typed is not None:
+        row["kp"], row["ti"] = typed
+        kp, ki = typed[0], typed[0] / typed[1]
     play = rng.uniform(0.5, 2.5) if scene == "worn" else 0.0
     out = np.empty((3, n))
     tracks = float(rng.random() < 0.5)
@@ -185,7 +203,7 @@ def controlled(form: str, scene: str, seed: int, days: float = 3.0) -> Controlle
         noise,
         (gain, lag, round(dead), play),
         (kp, ki, kd, float(td / narrow)),
-        (filter_s, gap, squared, weight, hold),
+        (filter_s, gap, squared, weight, hold, upper),
         (low, high, rate, tracks),
         out,
     )

@@ -16,8 +16,9 @@ from analyzer.finder.clock import Sampled, sampled
 from analyzer.finder.pairs import FoundPair, found_pairs, known_pair
 from analyzer.history.export import Export
 from analyzer.limits import FINDER
+from analyzer.loops.spec import COLUMNS as STATED_COLUMNS
 from analyzer.loops.spec import RECORDED, ROLES, STATED, LoopSpec
-from analyzer.loops.tags import find_loops
+from analyzer.loops.tags import find_loops, match
 
 COLUMNS = (
     *(
@@ -51,8 +52,8 @@ MOST_NAMES = 5
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A loop of the draft: its row, by what it was found ('names', 'data' or 'stated'), how sure that is [%], and
-    what speaks for it."""
+    """A loop of the draft: its row, by what it was found ('names', 'data', 'stated', or 'recorded' where the loop is
+    stated and its settings are those that its data show), how sure that is [%], and what speaks for it."""
 
     spec: LoopSpec
     found_by: str
@@ -82,14 +83,17 @@ def draft(
     all. Raises InputError where the export cannot be read.
     """
     taken = {tag for spec in stated for tag in spec.tags}
-    rows = [Row(spec, "stated", 100.0, "stated") for spec in stated]
+    open_ones = [s for s in match(stated, export.tags)[0] if s.kp is None or s.ti is None]
     named = [
-        s for s in find_loops(export.tags) if s.pv not in taken and s.loop not in {r.spec.loop for r in rows}
+        s for s in find_loops(export.tags) if s.pv not in taken and s.loop not in {r.loop for r in stated}
     ]
     whole = [spec for spec in named if spec.op is not None]
     taken |= {tag for spec in whole for tag in spec.tags}
     free = [tag for tag in export.tags if tag not in taken]
-    held = sampled(export, [*free, *(tag for spec in whole for tag in spec.tags)], span, told)
+    asked = [*free, *(tag for spec in (*whole, *open_ones) for tag in spec.tags)]
+    held = sampled(export, list(dict.fromkeys(asked)), span, told)
+    recorded = {spec.loop: spec for spec in open_ones}
+    rows = [_stated(held, spec, recorded.get(spec.loop)) for spec in stated]
     rows += [_named(held, spec) for spec in whole]
     found = by_data(held.of(free))
     rows += _joined(found, [spec for spec in named if spec.op is None])
@@ -107,6 +111,22 @@ def _named(held: Sampled, spec: LoopSpec) -> Row:
     shown = _shown(own, pair)
     law = f"; {_law(own, pair)}" if pair.told >= FINDER.law_told and pair.kp else ""
     return Row(replace(spec, type=type_of(spec.loop), **shown), "names", FINDER.surest_pct, said + law)
+
+
+def _stated(held: Sampled, spec: LoopSpec, with_tags: LoopSpec | None) -> Row:
+    """A stated loop; of one without settings, given here with its tags, those that its data show."""
+    own_tags = () if with_tags is None else (with_tags.pv, with_tags.op, with_tags.sp)
+    known = [tag for tag in own_tags if tag is not None and tag in held.tags]
+    if len(known) < 2 or len(held.values) < FINDER.least_blocks:
+        return Row(spec, "stated", 100.0, "stated")
+    own = held.of(known)
+    pair = known_pair(own.values)
+    shown = _shown(own, pair)
+    if "kp" not in shown:
+        return Row(spec, "stated", 100.0, f"stated; no settings: {_law(own, pair)}")
+    settings = {name: shown[name] for name in ("kp", "ti", "gain_unit")}
+    found = replace(spec, **settings, ti_unit="s", stated=spec.stated | {*settings, "ti_unit"})
+    return Row(found, RECORDED, FINDER.sure_pct, f"stated but for its settings; {_law(own, pair)}")
 
 
 def found_told(rows: Sequence[Row]) -> tuple[str, ...]:
@@ -214,11 +234,13 @@ def as_csv(rows: Sequence[Row]) -> str:
     """The draft as loops.csv; what is less sure is commented out."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    stated = {name for row in rows for name in row.spec.stated}
+    columns = [*COLUMNS, *(name for name in STATED_COLUMNS if name in stated and name not in COLUMNS)]
+    writer.writerow(columns)
     out.write("\n".join(HEAD) + "\n")
     for row in rows:
         at = out.tell()
-        writer.writerow([_cell(row, column) for column in COLUMNS])
+        writer.writerow([_cell(row, column) for column in columns])
         if not row.sure:
             line = out.getvalue()[at:]
             out.seek(at)
@@ -228,7 +250,7 @@ def as_csv(rows: Sequence[Row]) -> str:
 
 def _cell(row: Row, column: str) -> str:
     own = {
-        "ranges": RECORDED if row.found_by != "stated" and row.spec.has_pv_range else "",
+        "ranges": RECORDED if row.found_by not in ("stated", RECORDED) and row.spec.has_pv_range else "",
         "found_by": row.found_by,
         "sure_pct": f"{row.sure_pct:.0f}",
         "says": row.says,
@@ -238,7 +260,11 @@ def _cell(row: Row, column: str) -> str:
     value = getattr(row.spec, column)
     settings = column in ("kp", "ti", "gain_unit", "ti_unit")
     seen = row.spec.kp is not None if settings else row.spec.has_pv_range or column in ("type", "master")
-    spoken = (row.found_by != "stated" and seen) or column in row.spec.stated or column in ("loop", *ROLES)
+    spoken = (
+        (row.found_by not in ("stated", RECORDED) and seen)
+        or column in row.spec.stated
+        or column in ("loop", *ROLES)
+    )
     if value is None or not spoken:
         return ""
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -22,7 +22,7 @@ from analyzer.loops.slips import slip
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import sentences
-from analyzer.words.units import number, of_controller
+from analyzer.words.units import beside_settings, number, of_controller
 from identification.estimation.window import Fit
 from identification.limits import FIT
 from identification.models import Loop, Pid
@@ -117,7 +117,7 @@ def advise_if_sluggish(
     calm = counting(found.oscillations) is None and found.verdict.cause is Cause.NONE
     if advice.action is not Action.NONE or not calm or found.outdated or found.settings is not None:
         return advice
-    if not (prepared.op_known and prepared.op_scaled):
+    if not (prepared.op_known and prepared.op_scaled) or found.scheduled_over is not None:
         return advice
     slow = faster_settings(prepared.record, controller, spec.type, config)
     if slow is None:
@@ -125,6 +125,31 @@ def advise_if_sluggish(
     kp, ti = as_stated(slow.new, spec, prepared.scale.span)
     reason = SAID["sluggish"].format(slow.times, 100.0 * slow.change)
     return Advice(Action.RETUNE, reason, rounded(kp), rounded(ti))
+
+
+def with_controller_told(
+    found: Assessment, spec: LoopSpec, stated: Pid | None, prepared: Prepared
+) -> Assessment:
+    """The assessment with a note on what the record shows of the controller and loops.csv does not state."""
+    if found.scheduled_over is not None:
+        said = SAID["scheduled"].format(found.scheduled_over.upper())
+        return replace(found, notes=(*found.notes, said))
+    if found.shown is None:
+        return found
+    span = prepared.scale.span
+    if stated is None:
+        said = SAID["recorded"].format(of_controller(found.shown, spec, span))
+    else:
+        said = SAID["beside"].format(beside_settings(stated, found.shown, spec, span))
+    return replace(found, notes=(*found.notes, said))
+
+
+def on_recorded(advice: Advice, found: Assessment, spec: LoopSpec, pv_span: float) -> Advice:
+    """Advice on a loop without stated settings: new ones are said to rest on those recorded."""
+    if found.shown is None or advice.kp_new is None:
+        return advice
+    followed = of_controller(found.shown, spec, pv_span)
+    return replace(advice, reason=SAID["on_recorded"].format(followed, advice.reason))
 
 
 def _unscaled(kept: Advice | None, needs: Needs) -> Advice:
@@ -192,6 +217,9 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
         return _lacking(found.for_settings)
     if controller is None:
         return _or_repair(found.verdict, Advice(Action.CHECK_SETTINGS, SAID["not_stated"]))
+    if found.scheduled_over is not None:
+        said = SAID["scheduled"].format(found.scheduled_over.upper())
+        return _or_repair(found.verdict, Advice(Action.NONE, said))
     if controller.kp == 0.0:
         return _or_repair(found.verdict, Advice(Action.NONE, SAID["integral_alone"]))
     if found.judged_h < config.advice.least_h:

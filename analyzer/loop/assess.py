@@ -28,7 +28,7 @@ from analyzer.loop.cause import (
 from analyzer.loop.cycling_span import Span, detect_where_it_cycles
 from analyzer.loop.decisions import Cause, Lack, LacksError, Need, Needs
 from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
-from analyzer.loop.judged_stretch import Earlier, Stretch, differing, judged_stretch
+from analyzer.loop.judged_stretch import Earlier, Shown, Stretch, as_recorded, judged_stretch, shown
 from analyzer.loop.measure import Measured, measure, ringing_period, time_scale
 from analyzer.loop.oscillation import Oscillation, Oscillations, barely_seen, counting, detect
 from analyzer.loop.page_trends import BUCKETS, FINE_BUCKETS, close_view, thinned
@@ -55,7 +55,9 @@ class Assessment:
     """What is known about one loop after one night.
 
     loop; start_s, duration_s of the record [s]; night, the figures of the whole span; hours, of each clock
-    hour; oscillations; verdict; settings, the controller's where they are not the stated ones; harris index (1:
+    hour; oscillations; verdict; settings, the controller's where they are not the stated ones; shown, the stated
+    controller with what the record shows of it beside, or the recorded one where none is stated;
+    scheduled_over, as in Shown; harris index (1:
     minimum variance) where known; moves of the set point; waves, its part in the plant-wide pass; trend, thinned;
     notes, plain sentences about the data; needs, what the record lacks to tell whether the loop oscillates, None
     where that is told; close_s, first and last time [s] of the last ten periods; for_settings, what
@@ -72,6 +74,8 @@ class Assessment:
     oscillations: Oscillations
     verdict: Verdict
     settings: Pid | None = None
+    shown: Pid | None = None
+    scheduled_over: str | None = None
     harris: float | None = None
     moves: tuple[Move, ...] = ()
     waves: tuple[Wave, ...] = ()
@@ -181,8 +185,12 @@ def _known_without_op(figures: Assessments, op: bool) -> Assessments:
 
 
 def hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, config: Config) -> Needs | None:
-    """Why what is seen, or not, says nothing: the loop's cycles are too fast for the sampling; None where not."""
+    """Why what is seen, or not, says nothing: the loop's cycles are too fast for the sampling; None where not. An
+    integral time that is stated says so only where the record shows no other."""
     samples = config.oscillation.samples
+    if controller is not None and config.advice.cycle_per_ti * controller.ti_s < samples * record.dt_s:
+        scale_s = time_scale(record, counting(found), controller)
+        controller = as_recorded(record, controller, scale_s, config.settings)
     if found.first is not None:
         folded = None if controller is None else config.advice.cycle_per_ti * controller.ti_s
         if folded is None or folded >= NYQUIST * record.dt_s:
@@ -200,13 +208,13 @@ def hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, conf
 @dataclass(frozen=True, slots=True)
 class _Judged:
     """What a stretch of a record comes to: what oscillates in all of the record and in the stretch, why, and where
-    the settings are not the stated ones."""
+    what the record shows of the controller."""
 
     part: Prepared
     of_all: Oscillations
     found: Oscillations
     verdict: Verdict
-    settings: Pid | None
+    shown: Shown
 
 
 def _judge_stretch(prepared: Prepared, stretch: Stretch, config: Config, kind: str) -> _Judged:
@@ -217,15 +225,16 @@ def _judge_stretch(prepared: Prepared, stretch: Stretch, config: Config, kind: s
     whole, found = len(part.record) == len(record), of_all
     if not whole:
         found, span = detect_where_it_cycles(part.record, config.oscillation)
-    stated, settings = stretch.controller, None
-    if stated is not None and part.op_known and not stretch.outdated:
+    stated, seen = stretch.controller, Shown()
+    if part.op_known and part.op_scaled and not stretch.outdated:
         scale = time_scale(part.record, counting(found), stated)
-        settings = differing(part.record, stated, scale, config.settings)
-    found, verdict = judged_where(part, found, span, settings or stated, config, kind)
-    thin = None if verdict.rings else too_thin(record.dt_s, settings or stated, config)
+        seen = shown(part.record, stated, scale, config.settings)
+    acting = seen.other or (None if stated is None else seen.beside) or stated
+    found, verdict = judged_where(part, found, span, acting, config, kind)
+    thin = None if verdict.rings else too_thin(record.dt_s, acting, config)
     if _hours_in(part.record) < config.advice.least_h or thin is not None:
         verdict = as_hint(verdict, config.advice.hint_pct)
-    return _Judged(part, found if whole else of_all, found, verdict, settings)
+    return _Judged(part, found if whole else of_all, found, verdict, seen)
 
 
 def judged_where(
@@ -285,13 +294,15 @@ def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: C
         hours=tuple(replace(h, figures=_known_without_op(h.figures, in_percent)) for h in hours),
         oscillations=found,
         verdict=judged.verdict,
-        settings=judged.settings,
+        settings=judged.shown.other,
+        shown=judged.shown.beside,
+        scheduled_over=judged.shown.scheduled_over,
         harris=harris_index(record.error, record.usable, record.dt_s, dead_time) if dead_time else None,
         moves=moves(record, night.noise_band_pct or 0.0, config.figures),
         waves=waves_of(record.tag, judged.of_all, end_s, config.plant),
         trend=thinned(record, FINE_BUCKETS if counting(found) else BUCKETS, close),
         notes=prepared.notes,
-        needs=hidden(judged.part.record, found, judged.settings or stretch.controller, config),
+        needs=hidden(judged.part.record, found, judged.shown.other or stretch.controller, config),
         close_s=None if close is None else (_at(record, close[0]), _at(record, close[1])),
         for_settings=unfit_for_settings(prepared, config),
         judged_h=_hours_in(judged.part.record),

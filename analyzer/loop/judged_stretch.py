@@ -24,7 +24,8 @@ from analyzer.loops.changes import TuningChange, settings_before
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller as stated_controller
 from identification.controller.check import runs
-from identification.controller.law_comparison import LawsCompared, compare_laws
+from identification.controller.law_comparison import LawsCompared, best_of, compare_laws, scheduled_over
+from identification.controller.pid_regression import clamped, fit_pi
 from identification.models import Pid
 from identification.record import LoopRecord, Mask
 
@@ -111,27 +112,75 @@ def _factor(a: float, b: float) -> float:
     return max(a / b, b / a)
 
 
-def differing(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits) -> Pid | None:
-    """The recorded settings, in percent and seconds, where they are plainly not the stated ones, in the whole record
-    or in its later half.
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What a record shows of a controller, in percent and seconds.
+
+    other, settings that are not the stated ones, None where they agree or the record cannot tell; beside, the stated
+    ones with what the controller has beside, or those recorded where none are stated, None where the record shows no
+    more than is stated; scheduled_over, the signal, 'op', 'pv' or 'sp', in a part of whose range alone the stated
+    gain holds, None where there is none.
+    """
+
+    other: Pid | None = None
+    beside: Pid | None = None
+    scheduled_over: str | None = None
+
+
+def shown(record: LoopRecord, stated: Pid | None, scale_s: float, limits: SettingsLimits) -> Shown:
+    """What a record shows of its controller, in the whole of it or in its later half.
 
     Settings that were changed within the record show in its later half, and those are the ones in force. scale_s is
-    the period, or another time scale on which the loop moves [s]. None where they agree or the record cannot tell.
+    the period, or another time scale on which the loop moves [s].
     """
     if record.mask("compressed").mean() > limits.straight_share:
-        return None
+        return Shown()
+    if record.mask("saturated").mean() > limits.saturated_share:
+        return Shown()
+    if stated is None:
+        return Shown(beside=recorded(record, scale_s, limits))
     for part in (record.span(len(record) // 2, len(record)), record):
         seen = compare_laws(part, scale_s, stated)
         if seen is None:
             continue
         if seen.agree:
-            return None
-        if _plainly(seen, stated, record.dt_s, limits):
-            return seen.found
+            forms = other_forms(stated) if stated.scan_s >= record.dt_s else ()
+            best = best_of(part, scale_s, (stated, *forms)) if forms else stated
+            beside = None if seen.found == stated else seen.found
+            return Shown(beside=beside) if best is stated else Shown(best)
+        if _plainly(seen, stated, part, limits):
+            over = scheduled_over(part, scale_s, stated)
+            return Shown(seen.found) if over is None else Shown(scheduled_over=over)
         form = _of_another_form(part, stated, scale_s, limits)
         if form is not None:
-            return form
-    return None
+            return Shown(form)
+    return Shown()
+
+
+def differing(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits) -> Pid | None:
+    """The recorded settings where they are plainly not the stated ones; None where they agree or none can be told."""
+    return shown(record, stated, scale_s, limits).other
+
+
+def recorded(record: LoopRecord, scale_s: float, limits: SettingsLimits) -> Pid | None:
+    """The controller that a record shows where none is stated; None where no law with a gain gives nearly all of
+    OP."""
+    first = fit_pi(record, scale_s)
+    if first is None or first.kp == 0.0 or first.explained < limits.explained:
+        return None
+    seen = compare_laws(record, scale_s, Pid(first.kp, first.ti_s, scan_s=record.dt_s))
+    if seen is None or seen.explained < limits.explained_alone or seen.found.kp == 0.0:
+        return None
+    return seen.found if seen.found.ti_s >= limits.ti_samples * record.dt_s else None
+
+
+def as_recorded(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits) -> Pid:
+    """The controller whose integral time says whether a record's samples suffice: the recorded one where the record
+    shows a law with a gain, however little that differs from the stated one, else the stated one."""
+    seen = compare_laws(record, scale_s, stated)
+    if seen is None or seen.explained < limits.explained or seen.found.kp == 0.0:
+        return stated
+    return seen.found
 
 
 def _of_another_form(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits) -> Pid | None:
@@ -158,15 +207,19 @@ def other_forms(c: Pid) -> tuple[Pid, ...]:
     return tuple(out)
 
 
-def _plainly(seen: LawsCompared, stated: Pid, dt_s: float, limits: SettingsLimits) -> bool:
+def _plainly(seen: LawsCompared, stated: Pid, record: LoopRecord, limits: SettingsLimits) -> bool:
     """Whether the stated law is another than the one found, and explains plainly less: noise that the recorder adds
-    to PV leaves the true law 1/explained times what it leaves the best."""
+    to PV leaves the true law 1/explained times what it leaves the best. Where OP may reach a limit of its own, or an
+    integral act, between two samples, the law found must give nearly all of OP."""
     if seen.explained < limits.explained or seen.explained - seen.explained_stated < limits.gain:
         return False
-    unseen = limits.judged_ti_samples * dt_s
-    if seen.found.ti_s < unseen or (stated.ti_s < unseen and seen.explained < limits.explained_unseen):
+    unseen = limits.judged_ti_samples * record.dt_s
+    limited = stated.scan_s < record.dt_s and bool(clamped(record.op).any())
+    if seen.found.ti_s < unseen:
         return False
-    apart = _apart(seen.found, stated, dt_s, limits.filtered)
+    if (limited or stated.ti_s < unseen) and seen.explained < limits.explained_unseen:
+        return False
+    apart = _apart(seen.found, stated, record.dt_s, limits.filtered)
     return seen.left * seen.explained >= limits.left and apart >= limits.factor
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from analyzer.config import QualityLimits
 from analyzer.history.series import Series
+from analyzer.limits import LOOP
 from analyzer.loop.decisions import Lack, LacksError, Need, Needs
 from analyzer.loop.sample_clock import (
     archived_share,
@@ -27,6 +28,7 @@ from analyzer.loop.sample_clock import (
 )
 from analyzer.loop.shared_valve import Shared, half, selected
 from analyzer.loops.spec import STATED, LoopSpec
+from identification.controller.check import runs
 from identification.record import Floats, LoopRecord, Mask
 
 RECORDED_RANGE = (0.005, 0.995)
@@ -137,6 +139,9 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
     )
     step = resolution(pv)
     masked = _masked(record, clock, series.get(spec.mode or ""), op_known, step, limits)
+    if spec.gap and spec.mode is None:
+        manual = beyond_gap(masked.mask("manual"), masked.error, 100.0 * spec.gap / scale.span)
+        masked = replace(masked, masks=MappingProxyType({**masked.masks, "manual": manual}))
     other = spec.beside.tag if spec.beside is not None else None
     shared = _shared(masked, spec, _signal(series, other, clock, dt, limits), limits)
     if shared is not None:
@@ -241,6 +246,15 @@ def _manual(mode: Series | None, clock: Floats, record: LoopRecord, q: QualityLi
     still = constant_stretches(record.op, record.dt_s, q.manual_s, q.manual_samples)
     moves = still.any() and float(np.std(record.error[still])) > 1e-9
     return still if moves else np.zeros(still.size, dtype=bool)
+
+
+def beyond_gap(manual: Mask, error: Floats, gap: float) -> Mask:
+    """The spans of a mask, shape (n,), in which the error [% PV] leaves a gap: within it OP of a controller in
+    automatic stands still too."""
+    out = manual.copy()
+    for first, last in runs(manual):
+        out[first:last] = float(np.abs(error[first:last]).max()) > LOOP.beyond_gap * gap
+    return out
 
 
 def _mode_mask(mode: Series, clock: Floats) -> Mask | None:

@@ -19,7 +19,7 @@ from analyzer.config import Config
 from analyzer.history.plant_clock import stamp
 from analyzer.history.series import Series
 from analyzer.lanes.standing import standing
-from analyzer.loop.advice import Advice, advise, advise_if_sluggish
+from analyzer.loop.advice import Advice, advise, advise_if_sluggish, on_recorded, with_controller_told
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.conclusion import Lost, concluded
 from analyzer.loop.decisions import Cell, Finding, Lack, LacksError, Need, Needs, Status
@@ -86,16 +86,22 @@ def assess_loop(
     earlier: Sequence[Earlier] = (),
     held: Held | None = None,
 ) -> tuple[Assessment, Advice]:
-    """Assess one loop, and advise on it if wanted, in view of settings before its last and of those told before."""
+    """Assess one loop, and advise on it if wanted, in view of settings before its last and of those told before.
+
+    The advice is for the controller with what the record shows of it beside, or on recorded settings for want of
+    stated ones.
+    """
     stated = controller_of(spec, prepared)
-    found = assess(prepared, stated, config, spec.type, earlier)
+    found = with_controller_told(assess(prepared, stated, config, spec.type, earlier), spec, stated, prepared)
     if not advising:
         return found, Advice(WITHOUT_SETTINGS.get(found.verdict.cause))  # settings are for tomorrow alone
     pair = None
     if held is not None and held[0] == (spec.kp, spec.ti):
         kp, ti = held[1]
         pair = controller_of(replace(spec, kp=kp, ti=ti), prepared)
-    advice = advise(found, spec, stated, prepared.scale.span, config, pair)
+    advice = advise(found, spec, found.shown or stated, prepared.scale.span, config, pair)
+    if stated is None:
+        advice = on_recorded(advice, found, spec, prepared.scale.span)
     return found, advice if stated is None else advise_if_sluggish(
         found, advice, prepared, spec, stated, config
     )

@@ -90,6 +90,22 @@ def of_controller(pid: Pid, spec: LoopSpec, pv_span: float) -> str:
     return f"{known}, Td {number(td)} {'s' if spec.ti_unit == 's' else 'min'}" if td else known
 
 
+def beside_settings(stated: Pid, shown: Pid, spec: LoopSpec, pv_span: float) -> str:
+    """The columns of loops.csv, and what to write into them, with which a stated controller is the one shown."""
+    pv, op = pv_span / 100.0, (spec.op_hi - spec.op_lo) / 100.0
+    columns = (
+        ("gap", stated.gap, shown.gap, shown.gap * pv),
+        ("gap_gain", stated.gap_gain, shown.gap_gain, shown.gap_gain),
+        ("pv_filter_s", stated.pv_filter_s, shown.pv_filter_s, shown.pv_filter_s),
+        ("op_rate", stated.op_rate, shown.op_rate, shown.op_rate * op),
+        ("op_lo_limit", stated.op_lo, shown.op_lo, spec.op_lo + shown.op_lo * op),
+        ("op_hi_limit", stated.op_hi, shown.op_hi, spec.op_lo + shown.op_hi * op),
+        ("sp_weight", stated.sp_weight, shown.sp_weight, shown.sp_weight),
+    )
+    form = [] if shown.error_form is stated.error_form else [f"error_form {shown.error_form}"]
+    return ", ".join([*form, *(f"{name} {number(x)}" for name, was, now, x in columns if was != now)])
+
+
 def settings_changed(old: LoopSpec, new: LoopSpec, clock: str) -> str:
     """What was typed in within the night, and at which time of day."""
     gain = gain_unit(new.gain_unit, new.pv_unit, new.op_unit)

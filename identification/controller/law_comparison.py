@@ -3,7 +3,7 @@ states."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
@@ -13,9 +13,11 @@ from identification.controller.law_ways import (
     STRAIGHT,
     Look,
     Seen,
+    Way,
     bent_shapes,
     gains_of,
     look,
+    recognized,
     rough_ways,
     shape_of,
     usual_ways,
@@ -43,30 +45,32 @@ class LawsCompared:
         return (1.0 - self.explained_stated) / max(1.0 - self.explained, 1e-9)
 
 
-def _ways(x: Look, longest_s: float, stated: Pid) -> Iterator[Seen]:
+def _ways(x: Look, stated: Pid) -> Iterator[Seen]:
     """All ways, the stated shape's first, then those of what no list states."""
     own, gains = shape_of(stated), gains_of(stated)
-    yield from usual_ways(x, longest_s, stated, own)
+    yield from usual_ways(x, own, stated)
     if stated.scan_s < x.record.dt_s:
         yield from rough_ways(x, own)
     if own == STRAIGHT:
         for shape in bent_shapes(x, gains):
-            yield from chain(usual_ways(x, 0.0, replace(stated, td_s=0.0), shape), rough_ways(x, shape))
+            yield from chain(usual_ways(x, shape, smoothing=False), rough_ways(x, shape))
     else:
-        yield from usual_ways(x, longest_s, stated, STRAIGHT)
+        yield from usual_ways(x, STRAIGHT, stated)
 
 
 def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompared | None:
     """A stated law, and the one that the record shows, which differs in as few settings as explain OP.
 
     period_s : period, or other time scale on which the loop moves [s]. None where the record tells none; the
-    stated law, with the shape of error that the record shows, where that does.
+    stated law, with what the record shows beside, where that does.
     """
     gains, x = gains_of(stated), look(record, period_s, stated)
     best, given = None, None
-    for seen in _ways(x, LAW.longest_filter * period_s, stated):
+    for seen in _ways(x, stated):
         if seen.does(gains):
-            return LawsCompared(with_shape(stated, seen.shape), 1.0, 1.0, True)
+            return LawsCompared(recognized(x, stated, _way_needed(seen, given, stated)), 1.0, 1.0, True)
+        if not seen.is_law(gains):
+            continue
         if best is None or seen.poorness(seen.free) < best.poorness(best.free) - LAW.worth:
             best = seen
         if given is None or seen.poorness(gains) < given.poorness(gains):
@@ -75,8 +79,51 @@ def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompar
             break
     if best is None or given is None:
         return None
-    found = _simplest(best, gains, record.duration_s, with_shape(stated, best.shape))
+    found = _simplest(best, gains, record.duration_s, with_shape(stated, best.way.shape))
     return None if found is None else _most_apart(best, given, gains, *found)
+
+
+def _way_needed(seen: Seen, before: Seen | None, stated: Pid) -> Way:
+    """The way in which the stated law gives OP; with the stated shape where that does about as well."""
+    own, gains = shape_of(stated), gains_of(stated)
+    if seen.way.shape == own or before is None:
+        return seen.way
+    bent = before.poorness(gains) - seen.poorness(gains) > LAW.plainly_better
+    return seen.way if bent else replace(seen.way, shape=own)
+
+
+def scheduled_over(record: LoopRecord, period_s: float, stated: Pid) -> str | None:
+    """The signal, 'op', 'pv' or 'sp', in a part of whose range the stated law gives OP; None where in none: a gain
+    that is scheduled over it has the stated value there alone.
+
+    A part counts where the integral is seen in it, on increments of half an integral time.
+    """
+    gains, whole = gains_of(stated), look(record, period_s, stated)
+    for name in ("op", "pv", "sp"):
+        x = getattr(record, name)
+        for low, high in LAW.parts:
+            a, b = (float(np.quantile(x[record.usable], share)) for share in (low, high))
+            within = replace(whole, out=whole.out | (x < a) | (x > b))
+            seen = within.plainly(shape_of(stated)) if b > a else None
+            if seen is None or (stated.ki and max(seen.moves) * record.dt_s < 0.5 * stated.ti_s):
+                continue
+            if seen.does(gains):
+                return name
+    return None
+
+
+def best_of(record: LoopRecord, period_s: float, laws: Sequence[Pid]) -> Pid:
+    """The one of some laws with a derivative that gives OP plainly best, the first where none does.
+
+    Laws that agree with a record on a law's usual uncertainty are told apart here by what they leave of an OP whose
+    every scan is recorded.
+    """
+    poor = np.full(len(laws), np.inf)
+    for seen in usual_ways(look(record, period_s, laws[0]), STRAIGHT, *laws, smoothing=False):
+        left = np.stack([seen.left(gains_of(law)) for law in laws])
+        poor = np.minimum(poor, np.log(np.maximum(left, LAW.rounding)).mean(axis=1))
+    best = int(np.argmin(poor))
+    return laws[best] if poor[0] - poor[best] > LAW.plainly_better else laws[0]
 
 
 def _settled(best: Seen, given: Seen, gains: Floats) -> bool:

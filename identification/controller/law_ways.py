@@ -32,6 +32,8 @@ from identification.simulation.pi import Law, acting_error
 
 ON_ERROR = ((1.0, 1.0), (1.0, 0.0), (0.0, 0.0))
 """What gain and derivative take of the set point's moves: the usual three [-]."""
+LATE = ((0, 0), (1, 0), (1, 1))
+"""By how many samples OP's stamps may be later than those of PV and of SP."""
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 Shape = tuple[float, float, bool]
 """Gap [% PV], gain inside it [-], and whether the error is squared."""
@@ -39,14 +41,29 @@ STRAIGHT: Shape = (0.0, 0.0, False)
 
 
 @dataclass(frozen=True, slots=True)
+class Way:
+    """What a law has beside its gains: the shape of the error, a filter of PV [samples], and what the gain takes of
+    the set point's moves [-], None where that is not known."""
+
+    shape: Shape = STRAIGHT
+    pv_filter: float = 0.0
+    sp_weight: float | None = 1.0
+
+
+@dataclass(frozen=True, slots=True)
 class Seen:
     """A record as one way of the law's sees it: products of increments by their length in samples, what each weighs,
-    the freest law, and the shape of the error."""
+    the freest law, and what beside gains the way has."""
 
     moves: dict[int, Floats]
     weight: Floats
     free: Floats
-    shape: Shape = STRAIGHT
+    way: Way
+
+    def is_law(self, gains: Floats) -> bool:
+        """Whether the freest law may be a controller's beside stated gains: without the set point's moves, one of the
+        other sign is how PV answers OP."""
+        return self.way.sp_weight == 1.0 or bool(self.free[0] * gains[0] >= 0.0)
 
     def left(self, gains: Floats) -> Floats:
         """Share of OP's variance that gains leave at each length of increments [-]."""
@@ -80,7 +97,8 @@ def fastest(op: Floats) -> Mask:
     top = float(size.max())
     at = size >= LAW.at_rate * top
     nearly = np.count_nonzero((size >= LAW.near_rate * top) & ~at)
-    limited = top > 0.0 and np.count_nonzero(at) > LAW.clamped * (nearly + LAW.end_samples)
+    coarse = top < LAW.rate_steps * float(np.min(size, where=size > 0.0, initial=np.inf))
+    limited = not coarse and np.count_nonzero(at) > LAW.clamped * (nearly + LAW.end_samples)
     return _spread(at) if limited else np.zeros(op.size, dtype=bool)
 
 
@@ -135,7 +153,7 @@ class Look:
     out: Mask
     lengths: tuple[int, ...]
 
-    def seen(self, rows: Floats, shape: Shape) -> Seen | None:
+    def seen(self, rows: Floats, way: Way) -> Seen | None:
         """One way of it; None where no length tells a law."""
         every = len(self.record) // LAW.most_increments
         of = {k: increments(rows, self.out, k, max(k // 8, every, 1), True) for k in self.lengths}
@@ -148,11 +166,11 @@ class Look:
             free[2] * free[0] < 0.0
         ):  # no controller has such a derivative: it mends a filter that is not the true one
             free = best_gains(found.values(), weight, np.eye(3)[:2], np.zeros(3))
-        return Seen(found, weight, free, shape)
+        return Seen(found, weight, free, way)
 
     def plainly(self, shape: Shape) -> Seen | None:
         """The plainest way, of an error of that shape."""
-        return self.seen(rows_of(self.record, shaped(self.record.error, shape)), shape)
+        return self.seen(rows_of(self.record, shaped(self.record.error, shape)), Way(shape))
 
 
 def look(record: LoopRecord, scale_s: float, stated: Pid) -> Look:
@@ -163,35 +181,45 @@ def look(record: LoopRecord, scale_s: float, stated: Pid) -> Look:
     return Look(record, no_law(record, stated), lengths)
 
 
-def usual_ways(x: Look, longest_s: float, stated: Pid, shape: Shape) -> Iterator[Seen]:
-    """The usual ways of a law on an error of that shape, the plainest first; longest_s : filter of PV [s]."""
-    record = x.record
-    narrow = LAW.slope_filters + (LAW.more_slope_filters if stated.td_s > 0 else ())
+def slope_filters(dt_s: float, laws: Iterable[Pid]) -> tuple[float, ...]:
+    """Time constants of the slope's filter [samples]: usual parts of the laws' derivative times, then others."""
+    parts = {n * dt_s / c.td_s for c in laws if c.td_s > 0 for n in LAW.filter_parts}
+    return (*(float(1.0 / np.log1p(part)) for part in sorted(parts)), *LAW.slope_filters)
+
+
+def usual_ways(x: Look, shape: Shape, *laws: Pid, smoothing: bool = True) -> Iterator[Seen]:
+    """The usual ways of laws on an error of that shape, the plainest first; smoothing : behind
+    filters of PV, too."""
+    record, narrow = x.record, slope_filters(x.record.dt_s, laws)
     moves = float(np.ptp(record.sp)) > 0 and not record.sp_estimated
-    filters = [f for f in LAW.pv_filters if f == 0.0 or f * record.dt_s <= longest_s]
-    for smooth, late in product(filters, (0, 1)):
-        pv = first_order(record.pv, smooth)
-        pv = np.concatenate((pv[:1], pv[:-1])) if late else pv
-        for rows in _slopes(record, pv, narrow, moves, shape):
-            found = x.seen(rows, shape)
+    stated = sorted({c.pv_filter_s / record.dt_s for c in laws} - {0.0})
+    filters = [*stated, *LAW.pv_filters] if smoothing else [0.0]
+    for smooth, (late_pv, late_sp) in product(filters, LATE if moves else LATE[:2]):
+        pv, sp = delayed(first_order(record.pv, smooth), late_pv), delayed(record.sp, late_sp)
+        for rows, weight in _slopes(record, sp, pv, narrow, moves, shape):
+            found = x.seen(rows, Way(shape, smooth, weight))
             if found is not None:
                 yield found
 
 
+def delayed(x: Floats, samples: int) -> Floats:
+    """A signal so many samples later, shape (n,)."""
+    return np.concatenate((np.repeat(x[:1], samples), x[: x.size - samples]))
+
+
 def _slopes(
-    record: LoopRecord, pv: Floats, narrow: Iterable[float], moves: bool, shape: Shape
-) -> Iterator[Floats]:
-    """Rows of every slope filter and of every weight of the set point; one that nothing is known of goes with the set
-    point's moves."""
-    sp = record.sp
+    record: LoopRecord, sp: Floats, pv: Floats, narrow: Iterable[float], moves: bool, shape: Shape
+) -> Iterator[tuple[Floats, float | None]]:
+    """Rows of every slope filter and every weight of the set point, and that weight; None with the rows in which what
+    goes with the set point's moves is left out."""
     for (on_gain, on_slope), filtered in product(ON_ERROR if moves else ON_ERROR[:1], narrow):
         slope = np.diff(on_slope * sp - pv, prepend=on_slope * sp[0] - pv[0]) / record.dt_s
         rows = rows_of(record, shaped(sp - pv, shape), first_order(slope, filtered))
         rows[0] += (on_gain - 1.0) * sp
-        yield rows
+        yield rows, on_gain
     if moves:
         slope = np.diff(-pv, prepend=-pv[0]) / record.dt_s
-        yield np.vstack((rows_of(record, shaped(sp - pv, shape), slope), sp))
+        yield np.vstack((rows_of(record, shaped(sp - pv, shape), slope), sp)), None
 
 
 def rough_ways(x: Look, shape: Shape) -> Iterator[Seen]:
@@ -203,8 +231,8 @@ def rough_ways(x: Look, shape: Shape) -> Iterator[Seen]:
     rows = [np.vstack((rows_of(record, shaped(record.error, shape), slope), pv - beside))]
     if float(np.ptp(record.sp)) > 0:
         rows.append(np.vstack((rows[0], record.sp)))
-    for each in rows:
-        found = x.seen(each, shape)
+    for each, weight in zip(rows, (1.0, None), strict=False):
+        found = x.seen(each, Way(shape, sp_weight=weight))
         if found is not None:
             yield found
 
@@ -238,3 +266,32 @@ def _best_gap(x: Look, size: float, inside: float, gains: Floats | None) -> floa
         a, b = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
         low, high = (low, b) if poor(a) < poor(b) else (a, high)
     return 0.5 * (low + high)
+
+
+def recognized(x: Look, stated: Pid, way: Way) -> Pid:
+    """A stated controller with what the record shows beside: what the way has in which it obeys the stated gains, and
+    limits of OP and of its rate at which it is seen."""
+    record, c = x.record, with_shape(stated, way.shape)
+    if way.pv_filter >= LAW.seen_filter and not stated.pv_filter_s:
+        c = replace(c, pv_filter_s=_best_filter(x, way, stated) * record.dt_s)
+    if way.sp_weight == 0.0 and c.kp and c.scan_s >= record.dt_s:
+        c = replace(c, sp_weight=0.0)
+    if fastest(record.op).any():
+        c = replace(c, op_rate=min(c.op_rate, float(np.abs(np.diff(record.op)).max()) / record.dt_s))
+    at_end, middle = record.op[clamped(record.op)], 0.5 * float(record.op.min() + record.op.max())
+    low, high = at_end[at_end < middle], at_end[at_end > middle]
+    return replace(c, op_lo=float(max([c.op_lo, *low[:1]])), op_hi=float(min([c.op_hi, *high[:1]])))
+
+
+def _best_filter(x: Look, way: Way, stated: Pid) -> float:
+    """The filter of PV near that of a way with which the stated gains give OP best [samples]; the way's own beside a
+    derivative, which has a filter too."""
+    if stated.td_s:
+        return way.pv_filter
+
+    def poor(smooth: float) -> float:
+        error = x.record.sp - first_order(x.record.pv, smooth)
+        seen = x.seen(rows_of(x.record, shaped(error, way.shape)), way)
+        return np.inf if seen is None else seen.poorness(gains_of(stated))
+
+    return float(min(way.pv_filter * np.geomspace(0.5, 2.0, LAW.filters_near), key=poor))

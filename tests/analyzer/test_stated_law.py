@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from analyzer.loop.quality import beyond_gap
 from analyzer.loops.slips import slip
 from analyzer.loops.spec import LoopSpec, read_loops
 from analyzer.loops.tags import as_stated, controller
+from analyzer.words.units import beside_settings
 from identification.errors import InputError
 from identification.models import ErrorForm, Form, Pid
 
@@ -97,3 +100,25 @@ def test_the_slip_that_explains_the_settings_is_named(spec, found, changed):
         assert slip(spec, found, 250.0) == changed
     else:
         assert "form" not in slip(replace(spec, form=Form.IDEAL), found, 250.0)
+
+
+def test_what_the_record_shows_is_written_as_loops_csv_takes_it(tmp_path):
+    """A gap of 1 % of a span of 200, a rate of 1 %/s and a limit of 50 % of 4 to 20 mA are 2, 0.16 and 12."""
+    spec = row(tmp_path, "pv_lo,pv_hi,op_lo,op_hi,kp,ti", "100,300,4,20,2,60")
+    stated = controller(spec, 200.0)
+    assert stated is not None
+    seen = replace(stated, gap=1.0, op_rate=1.0, op_hi=50.0, error_form=ErrorForm.SQUARED)
+    written = beside_settings(stated, seen, spec, 200.0)
+    assert written == "error_form squared, gap 2, op_rate 0.16, op_hi_limit 12"
+    columns, cells = zip(*(part.split(" ") for part in written.split(", ")), strict=True)
+    head, filled = "pv_lo,pv_hi,op_lo,op_hi,kp,ti", "100,300,4,20,2,60"
+    again = row(tmp_path, f"{head},{','.join(columns)}", f"{filled},{','.join(cells)}")
+    assert controller(again, 200.0) == seen
+
+
+def test_an_op_that_stands_within_a_stated_gap_is_not_in_manual():
+    """Of two spans in which OP stands still, the one in which the error leaves the gap is manual."""
+    manual, error = np.zeros(40, dtype=bool), np.zeros(40)
+    manual[5:15] = manual[20:30] = True
+    error[5:15], error[20:30] = 0.4, np.linspace(0.0, 0.9, 10)
+    assert np.flatnonzero(beyond_gap(manual, error, 0.5)).tolist() == list(range(20, 30))

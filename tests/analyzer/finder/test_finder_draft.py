@@ -49,6 +49,18 @@ def test_the_draft_is_read_as_loops_csv(bag: Path, tmp_path: Path) -> None:
     assert found.extra["ranges"] == "recorded"
 
 
+def test_settings_that_are_not_stated_are_drafted_as_recorded(bag: Path, tmp_path: Path) -> None:
+    """A stated loop without kp and ti gets those that its data show, and keeps all that its row states."""
+    (tmp_path / "stated.csv").write_text("loop,description,pv_lo,pv_hi,gap\nTIC7,column's foot,-50,150,0.5\n")
+    done = triage("loops", bag, "--loops", tmp_path / "stated.csv", "--out", tmp_path / "loops.csv")
+    assert done.exit_code == 0
+    spec = next(s for s in read_loops(tmp_path / "loops.csv") if s.loop == "TIC7")
+    assert spec.extra["found_by"] == "recorded"
+    assert (spec.kp, spec.ti) == pytest.approx((2.0, 60.0), rel=0.1)
+    assert (spec.gain_unit, spec.ti_unit) == ("engineering", "s")
+    assert (spec.description, spec.pv_lo, spec.pv_hi, spec.gap) == ("column's foot", -50.0, 150.0, 0.5)
+
+
 def test_what_is_stated_is_kept(bag: Path, tmp_path: Path) -> None:
     """A loop of --loops stands as it is stated, and its tags are nobody else's."""
     (tmp_path / "stated.csv").write_text("loop,pv,op,kp,ti\nQ,X1,Y0,3,7\n")

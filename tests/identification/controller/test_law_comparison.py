@@ -102,3 +102,35 @@ def test_a_rate_limit_is_seen_and_a_sine_has_none():
     assert not fastest(50 + 5 * np.sin(t / 50)).any()
     assert not fastest(np.round(np.cumsum(np.random.default_rng(1).standard_normal(N)), 1)).any()
     assert fastest(np.cumsum(np.clip(np.random.default_rng(1).standard_normal(N), -1, 1))).mean() > 0.3
+
+
+@pytest.mark.parametrize(
+    ("more", "column", "true"),
+    [({"rate": 0.05}, "op_rate", 0.05), ({"weight": 0.0}, "sp_weight", 0.0), ({}, "op_rate", np.inf)],
+    ids=["rate", "weight", "none"],
+)
+def test_what_the_record_shows_beside_true_settings_is_recognized(more, column, true):
+    """A limit of OP's rate and a gain without the set point are recognized, and neither where there is none."""
+    found = compared(recorded(lambda e: e, **more), TRUE)
+    assert found.agree
+    assert getattr(found.found, column) == pytest.approx(true, rel=0.02)
+
+
+def test_a_filter_and_a_limit_are_recognized():
+    """A filter of PV of 7 s is told within a sixth, and a limit of OP at 51 % as it is."""
+    rng = np.random.default_rng(4)
+    load = np.cumsum(rng.standard_normal(N)) * 0.2
+    load -= np.linspace(0.0, load[-1], N)
+    pv, op, y, seen, integral = np.empty(N), np.empty(N), 0.0, 50.0, 50.0
+    for k in range(N):
+        y += (0.8 * ((op[k - 8] if k >= 8 else 50.0) - 50.0 + load[k]) - y) / 60.0
+        pv[k] = 50.0 + y + 0.01 * rng.standard_normal()
+        seen += (pv[k] - seen) / 8.0
+        wanted = integral + 2.0 * (50.0 - seen) * (1.0 + 1.0 / 80.0)
+        op[k] = min(wanted, 51.0)
+        integral += 2.0 * (50.0 - seen) / 80.0 if wanted < 51.0 else 0.0
+    record = LoopRecord("L", 0.0, 1.0, np.full(N, 50.0), pv, op, np.zeros(N, dtype=bool))
+    found = compared(record, TRUE)
+    assert found.agree
+    assert found.found.op_hi == pytest.approx(51.0)
+    assert found.found.pv_filter_s == pytest.approx(7.0, rel=1 / 6)

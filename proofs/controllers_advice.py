@@ -1,0 +1,81 @@
+"""Does advice hold for controllers as plants have them? python -m proofs.controllers_advice [--seed 1 2] [--days 1]
+
+Loops of proofs/controllers_plant.py with a gap, limits of OP and of its rate, a filter of PV or a slow scan, of which
+gain and integral time alone are stated: worn, tuned too tight, and unstable. What is advised is typed into the same
+controller on the same plant under the same load. Writes controllers_advice.md here.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from analyzer.config import Config
+from analyzer.history.export import open_export
+from analyzer.loop.quality import prepare
+from analyzer.loops.tags import match, read_loops
+from analyzer.night.chunk import assess_loop
+from proofs.common import command, command_line, publish, table
+from proofs.controllers_plant import Controlled, controlled
+
+ASKED = ("gap", "limit of OP", "limit of OP's rate", "PV filter", "slow scan")
+CASES = {"worn": ("worn", 1.5), "too tight": ("healthy", 3.0), "unstable": ("healthy", 5.0)}
+"""Scene, and times the usual gain."""
+
+
+def advised(c: Controlled, every: int) -> tuple[float, float] | None:
+    """Gain and integral time that are advised, None where none are."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "trends").mkdir()
+        c.trends("L", every).to_parquet(folder / "trends" / "trends.parquet")
+        pd.DataFrame([{"loop": "L", **c.row}]).to_csv(folder / "loops.csv", index=False)
+        export, config = open_export([folder / "trends"]), Config()
+        (spec,), *_ = match(read_loops(folder / "loops.csv"), export.tags)
+        _, advice = assess_loop(spec, prepare(spec, export.read(spec.tags), config.quality), config)
+    return None if advice.kp_new is None or advice.ti_new is None else (advice.kp_new, advice.ti_new)
+
+
+def error(c: Controlled) -> float:
+    """Average absolute error [% PV]."""
+    return float(np.mean(np.abs(c.sp - c.pv)))
+
+
+def main() -> None:
+    """Type in what is advised, and tabulate what the error does."""
+    asked = command_line(__doc__, seed=[1], days=1.0)
+    rows = []
+    for form in ASKED:
+        for case, (scene, tight) in CASES.items():
+            ratios = []
+            for seed in asked.seed:
+                before = controlled(form, scene, seed, asked.days, tight)
+                for every in (1, 10):
+                    typed = advised(before, every)
+                    if typed is not None:
+                        after = controlled(form, scene, seed, asked.days, tight, typed)
+                        ratios.append(error(after) / error(before))
+            change = (
+                [f"{100 * (x - 1):+.0f}" for x in (np.median(ratios), max(ratios))] if ratios else ["", ""]
+            )
+            rows.append((form, case, 2 * len(asked.seed), len(ratios), *change, sum(x > 1.1 for x in ratios)))
+            print(*rows[-1], flush=True)
+    publish(
+        __file__,
+        "Does advice hold for controllers as plants have them?",
+        command(__file__, seed=asked.seed, days=asked.days),
+        "Loops of which gain and integral time are stated and nothing else, recorded every 1 and 10 s. New settings "
+        "are typed into the same controller on the same plant under the same load.",
+        table(
+            "controller | case | recordings | new settings | error, median % | error, worst % | over 10 %",
+            rows,
+            True,
+        ),
+    )
+
+
+if __name__ == "__main__":
+    main()
