@@ -8,7 +8,7 @@ worn valve.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import repeat
@@ -105,7 +105,7 @@ class Belief:
         return now.significance <= limits.calmed * then.significance
 
 
-_types = cache(get_type_hints)
+_types: Callable[[Any], dict[str, Any]] = cache(get_type_hints)
 
 
 def kept_as(belief: Belief) -> str:

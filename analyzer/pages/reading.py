@@ -94,7 +94,7 @@ def _figures(
 ) -> dict[str, dict[str, Floats]]:
     """Columns of numbers by loop, in the order of the nights that have the table, NaN where not known."""
     paths = [store.file(table, night) for night in nights] if loops else []
-    tables = [read_stored(p, columns, [("loop", "in", sorted(loops))]) for p in paths if p.exists()]
+    tables = [read_stored(p, columns, loops) for p in paths if p.exists()]
     if not tables:
         return {}
     names = dict.fromkeys(n for t in tables for n in t.column_names if n not in ("loop", "night"))

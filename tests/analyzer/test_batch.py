@@ -13,12 +13,13 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 
+from analyzer.belief import nights as believed
 from analyzer.cli import main
 from analyzer.columns import NIGHTS, names
 from analyzer.history.export import Export, open_export
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import find_loops
-from analyzer.night import batch, chunk
+from analyzer.night import batch, chunk, finish
 from analyzer.night.nights import Plant
 from analyzer.store.store import Store
 from identification.errors import InputError
@@ -206,6 +207,26 @@ def test_two_processes_give_what_one_gives(night, whole, tmp_path):
     store = tmp_path / "store"
     batch.run(Plant(export, specs, CONFIG), Store(store), jobs=2)
     assert tables(store) == tables(whole)
+
+
+def test_a_night_put_together_in_small_parts_is_the_same(night, whole, tmp_path, monkeypatch):
+    """Tables that are read and written three loops at a time have the rows of tables in one part, and of some loops
+    the same are read."""
+    monkeypatch.setattr(finish, "CHUNKS_AT_ONCE", 1)
+    monkeypatch.setattr(finish, "LOOPS_AT_ONCE", 3)
+    monkeypatch.setattr(believed, "LOOPS_AT_ONCE", 7)
+    export, specs = opened(night)
+    store = Store(tmp_path / "store")
+    batch.run(Plant(export, specs, CONFIG), store)
+    assert tables(store.path) == tables(whole)
+    assert pq.ParquetFile(store.file("nights", store.nights()[-1])).num_row_groups > 10
+    for table in ("nights", "hours", "trends", "beliefs"):
+        some = [store.read(table, store.nights()[-1]).to_pylist() for store in (store, Store(whole))]
+        wanted = {"L03", "L08", "L39"}
+        kept = [r for r in some[1] if r["loop"] in wanted]
+        names = list(kept[0])
+        assert store.own_rows(table, store.nights()[-1], names, wanted) == kept
+        assert store.own_rows(table, store.nights()[-1], names, []) == []
 
 
 def test_progress_counts_all_loops(night, tmp_path):
