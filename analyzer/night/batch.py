@@ -80,9 +80,13 @@ def _tasks(plant: Plant, store: Store, nights: Sequence[Night], known: set[str])
     return tasks
 
 
-def _results(tasks: Sequence[Task], jobs: int, config: Config, scheduler: str | None) -> Iterator[Done]:
-    """What the chunks give, on a cluster, on worker processes or, with no jobs, in this process, unprotected."""
+def _results(
+    tasks: Sequence[Task], jobs: int, config: Config, scheduler: str | None, watch: Callable[[int], None]
+) -> Iterator[Done]:
+    """What the chunks give, on a cluster, on worker processes or, with no jobs, in this process, unprotected; `watch`
+    is told now and then how many loops of the chunks in hand are done."""
     with executor(jobs, len(tasks), chunk.work, config.workers, scheduler) as workers:
+        workers.watch = watch
         for task in tasks:
             workers.submit(task)
         for result in workers.results():
@@ -218,8 +222,13 @@ def run(
         known = set() if whole is None else set(whole.column("loop").to_pylist())
         done, of = len(known), len(plant.specs)
         progress(done, of)
+
+        def watch(in_hand: int) -> None:
+            progress(done + in_hand, of)
+
         try:
-            for result in _results(_tasks(plant, store, nights, known), jobs, plant.config, scheduler):
+            tasks = _tasks(plant, store, nights, known)
+            for result in _results(tasks, jobs, plant.config, scheduler, watch):
                 _require_kept(store, nights[-1].name, result.key)
                 keys.append(result.key)
                 done += result.loops
