@@ -89,7 +89,7 @@ def measured(path: Path) -> tuple[float, float, float, int, int]:
     del table, lines
     begun = time.perf_counter()
     alone = {name: Finding(name, "", Status.OK, cause=Cause.LOAD) for name in names}
-    found = trace(waves_in(pq.read_table(path)), alone, PlantLimits())
+    found = trace(waves_in([pq.read_table(path)]), alone, PlantLimits())
     took = time.perf_counter() - begun
     return floor, took, peak_mb(), count, len(found)
 

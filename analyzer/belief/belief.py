@@ -8,8 +8,8 @@ worn valve.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import repeat
 from operator import attrgetter
@@ -102,17 +102,21 @@ class Belief:
         return now.significance <= limits.calmed * then.significance
 
 
+_types: Callable[[Any], dict[str, Any]] = cache(get_type_hints)
+
+
 def kept_as(belief: Belief) -> str:
     """A belief as the store keeps it (JSON): what the belief of the next night goes on from."""
-    return json.dumps(asdict(belief), separators=(",", ":"))
+    return json.dumps(belief, separators=(",", ":"), default=_as_fields)
+
+
+def _as_fields(value: Any) -> dict[str, Any]:
+    return {name: getattr(value, name) for name in _types(type(value))}
 
 
 def belief_of(text: str) -> Belief:
     """A belief as the store kept it; KeyError, TypeError or ValueError where another version wrote it."""
     return _read_as(Belief, {"phases": []} | json.loads(text))  # type: ignore[no-any-return]
-
-
-_types = cache(get_type_hints)
 
 
 def _read_as(kind: Any, kept: Any) -> Any:

@@ -4,13 +4,17 @@ order of runs nor a night run twice matters, and one command makes them anew."""
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
+
+import pyarrow as pa
 
 from analyzer.belief.belief import Belief, belief_of, kept_as, step
 from analyzer.belief.pool import Pooled
 from analyzer.belief.wear import growth, wear
 from analyzer.columns import BELIEFS, Row, row_of
+from analyzer.columns import names as names_of
 from analyzer.config import Config
 from analyzer.loop.decisions import CAUSES, Lane
 from analyzer.store import notes
@@ -22,8 +26,10 @@ from identification.errors import InputError, NotNowError
 
 Held = tuple[tuple[float | None, float | None], tuple[float, float]]
 """Settings in force, as loops.csv states them, and those that nights have told to type in instead."""
-Followed = tuple[str, Sequence[Row], Sequence[str]]
-"""A night, the rows of its beliefs, and sentences on loops of which they failed."""
+LOOPS_AT_ONCE = 1000
+"""Loops whose beliefs are in memory at a time."""
+UNREADABLE = (InputError, KeyError, TypeError, ValueError)
+"""What says that beliefs are damaged, or of another version."""
 READ = (
     *("loop", "night", "status", "start_s", "duration_s"),
     *("kp", "ti", "form", "gain_unit", "ti_unit", "op_unit"),
@@ -38,40 +44,40 @@ READ = (
 """What beliefs follow from."""
 
 
+class UnreadableError(Exception):
+    """Beliefs of a night are damaged, gone, or of another version."""
+
+
 def settle(store: Store, night: str, config: Config) -> list[str]:
     """Write the beliefs of a night and of all after it, and of any before that has none; sentences on loops of which
     that failed."""
     names = store.nights()
     first = min([night, *(n for n in names if not store.file("beliefs", n).exists())])
-    known = _beliefs_before(store, first)
-    if known is None:
+    earlier = [n for n in names if n < first]
+    try:
+        return _write_all(store, names[len(earlier) :], earlier[-1] if earlier else None, config)
+    except UnreadableError:
         return settle_anew(store, config)
-    return _write_all(store, _followed(store, [n for n in names if n >= first], known, config))
-
-
-def _beliefs_before(store: Store, night: str) -> dict[str, Belief] | None:
-    """What was believed before a night, nothing of the first of all; None where that cannot be read."""
-    earlier = [n for n in store.nights() if n < night]
-    return read_beliefs(store, earlier[-1]) if earlier else {}
 
 
 def held_pairs(store: Store, night: str) -> dict[str, Held]:
     """Settings that are told of loops before a night; none where the store has no beliefs before it."""
-    told = [(loop, b.told.pair, b) for loop, b in (_beliefs_before(store, night) or {}).items()]
-    return {loop: ((b.kp, b.ti), (pair.kp, pair.ti)) for loop, pair, b in told if pair is not None}
+    earlier, out = [n for n in store.nights() if n < night], {}
+    try:
+        for loop, state in _states(store, earlier[-1]) if earlier else ():
+            if json.loads(state)["told"]["pair"] is not None:
+                b = belief_of(state)
+                assert b.told.pair is not None
+                out[loop] = (b.kp, b.ti), (b.told.pair.kp, b.told.pair.ti)
+    except UNREADABLE:
+        return {}
+    return out
 
 
 def settle_anew(store: Store, config: Config) -> list[str]:
     """Make all beliefs of a store anew from its nights; sentences as of `settle`."""
-    return _write_all(store, _followed_anew(store, config))
-
-
-def _followed_anew(store: Store, config: Config) -> Iterator[Followed]:
-    """All nights with their beliefs, from what the oldest knew of nights before it, which have been deleted."""
     names = store.nights()
-    known = (read_beliefs(store, names[0]) if names else None) or {}
-    pruned = {k: b for k, b in known.items() if min(b.valve.since or names[0], b.cycle.since) < names[0]}
-    return _followed(store, names, pruned, config)
+    return _write_all(store, names, names[0] if names else None, config)
 
 
 def unfounded(store: Store, config: Config) -> list[Problem]:
@@ -79,68 +85,142 @@ def unfounded(store: Store, config: Config) -> list[Problem]:
     version kept no beliefs."""
     if not store.files("beliefs"):
         return []
+    names, wrong = store.nights(), set()
     try:
-        followed = list(_followed_anew(store, config))
+        loops = list(dict.fromkeys(loop for name in names for loop in _loops(store, name, "nights")))
+        repaired = _repaired(store)
+        for part in in_parts(loops):
+            beliefs = _pruned(store, names[0], part)
+            for name in names:
+                rows, _ = _with_night(store, name, part, beliefs, repaired, config)
+                if name not in wrong and not _same(store, name, rows, part):
+                    wrong.add(name)
     except (InputError, NotNowError):
         return []
     remedy = "'triage store beliefs' makes them anew"
-    paths = [store.file("beliefs", night) for night, rows, _ in followed if not _same(store, night, rows)]
+    paths = [store.file("beliefs", night) for night in sorted(wrong)]
     return [Problem(f"{path}: not what the nights say", remedy) for path in paths]
 
 
-def _write_all(store: Store, followed: Iterator[Followed]) -> list[str]:
+def _write_all(store: Store, names: Sequence[str], before: str | None, config: Config) -> list[str]:
+    """Write the beliefs of nights, oldest first, from those of the night before them; of a first night that comes
+    before none, from what it knew of nights that have been deleted."""
     lost: list[str] = []
-    for night, rows, more in followed:
-        store.write("beliefs", night, rows_table(rows, BELIEFS))
-        lost += more
+    repaired = _repaired(store)
+    for name in names:
+        store.write("beliefs", name, _believed(store, name, before, repaired, config, lost))
+        before = name
     return lost
 
 
-def _same(store: Store, night: str, rows: Sequence[Row]) -> bool:
+def _believed(
+    store: Store,
+    name: str,
+    before: str | None,
+    repaired: Mapping[str, Sequence[float]],
+    config: Config,
+    lost: list[str],
+) -> Iterator[pa.Table]:
+    """The beliefs of a night in parts; sentences on loops of which that failed are added to `lost`."""
+    earlier = () if before in (None, name) else _loops(store, before, "beliefs")
+    if before == name:
+        with suppress(UnreadableError):
+            earlier = _loops(store, name, "beliefs")
+    for part in in_parts(list(dict.fromkeys([*_loops(store, name, "nights"), *earlier]))):
+        if before is None:
+            known = {}
+        else:
+            known = _pruned(store, name, part) if before == name else read_beliefs(store, before, part)
+        rows, failed = _with_night(store, name, part, known, repaired, config)
+        lost += failed
+        yield rows_table(rows, BELIEFS)
+
+
+def in_parts(loops: Sequence[str]) -> Iterator[Sequence[str]]:
+    """Loops, so many at a time as memory may hold of."""
+    return (loops[k : k + LOOPS_AT_ONCE] for k in range(0, len(loops), LOOPS_AT_ONCE))
+
+
+def _loops(store: Store, night: str, table: str) -> list[str]:
+    """The loops of a table of a night."""
     try:
-        held = store.read_if_there("beliefs", night)
+        return list(store.read(table, night, ["loop"]).column(0).to_pylist())
+    except UNREADABLE as error:
+        if table == "nights":
+            raise
+        raise UnreadableError from error
+
+
+def _repaired(store: Store) -> dict[str, list[float]]:
+    """When notes say that the valve of each loop was repaired [s since 1970-01-01 UTC]."""
+    return {
+        loop: [n.time_s for n in own if words.says_repaired(n.text)]
+        for loop, own in notes.read_notes(store.path).items()
+    }
+
+
+def _pruned(store: Store, night: str, loops: Collection[str]) -> dict[str, Belief]:
+    """What the oldest night knew of nights before it, which have been deleted."""
+    try:
+        known = read_beliefs(store, night, loops)
+    except UnreadableError:
+        return {}
+    return {k: b for k, b in known.items() if min(b.valve.since or night, b.cycle.since) < night}
+
+
+def _same(store: Store, night: str, rows: Sequence[Row], loops: Collection[str]) -> bool:
+    try:
+        held = store.own_rows("beliefs", night, names_of(BELIEFS), loops)
     except DamagedError:
         return False
     except NotNowError:  # said of the table itself
         return True
-    kept = [] if held is None else held.to_pylist()
-    return {r["loop"]: r for r in kept} == {r["loop"]: row_of(r, BELIEFS) for r in rows}
+    except InputError:
+        return not rows
+    return {r["loop"]: r for r in held} == {r["loop"]: row_of(r, BELIEFS) for r in rows}
 
 
-def read_beliefs(store: Store, night: str) -> dict[str, Belief] | None:
-    """The beliefs of a night by loop; None where there are none that this version can read."""
+def _states(store: Store, night: str, loops: Collection[str] | None = None) -> Iterator[tuple[str, str]]:
+    """The beliefs of some loops of a night, or of all, as they are kept."""
+    found = store.own_rows("beliefs", night, ("loop", "state"), loops)
+    return ((r["loop"], r["state"]) for r in found)
+
+
+def read_beliefs(store: Store, night: str, loops: Collection[str] | None = None) -> dict[str, Belief]:
+    """The beliefs of some loops of a night, or of all. Raises UnreadableError where there are none that this version
+    can read."""
     try:
-        rows = store.read("beliefs", night, ["loop", "state"]).to_pylist()
-        return {r["loop"]: belief_of(r["state"]) for r in rows}
-    except (InputError, KeyError, TypeError, ValueError):  # damaged, or of another version
-        return None
+        return {loop: belief_of(state) for loop, state in _states(store, night, loops)}
+    except UNREADABLE as error:
+        raise UnreadableError from error
 
 
-def _followed(
-    store: Store, names: Sequence[str], known: Mapping[str, Belief], config: Config
-) -> Iterator[Followed]:
-    """Nights, oldest first, with their beliefs, from what was believed before them."""
-    beliefs = dict(known)
-    repaired = {
-        loop: [n.time_s for n in own if words.says_repaired(n.text)]
-        for loop, own in notes.read_notes(store.path).items()
-    }
-    for name in names:
-        rows = {r["loop"]: r for r in store.own_rows("nights", name, READ)}
-        out, lost = [], []
-        for loop in (*rows, *(k for k in beliefs if k not in rows)):
-            before, row = beliefs.get(loop), rows.get(loop)
-            # what a pruned store knew of its oldest night is not counted again
-            known_already = before is not None and before.night >= name
-            try:
-                own = repaired.get(loop, ())
-                now = before if row is None or known_already else step(before, row, own, config)
-                if now is not None:
-                    out.append(_belief_row(before, now, row, name, config))
-                    beliefs[loop] = now
-            except Exception as error:  # a belief that fails is that loop's alone, and never the night's end
-                lost.append(f"{loop}: no belief of night {name} ({type(error).__name__}: {error})")
-        yield name, out, lost
+def _with_night(
+    store: Store,
+    name: str,
+    loops: Sequence[str],
+    beliefs: dict[str, Belief],
+    repaired: Mapping[str, Sequence[float]],
+    config: Config,
+) -> tuple[list[Row], list[str]]:
+    """The beliefs of some loops with a night, as rows and in place of those before it; and sentences on loops of
+    which they failed."""
+    rows = {r["loop"]: r for r in store.own_rows("nights", name, READ, loops)}
+    out: list[Row] = []
+    lost = []
+    for loop in loops:
+        before, row = beliefs.get(loop), rows.get(loop)
+        # what a pruned store knew of its oldest night is not counted again
+        known_already = before is not None and before.night >= name
+        try:
+            own = repaired.get(loop, ())
+            now = before if row is None or known_already else step(before, row, own, config)
+            if now is not None:
+                out.append(_belief_row(before, now, row, name, config))
+                beliefs[loop] = now
+        except Exception as error:  # a belief that fails is that loop's alone, and never the night's end
+            lost.append(f"{loop}: no belief of night {name} ({type(error).__name__}: {error})")
+    return out, lost
 
 
 def _belief_row(

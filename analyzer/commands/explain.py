@@ -98,9 +98,10 @@ def _show(data: dict[str, Any], page: Callable[[], Page], form: str, out: Path |
 
         say("\n".join(answer_lines(data)))
     else:
+        from analyzer.pages.rank import interactive
         from reports import folder, html, markdown
 
-        if out is None and form == "html" and sys.stdout.isatty():
+        if out is None and form == "html" and interactive():
             out = Path()  # nobody reads a thousand lines of HTML on a terminal
         if out is None:
             click.echo(html.render(page(), True) if form == "html" else markdown.render(page(), ""))

@@ -277,17 +277,42 @@ def bar(what: str) -> Iterator[Report]:
         yield lambda done, total: progress.update(task, completed=done, total=total)
 
 
+COMPILING_S = 10.0
+"""Seconds without a first thing done after which it is told what may take them [s]; ours: once compiled, a loop takes
+a tenth of a second."""
+
+
 def _tenths(what: str) -> Report:
-    """A line on stderr at every tenth."""
-    said = {0}
+    """A line on stderr at the beginning, at every tenth, and where the first thing takes long."""
+    said, begun = set[int](), time.monotonic()
 
     def report(done: int, total: int) -> None:
+        if done == 0 and -1 not in said and time.monotonic() - begun > COMPILING_S:
+            said.add(-1)
+            print(
+                f"{what}: the first run after an installation compiles for minutes",
+                file=sys.stderr,
+                flush=True,
+            )
         tenth = 10 * done // max(total, 1)
         if tenth not in said:
             said.add(tenth)
             print(f"{what}: {done} of {total}", file=sys.stderr, flush=True)
 
     return report
+
+
+@contextmanager
+def watched(what: str) -> Iterator[None]:
+    """Say what is done, for as long as it is done, where somebody looks at a terminal."""
+    seen = sys.stderr is not None and sys.stderr.isatty()
+    if seen:
+        click.echo(f"\r\033[K{visible(what)}", nl=False, err=True)
+    try:
+        yield
+    finally:
+        if seen:
+            click.echo("\r\033[K", nl=False, err=True)
 
 
 @contextmanager

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,16 +34,22 @@ def into_folder(single_text: str) -> Callable[[Command], Command]:
     return lambda command: options.formats("html", "markdown")(single(where(command)))
 
 
-def write(store: Store, pages: Sequence[Page], form: str, single_file: bool, out: Path) -> None:
-    """Write a store's pages and their tables, and say where."""
+def write(store: Store, pages: Iterable[Page], form: str, single_file: bool, out: Path) -> list[str]:
+    """Write a store's pages and their tables as they come, and say where; the names of their files."""
     from reports.folder import write_csv, write_html, write_markdown
 
     head, zone = made(store), store.zone()
-    pages = [replace(page, made=head, zone=zone) for page in pages]
-    paths = write_html(pages, out, single_file) if form == "html" else write_markdown(pages, out)
-    for page in pages:
-        write_csv(page, out)
+
+    def with_tables() -> Iterator[Page]:
+        for page in pages:
+            shown = replace(page, made=head, zone=zone)
+            write_csv(shown, out)
+            yield shown
+
+    shown = with_tables()
+    paths = write_html(shown, out, single_file) if form == "html" else write_markdown(shown, out)
     click.echo(f"{paths[0]}" + (f" and {len(paths) - 1} more" if len(paths) > 1 else ""))
+    return [path.name for path in paths]
 
 
 def made(store: Store) -> str:
@@ -152,8 +159,11 @@ def _changes(
     type=click.IntRange(0),
     help="Loops with a page, the worst first.",
 )
+@click.option("--loop", "tag", help="The pages of this loop alone; those that stand there stay.")
 @into_folder("Style and scripts in each page itself.")
-def pages(store: Path, night: str | None, top: int, form: str, single_file: bool, out: Path) -> None:
+def pages(
+    store: Path, night: str | None, top: int, tag: str | None, form: str, single_file: bool, out: Path
+) -> None:
     """The morning page of a night and a page for each of its loops, the worst first.
 
     Example: triage pages store --out pages --top 50
@@ -162,6 +172,9 @@ def pages(store: Path, night: str | None, top: int, form: str, single_file: bool
     from reports.folder import forget_stale
 
     kept = opened_store(store)
+    if tag is not None:
+        write(kept, night_pages.pages_of_loop(kept, night, tag), form, single_file, out)
+        return
 
     def page_of(night: str) -> Path:
         return out / f"{night_pages.name_of(night)}.html"
@@ -171,10 +184,8 @@ def pages(store: Path, night: str | None, top: int, form: str, single_file: bool
         page, results = page_of(night), kept.file("nights", night)
         return page.exists() and page.stat().st_mtime > results.stat().st_mtime
 
-    found = list(night_pages.pages_of_night(kept, night, top))
+    found = night_pages.pages_of_night(kept, night, top)
+    dated = night_pages.dated_pages(kept, night, stands) if form == "html" else ()
+    written = write(kept, chain(found, dated), form, single_file, out)
     if form == "html":
-        found += night_pages.dated_pages(kept, night, stands)
-    write(kept, found, form, single_file, out)
-    if form == "html":
-        dated = {page_of(night).name for night in kept.nights()}
-        forget_stale(out, [f"{page.name}.html" for page in found], kept_names=dated)
+        forget_stale(out, written, kept_names={page_of(night).name for night in kept.nights()})

@@ -32,6 +32,7 @@ from analyzer.commands.options import (
     finding,
     say,
     unforeseen,
+    watched,
     what_failed,
     what_went_wrong,
 )
@@ -215,14 +216,17 @@ def _run_night(
 ) -> tuple[Outcome, int]:
     """The export read, assessed as `how` says to analyzer/night/batch.py and, where it is asked for, explained; the
     outcome and the number of loops."""
-    from analyzer.night.asked import opened_apart
     from analyzer.store.lock import scratch
     from analyzer.store.store import Store, require_place
 
     require_place(place)
     with scratch(place, how["resume"]) as copies:
-        reading = {**asked.reading, "scratch": copies}
-        plant, store = opened_apart(replace(asked, reading=reading)), Store(place)
+        more = f" and {len(asked.export) - 1} more" if len(asked.export) > 1 else ""
+        with watched(f"reading {asked.export[0]}{more}"):
+            from analyzer.night.asked import opened_apart  # takes a second
+
+            plant = opened_apart(replace(asked, reading={**asked.reading, "scratch": copies}))
+        store = Store(place)
         _say(plant.notes, log)
         outcome = _assessed(plant, store, how, log)
         if explaining and len(outcome.unassessed) + len(outcome.failed) < len(plant.specs):

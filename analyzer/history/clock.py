@@ -140,7 +140,7 @@ class Clock:
         if scale == ELAPSED:
             return counted_s(as_text(column)), False
         if scale == OF_DAY:
-            return of_day_s(as_text(column)), False
+            return of_day_s(as_text(column), self.date_format), False
         if pa.types.is_date(column.type):
             column = pc.cast(column, pa.timestamp("s"))
         if pa.types.is_timestamp(column.type):
@@ -239,13 +239,22 @@ def counted_s(texts: pa.Array) -> NDArray[np.float64]:
     return np.asarray(3600.0 * hour + 60.0 * minute + second)
 
 
-def of_day_s(texts: pa.Array) -> NDArray[np.float64]:
+def is_of_day(date_format: str) -> bool:
+    """Whether a format states a time of day and no date."""
+    at = datetime(2026, 5, 12, 8, 9, 10)
+    return datetime.strptime(at.strftime(date_format), date_format) == at.replace(1900, 1, 1)
+
+
+def of_day_s(texts: pa.Array, date_format: str | None = None) -> NDArray[np.float64]:
     """Times of day as seconds, shape (n,), NaN where they are none: a day more, or less, where one lies over half a
     day from the last."""
-    parts = fields(pc.binary_join_element_wise("1970-01-01", pc.utf8_trim_whitespace(texts), " "))
-    if parts is None:
-        return np.full(len(texts), np.nan)
-    second = np.where(parts.readable, parts.clock_s, np.nan)
+    if date_format is not None:
+        second = _formatted(texts, date_format)[0] % DAY_S
+    else:
+        parts = fields(pc.binary_join_element_wise("1970-01-01", pc.utf8_trim_whitespace(texts), " "))
+        if parts is None:
+            return np.full(len(texts), np.nan)
+        second = np.where(parts.readable, parts.clock_s, np.nan)
     known = np.isfinite(second)
     second[known] = np.unwrap(second[known], period=DAY_S)
     return np.asarray(second - DAY_S * np.floor(np.min(second[known], initial=DAY_S) / DAY_S))

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
+from analyzer.history.clock import is_of_day
 from analyzer.history.files import Mark, export_files, is_parquet, mark_of, packed_beside, unpacked
 from analyzer.history.layouts import Source, source_of, tag_column
 from analyzer.history.parquet import converted, open_parquet
@@ -192,7 +193,7 @@ def _is_format(written: str) -> bool:
         again = datetime.strptime(datetime(2026, 5, 12, 8, 9, 10).strftime(written), written)
     except (ValueError, re.error):
         return False
-    return again.year == 2026  # a format without a year reads as 1900
+    return again.year == 2026 or is_of_day(written)  # a format without a year reads as 1900
 
 
 def _readable_files(paths: Sequence[Path], options: ReadOptions) -> tuple[list[Source], list[str]]:

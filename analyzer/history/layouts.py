@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -196,7 +196,7 @@ def open_wide(table: Table, options: ReadOptions) -> Source:
     clock = find_clock(table, options)
     others = [i for i in range(len(table.names)) if i not in clock.columns and _holds_values(table, i)]
     free = [i for i in others if not _counts_rows(table, i)] or others
-    partner, said = quality_columns(table, free)
+    partner, said = quality_columns(table, free, options.stated)
     values_in = [i for i in free if i not in partner.values()]
     if not values_in or not _any_number(table, values_in):
         seen = f"{table.path}: no values beside the time column '{table.names[clock.columns[0]]}'"
@@ -259,7 +259,7 @@ def open_pairs(table: Table, options: ReadOptions) -> Source | None:
     """Take a table as pairs where two or more columns hold stamps, each with values behind it; else None."""
     if options.time_column is not None or options.date_format is not None:
         return None
-    groups = _groups(table)
+    groups = _groups(table, options.stated)
     if len(groups) < 2:
         return None
     columns = tuple(c for time, beside in groups for c in _paired(table, time, beside, options))
@@ -272,13 +272,15 @@ def open_pairs(table: Table, options: ReadOptions) -> Source | None:
     return Source(table, tags, columns, options.good_quality, (layout,), paired=True)
 
 
-def _groups(table: Table) -> list[tuple[int, list[int]]]:
-    """Each column of stamps with the columns behind it up to the next; none where a column has nothing behind it."""
+def _groups(table: Table, stated: Collection[str]) -> list[tuple[int, list[int]]]:
+    """Each column of stamps, none of stated tags, with the columns behind it up to the next; none where a column has
+    nothing behind it."""
     timed = [_is_time(name) for name in table.names]
     # a tag, of both
     above = [NUMBERED.sub("", a) != "" and b == "" for a, b in pairwise((*table.names, "."))]
     texts = [is_text(kind) or pa.types.is_temporal(kind) for kind in table.types]
     likely = [i for i, may in enumerate(zip(texts, timed, above, strict=True)) if any(may)]
+    likely = [i for i in likely if table.names[i] not in stated]
     heads = dict(zip(likely, table.head(likely), strict=True))
     times = [i for i in likely if holds_stamps(heads[i], timed[i], above[i])]
     if len(times) < 2 or times[0] != 0:

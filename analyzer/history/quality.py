@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from enum import StrEnum
 
 import numpy as np
@@ -124,10 +124,12 @@ def not_good(
     return bad[place], +found
 
 
-def quality_columns(table: Table, free: Sequence[int]) -> tuple[dict[int, int], list[str]]:
+def quality_columns(
+    table: Table, free: Sequence[int], stated: Collection[str] = ()
+) -> tuple[dict[int, int], list[str]]:
     """Value column to quality column of a wide table, by position, and sentences on such as are not understood.
 
-    `free` are the columns that are not the time's.
+    `free` are the columns that are not the time's; `stated` are names of tags, which hold no quality.
 
     A quality column is named for its tag (FIC101.PV_Q, Qual FIC101.PV), or stands right of its values under a bare
     name that comes several times (Status), or is the only one of its kind and speaks for the whole row.
@@ -136,7 +138,11 @@ def quality_columns(table: Table, free: Sequence[int]) -> tuple[dict[int, int], 
     by_name = {names[i]: i for i in reversed(free)}
     named = {i: by_name[tag] for i in free if (tag := _tag_of(names[i], by_name)) is not None}
     found = {tag: i for i, tag in named.items() if _is_coded(table, i)}
+    found = {tag: i for tag, i in found.items() if names[i] not in stated}
     bare = [i for i in free if plain(names[i]) in COLUMNS["quality"] and i not in found.values()]
+    bare = [i for i in bare if names[i] not in stated]
+    if len(bare) > 1:  # an error of the loop, say, is a signal
+        bare = [i for i in bare if not _has_fractions(table, i)]
     values = [i for i in free if i not in bare and i not in found.values()]
     if len(bare) > 1:
         return {**{i - 1: i for i in bare if i - 1 in values}, **found}, []
@@ -157,6 +163,12 @@ def _tag_of(name: str, others: Mapping[str, int]) -> str | None:
     return next((tag for tag in tags if tag in others and tag != name), None)
 
 
+def _has_fractions(table: Table, i: int) -> bool:
+    """Whether a column holds numbers that are not whole."""
+    held = table.head([i])[0].drop_null()
+    return pa.types.is_floating(held.type) and not pc.all(pc.equal(held, pc.floor(held))).as_py()
+
+
 def _is_coded(table: Table, i: int) -> bool:
     """Whether a column named as quality holds codes: few kinds, whole numbers or known texts.
 
@@ -165,8 +177,7 @@ def _is_coded(table: Table, i: int) -> bool:
     codes = table.head([i])[0].drop_null()
     if len(codes) == 0:
         return True
-    fractions = pa.types.is_floating(codes.type) and not pc.all(pc.equal(codes, pc.floor(codes))).as_py()
-    if fractions or not _few_kinds(codes):
+    if _has_fractions(table, i) or not _few_kinds(codes):
         return False
     scheme, kinds = scheme_of(table.names[i], codes), {*_codes_seen(codes)} - {""}
     if scheme is Scheme.TEXT:

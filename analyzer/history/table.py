@@ -49,6 +49,8 @@ class ReadOptions:
         Names of the columns of stamps and, in long tables, of quality codes as they stand in the header.
     good_quality : tuple of str or None
         Quality codes or texts that count as good, in place of the detected scheme.
+    stated : frozenset of str
+        Tags that loops.csv states: columns of these names hold neither stamps nor quality codes.
     scratch : Path or None
         Directory for plain copies of packed files; None: this process's own, gone with it.
     """
@@ -63,6 +65,7 @@ class ReadOptions:
     interval: str | None = None
     time_column: str | None = None
     quality_column: str | None = None
+    stated: frozenset[str] = frozenset()
     scratch: Path | None = None
 
     @property

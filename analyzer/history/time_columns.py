@@ -24,6 +24,7 @@ from analyzer.history.clock import (
     counted_s,
     date_and_time,
     is_fixed,
+    is_of_day,
     shown_order,
     time_scale_of,
     winter_offset_s,
@@ -277,7 +278,8 @@ def _time_candidates(table: Table, options: ReadOptions) -> list[int]:
         return [stated_column(table.path, table.names, options.time_column, "time")]
     named = (is_stamp(n) or n in ("", "index") or n.startswith("__index_level_") for n in table.names)
     held = (pa.types.is_temporal(kind) or is_text(kind) for kind in table.types)
-    return [i for i, may in enumerate(zip(named, held, strict=True)) if any(may)]
+    may = (any(each) for each in zip(named, held, strict=True))
+    return [i for i, each in enumerate(may) if each and table.names[i] not in options.stated]
 
 
 def _kind_of_time(name: str, head: pa.Array, timezone: str | None = None) -> str | TimeScale:
@@ -315,7 +317,8 @@ def _chosen(
     clock = Clock((0,), date_format=options.date_format, timezone=options.timezone)
     if options.date_format is not None:
         named = _by_name(table, [i for i in kinds if is_stamp(table.names[i])] or list(kinds))
-        return replace(clock, columns=(named[0],)) if named else None
+        scale = OF_DAY if is_of_day(options.date_format) else None
+        return replace(clock, columns=(named[0],), scale=scale) if named else None
     full, dates, times = (
         _by_name(table, [i for i in kinds if kinds[i] == kind]) for kind in ("full", "date", "time of day")
     )

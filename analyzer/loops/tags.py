@@ -49,7 +49,9 @@ def match(specs: Sequence[LoopSpec], tags: Iterable[str]) -> tuple[tuple[LoopSpe
     by_loop = {spec.loop: spec for spec in alone}
     matched = tuple(_with_tags_beside(spec, by_loop, known) for spec in alone)
     notes = list(by_place)
-    notes += [note for before, after in zip(specs, matched, strict=True) for note in _missing(before, after)]
+    alike = {spelling(tag): tag for tag in known}
+    pairs = zip(specs, matched, strict=True)
+    notes += [note for before, after in pairs for note in _missing(before, after, alike)]
     taken = {tag for spec in matched for tag in spec.tags}
     others = [loop for loop, roles in by_ending.items() if roles["pv"] not in taken]
     if others:
@@ -94,8 +96,20 @@ def _tag_of(name: str, by_loop: Mapping[str, LoopSpec], known: Mapping[str, None
     return by_loop[name].pv if name in by_loop else name if name in known else None
 
 
-def _missing(before: LoopSpec, after: LoopSpec) -> list[str]:
-    notes = [] if after.pv else [f"{after.loop}: not assessed, no PV tag {after.wanted_pv} in the export"]
+def spelling(tag: str) -> str:
+    """A tag without what differs between two spellings of it: capitals, blanks and marks."""
+    return re.sub(r"[\W_]+", "", tag).casefold()
+
+
+def _missing(before: LoopSpec, after: LoopSpec, alike: Mapping[str, str]) -> list[str]:
+    def meant(tag: str | None) -> str:
+        found = alike.get(spelling(tag or ""))
+        return "" if found is None else f"; did you mean {found}?"
+
+    wanted = after.wanted_pv
+    notes = (
+        [] if after.pv else [f"{after.loop}: not assessed, no PV tag {wanted} in the export{meant(wanted)}"]
+    )
     stated = [(role, getattr(before, role)) for role in ROLES if role != "pv" and getattr(before, role)]
     lost = [(role, tag) for role, tag in stated if getattr(after, role) is None]
     beside, feed = after.override_with or after.split_of, after.feedforward
@@ -105,7 +119,9 @@ def _missing(before: LoopSpec, after: LoopSpec) -> list[str]:
         notes.append(f"{after.loop}: feedforward {feed} is neither a loop nor a tag of the export")
     if after.upstream and after.load is None:
         notes.append(f"{after.loop}: upstream {after.upstream} is neither a loop nor a tag of the export")
-    return notes + [f"{after.loop}: {role.upper()} tag {tag} is not in the export" for role, tag in lost]
+    return notes + [
+        f"{after.loop}: {role.upper()} tag {tag} is not in the export{meant(tag)}" for role, tag in lost
+    ]
 
 
 def controller(spec: LoopSpec, pv_span: float | None) -> Pid | None:

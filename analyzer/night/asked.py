@@ -19,7 +19,7 @@ from analyzer.history.plant_clock import utc_seconds, zone_of
 from analyzer.history.series import Series
 from analyzer.limits import HISTORY
 from analyzer.loops.changes import TuningChange, read_changes
-from analyzer.loops.spec import LoopSpec, unknown_columns
+from analyzer.loops.spec import ROLES, LoopSpec, unknown_columns
 from analyzer.loops.tags import find_loops, match, read_loops
 from analyzer.night.nights import ALWAYS, Plant, Span
 from analyzer.night.workers import Died, Workers
@@ -50,7 +50,11 @@ class Asked:
     def opened(self) -> Plant:
         """The export and its loops, found by their tags' endings where no loops.csv is given, and what there is to
         say of them and of the changes."""
-        source = open_export(list(self.export), ReadOptions(**self.reading))
+        stated = (
+            () if self.loops is None else read_loops(self.loops, self.zone, self.reading.get("day_first"))
+        )
+        tags = frozenset(tag for s in stated for role in ROLES if (tag := getattr(s, role)))
+        source = open_export(list(self.export), ReadOptions(**self.reading, stated=tags))
         notes: tuple[str, ...] = ()
         if self.loops is None and self.finding:
             rows = draft(source, (), self.span)
@@ -59,7 +63,6 @@ class Asked:
         elif self.loops is None:
             specs = find_loops(source.tags)
         else:
-            stated = read_loops(self.loops, self.zone, self.reading.get("day_first"))
             specs, notes = match(stated, source.tags)
             own = unknown_columns(stated)
             if own:

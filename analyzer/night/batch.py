@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from analyzer.belief.nights import held_pairs
+from analyzer.columns import Row
 from analyzer.config import Config
 from analyzer.history.export import met_told
 from analyzer.history.files import ChangedError, ends_of, require_unchanged
@@ -27,7 +28,7 @@ from analyzer.loop.decisions import Status
 from analyzer.loops.tags import no_loops
 from analyzer.night import chunk
 from analyzer.night.chunk import Done, Task
-from analyzer.night.finish import finish_night, is_empty
+from analyzer.night.finish import TELLS_EMPTY, finish_night, is_empty
 from analyzer.night.nights import Night, Plant, nights_of
 from analyzer.night.workers import Died, Executor, executor
 from analyzer.places import afresh, is_passing, not_now
@@ -37,7 +38,7 @@ from analyzer.store.store import GO_ON, Store
 from analyzer.store.table import OF_A_NIGHT, DamagedError
 from identification.errors import InputError
 
-CHUNKS, FEWEST, MOST = 16, 4, 16
+CHUNKS, FEWEST, MOST = 16, 4, 32
 """Tasks of a run that is small, and loops per task: enough to carry its four small tables, few enough for a smooth
 progress bar and for workers that end together."""
 PACKAGES = ("identification", "tuning", "analyzer", "reports")
@@ -79,9 +80,13 @@ def _tasks(plant: Plant, store: Store, nights: Sequence[Night], known: set[str])
     return tasks
 
 
-def _results(tasks: Sequence[Task], jobs: int, config: Config, scheduler: str | None) -> Iterator[Done]:
-    """What the chunks give, on a cluster, on worker processes or, with no jobs, in this process, unprotected."""
+def _results(
+    tasks: Sequence[Task], jobs: int, config: Config, scheduler: str | None, watch: Callable[[int], None]
+) -> Iterator[Done]:
+    """What the chunks give, on a cluster, on worker processes or, with no jobs, in this process, unprotected; `watch`
+    is told now and then how many loops of the chunks in hand are done."""
     with executor(jobs, len(tasks), chunk.work, config.workers, scheduler) as workers:
+        workers.watch = watch
         for task in tasks:
             workers.submit(task)
         for result in workers.results():
@@ -213,12 +218,17 @@ def run(
         _require_one_clock(store, plant.zone, [night.name for night in nights] if replacing else [])
         said = [line for night in nights for line in store.set_aside_damaged(night.name)]
         keys, met = _begun(plant, store, nights, resume), Counter[str]()
-        whole = store.read_parts(nights[-1].name, "nights", keys)
+        whole = store.read_parts(nights[-1].name, "nights", keys, ["loop"])
         known = set() if whole is None else set(whole.column("loop").to_pylist())
         done, of = len(known), len(plant.specs)
         progress(done, of)
+
+        def watch(in_hand: int) -> None:
+            progress(done + in_hand, of)
+
         try:
-            for result in _results(_tasks(plant, store, nights, known), jobs, plant.config, scheduler):
+            tasks = _tasks(plant, store, nights, known)
+            for result in _results(tasks, jobs, plant.config, scheduler, watch):
                 _require_kept(store, nights[-1].name, result.key)
                 keys.append(result.key)
                 done += result.loops
@@ -255,9 +265,10 @@ def _finished(
 ) -> tuple[list[Night], list[str]]:
     """The nights put together, those without a sample left out unless they are all there is."""
     order = [s.loop for s in plant.specs]
-    for night in nights:
-        _require_all(store, night.name, keys, order)
-    full = [night for night in nights if not is_empty(store, night.name, keys)] or list(nights[-1:])
+    held = [_require_all(store, night.name, keys, order) for night in nights]
+    full = [night for night, rows in zip(nights, held, strict=True) if not is_empty(rows)] or list(
+        nights[-1:]
+    )
     said = []
     if len(full) < len(nights):
         said.append(f"{len(nights) - len(full)} nights without a good sample of any loop are left out")
@@ -268,13 +279,15 @@ def _finished(
     return full, said
 
 
-def _require_all(store: Store, night: str, keys: Sequence[str], order: Sequence[str]) -> None:
-    """Raise DamagedError where the pieces of a night do not hold every loop of the run."""
-    table = store.read_parts(night, "nights", keys)
-    missing = set(order) - set([] if table is None else table.column("loop").to_pylist())
+def _require_all(store: Store, night: str, keys: Sequence[str], order: Sequence[str]) -> list[Row]:
+    """What the pieces of a night hold of each loop of the run. Raises DamagedError where they lack one."""
+    table = store.read_parts(night, "nights", keys, ("loop", *TELLS_EMPTY))
+    rows = [] if table is None else table.to_pylist()
+    missing = set(order) - {r["loop"] for r in rows}
     if missing:
         seen = f"{store.path}: the pieces of night {night} hold {len(order) - len(missing)} of {len(order)} loops"
         raise DamagedError(seen, "all of them", GO_ON)
+    return rows
 
 
 def _require_in(store: Store, night: str, wanted: AbstractSet[str]) -> None:

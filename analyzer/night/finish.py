@@ -6,26 +6,40 @@ newer of two that are alike, so that the same night twice replaces and a good ni
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import dataclasses
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from functools import cached_property, lru_cache
+from itertools import chain
+from tempfile import TemporaryFile
 from typing import Any
 
 import pyarrow as pa
 
 from analyzer.belief.nights import settle
-from analyzer.columns import GROUPS, NIGHTS, Column, Row
+from analyzer.columns import GROUPS, NIGHTS, Column, Row, names
 from analyzer.config import Config, NightLimits
 from analyzer.lanes.lanes import in_lanes
-from analyzer.loop.decisions import Status
+from analyzer.loop.decisions import Finding, Status
+from analyzer.plantwide import cascade
+from analyzer.plantwide import night as plantwide
 from analyzer.plantwide.cascade import led_anew, linked
 from analyzer.plantwide.night import traced_night
 from analyzer.plantwide.structure import links_of, moves_in
 from analyzer.plantwide.wave import waves_in
-from analyzer.store.rows import finding_of, night_row
+from analyzer.store.rows import TYPED, finding_of, night_row
 from analyzer.store.store import Store
 from analyzer.store.table import KEPT, rows_of_loops, rows_table
 
 JOINED = tuple(t.name for t in KEPT if t.in_pieces and t.name != "nights")
 """Tables whose pieces are taken as they are; the table of nights and that of groups are made of theirs."""
+TELLS_EMPTY = ("status", "good_h")
+"""Columns that say whether there is anything to keep of a night."""
+PLANT_WIDE = (*TYPED, *plantwide.READ, *cascade.READ, "good_h")
+"""Columns of a loop that the plant-wide pass reads, and what records are compared by."""
+OF_ITS_OWN = tuple(name for name in names(NIGHTS) if name not in TYPED)
+"""Columns that a worker alone knows."""
+CHUNKS_AT_ONCE, LOOPS_AT_ONCE = 8, 256
+"""What is in memory at a time of tables that are put together."""
 WORTH = {Status.OK: 2, Status.NOT_ASSESSED: 1}
 """What a status is worth when two records of one loop meet; a failure is worth nothing."""
 
@@ -42,12 +56,8 @@ def _good_h(row: Row) -> float:
     return float(row.get("good_h") or 0.0)
 
 
-def is_empty(store: Store, night: str, keys: Sequence[str]) -> bool:
+def is_empty(rows: Sequence[Row]) -> bool:
     """Whether no loop of a night has a good sample, and none failed, so that there is nothing to keep."""
-    table = store.read_parts(night, "nights", keys)
-    if table is None:
-        return False
-    rows = table.select(["status", "good_h"]).to_pylist()
     return all(r["status"] == Status.NOT_ASSESSED and not r["good_h"] for r in rows)
 
 
@@ -60,51 +70,121 @@ def finish_night(
     forget what the store has of the night. Returns sentences on what was joined, and on loops whose earlier record
     was kept.
     """
-    table = store.read_parts(night, "nights", keys)
-    if table is None:
+    held = Pieces(store, night, keys)
+    fresh = {r["loop"]: finding_of(r) for t in held.tables("nights", PLANT_WIDE) for r in t.to_pylist()}
+    if not fresh:
         return ()
-    fresh = {r["loop"]: finding_of(r) for r in table.to_pylist()}
     other = [] if replace else _rows_held(store, "groups", night, GROUPS)
     gone = {r["group"] for r in other if r["loop"] in fresh}  # a group of any of these loops is told anew
     other = [r for r in other if r["group"] not in gone]
     first = 1 + max((int(r["group"]) for r in other), default=0)
-    waves = waves_in(store.read_parts(night, "waves", keys))
-    traced, found = traced_night(fresh, waves, config.plant, first)
-    links = links_of(moves_in(store.read_parts(night, "moves", keys)), config.plant)
+    with TemporaryFile() as lines:
+        waves = waves_in(held.tables("waves"), lines)
+        traced, found = traced_night(fresh, waves, config.plant, first)
+    links = links_of([m for t in held.tables("moves") for m in moves_in(t)], config.plant)
     loops = linked(traced, links, config.plant)
-    rows = {loop: night_row(in_lanes(found, config.lanes)) for loop, found in loops.items()}
-    old = {} if replace else {r["loop"]: r for r in _rows_held(store, "nights", night, NIGHTS)}
-    kept = {loop for loop, row in rows.items() if loop in old and fuller(old[loop], row, config.nights)}
-    beside = [loop for loop in old if loop not in rows]
-    joined = [old[k] if k in kept else rows[k] for k in order if k in rows] + [old[k] for k in beside]
-    mine = [loop for loop in rows if loop not in kept]
-    for name in JOINED:  # one at a time: trends are most of a night
-        before = None if replace else store.read_if_there(name, night)
-        store.write(name, night, _joined_table(before, store.read_parts(night, name, keys), mine))
+    old = {} if replace else _worth_held(store, night)
+    kept = {
+        loop for loop, own in loops.items() if loop in old and fuller(old[loop], _worth(own), config.nights)
+    }
+    beside = [loop for loop in old if loop not in loops]
+    mine = [loop for loop in loops if loop not in kept]
+    for name in JOINED:  # trends are most of a night
+        before = () if replace else store.parts_if_there(name, night)
+        store.write(name, night, _joined_tables(before, held.tables(name), mine))
     groups = [*other, *led_anew(found, loops)]
     store.write("groups", night, rows_table(groups, GROUPS) if groups else None)
-    store.write("nights", night, rows_table(joined, NIGHTS))
+    joined = [*(k for k in order if k in loops), *beside]
+    store.write("nights", night, _joined_rows(held, joined, {k: loops[k] for k in mine}, config))
     store.forget_explained(night, None if replace else mine)
     store.forget_compared()
-    return (*settle(store, night, config), *_joining_told(night, rows, old, kept, beside))
+    return (*settle(store, night, config), *_joining_told(night, loops, old, kept, beside))
 
 
-def _rows_held(store: Store, table: str, night: str, columns: Sequence[Column]) -> list[dict[str, Any]]:
-    """The rows that the store has of a night, none where it has no such table."""
-    held = store.read_if_there(table, night)
-    return [] if held is None else [{c.name: row.get(c.name) for c in columns} for row in held.to_pylist()]
+class Pieces:
+    """The pieces of a night, those of a few chunks in memory."""
+
+    def __init__(self, store: Store, night: str, keys: Sequence[str]) -> None:
+        self.store, self.night = store, night
+        in_order = sorted(keys, key=lambda key: key.partition("-")[2])
+        self._few = [in_order[k : k + CHUNKS_AT_ONCE] for k in range(0, len(keys), CHUNKS_AT_ONCE)]
+        self._rows_of = lru_cache(maxsize=CHUNKS_AT_ONCE)(self._rows)
+
+    def tables(self, table: str, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+        """One table in parts."""
+        found = (self.store.read_parts(self.night, table, few, columns) for few in self._few)
+        return (piece for piece in found if piece is not None)
+
+    @cached_property
+    def _place(self) -> dict[str, int]:
+        """Among which few chunks each loop is."""
+        names = enumerate(self.tables("nights", ["loop"]))
+        return {loop: k for k, table in names for loop in table.column(0).to_pylist()}
+
+    def _rows(self, few: int) -> dict[str, Row]:
+        table = self.store.read_parts(self.night, "nights", self._few[few], ("loop", *OF_ITS_OWN))
+        rows = [] if table is None else table.to_pylist()
+        return {r.pop("loop"): r for r in rows}
+
+    def known(self, loop: str) -> Row:
+        """Columns of a loop that no pass over the plant judges."""
+        return self._rows_of(self._place[loop])[loop]
 
 
-def _joined_table(before: pa.Table | None, piece: pa.Table | None, mine: Sequence[str]) -> pa.Table | None:
-    """Rows of a table of the store, those of some loops taken from a piece."""
-    tables = [] if before is None else [rows_of_loops(before, mine, others=True)]
-    tables += [] if piece is None else [rows_of_loops(piece, mine)]
-    tables = [t for t in tables if t.num_rows] or tables[:1]
-    return pa.concat_tables(tables, promote_options="default").unify_dictionaries() if tables else None
+def _joined_rows(
+    held: Pieces, order: Sequence[str], judged: Mapping[str, Finding], config: Config
+) -> Iterator[pa.Table]:
+    """The table of a night in parts: rows of loops as they are judged, of others as the store has them."""
+    for k in range(0, len(order), LOOPS_AT_ONCE):
+        part = order[k : k + LOOPS_AT_ONCE]
+        old = _rows_held(held.store, "nights", held.night, NIGHTS, set(part) - judged.keys())
+        rows = {r["loop"]: r for r in old}
+        for loop in judged.keys() & set(part):
+            whole = {**held.known(loop), **judged[loop].known}
+            rows[loop] = night_row(in_lanes(dataclasses.replace(judged[loop], known=whole), config.lanes))
+        yield rows_table([rows[loop] for loop in part], NIGHTS)
+
+
+def _worth(own: Finding) -> Row:
+    """What a finding is compared by with another record of its loop."""
+    return {"loop": own.loop, "status": own.status, "good_h": own.known.get("good_h")}
+
+
+def _worth_held(store: Store, night: str) -> dict[str, Row]:
+    """The same of the loops that the store has of a night."""
+    if not store.file("nights", night).exists():
+        return {}
+    return {r["loop"]: r for r in store.own_rows("nights", night, ("loop", "status", "good_h"))}
+
+
+def _rows_held(
+    store: Store, table: str, night: str, columns: Sequence[Column], loops: Collection[str] | None = None
+) -> list[dict[str, Any]]:
+    """The rows that the store has of some loops of a night, or of all; none where it has no such table."""
+    if loops == set() or not store.file(table, night).exists():
+        return []
+    return store.own_rows(table, night, names(columns), loops)
+
+
+def _joined_tables(
+    before: Iterable[pa.Table], pieces: Iterable[pa.Table], mine: Sequence[str]
+) -> Iterator[pa.Table]:
+    """Rows of a table of the store in parts, those of some loops taken from pieces; all of one schema."""
+    kept = chain(
+        (rows_of_loops(t, mine, others=True) for t in before), (rows_of_loops(t, mine) for t in pieces)
+    )
+    filled = (t.unify_dictionaries() for t in kept if t.num_rows)
+    first = next(filled, None)
+    if first is None:
+        return
+    second = next(filled, first.slice(0, 0))  # where the store's are of an earlier version
+    schema = pa.unify_schemas([first.schema, second.schema], promote_options="default")
+    for part in chain((first, second), filled):
+        yield pa.concat_tables([schema.empty_table(), part], promote_options="default").unify_dictionaries()
 
 
 def _joining_told(
-    night: str, rows: Mapping[str, Row], old: Mapping[str, Row], kept: set[str], beside: Sequence[str]
+    night: str, loops: Mapping[str, Finding], old: Mapping[str, Row], kept: set[str], beside: Sequence[str]
 ) -> tuple[str, ...]:
     """What is worth saying of a night that was there already."""
     said = []
@@ -113,6 +193,6 @@ def _joining_told(
     for loop in sorted(kept):
         said.append(
             f"{loop}: the store has {_good_h(old[loop]):.1f} good hours of night {night}, this export "
-            f"{_good_h(rows[loop]):.1f}; the fuller record is kept (--replace takes this one)"
+            f"{_good_h(loops[loop].known):.1f}; the fuller record is kept (--replace takes this one)"
         )
     return tuple(said)

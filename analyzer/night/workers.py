@@ -63,11 +63,13 @@ class Died(Generic[T]):
 
 class Executor(Generic[T, R]):
     """Who carries out one function on many tasks, for as long as it is entered: by itself this process, one after
-    the other, unprotected."""
+    the other, unprotected. `watch` is told now and then how many items of the tasks in hand are done, where that is
+    known."""
 
     def __init__(self, function: Callable[..., R]) -> None:
         self._function = function
         self._waiting: deque[T] = deque()
+        self.watch: Callable[[int], None] = lambda items: None
 
     def __enter__(self) -> Self:
         return self
@@ -160,6 +162,7 @@ class Workers(Executor[T, R]):
             elif time.monotonic() - worker.since_s > self.limits.wall_s:
                 worker.process.kill()
                 yield self._buried(worker, f"took longer than {self.limits.wall_s:g} s", again=False)
+        self.watch(sum(worker.at for worker in self._workers if worker.busy))
 
     def _heard(self, worker: _Worker) -> Iterator[R | Died[T]]:
         try:

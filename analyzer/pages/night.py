@@ -4,15 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from difflib import get_close_matches
 
 from analyzer.explain.night import known
 from analyzer.limits import PAGES
 from analyzer.pages import groups, loop, morning, work
 from analyzer.pages.loop_pictures import trend_block
-from analyzer.pages.reading import BESIDE, ShownNight, Thinned, by_loop, read_night, read_nights, read_trends
+from analyzer.pages.reading import (
+    BESIDE,
+    NIGHT_COLUMNS,
+    ShownNight,
+    Thinned,
+    by_loop,
+    read_night,
+    read_nights,
+    read_trends,
+)
 from analyzer.pages.words import ALL_LOOPS, pv_scale_of
 from analyzer.plantwide.view import GroupView, read_groups
+from analyzer.store.notes import read_notes
 from analyzer.store.store import Store
+from identification.errors import InputError
 from reports.page_file import loads
 from reports.pages import Beside, Page, Section
 from reports.texts import slug
@@ -46,6 +58,21 @@ def pages_of_night(store: Store, name: str | None = None, top: int = 200) -> Ite
     yield from _loop_pages(store, night, nights[-PAGES.history :], shared, {**trends, **night.trends})
 
 
+def pages_of_loop(store: Store, name: str | None, tag: str) -> Iterator[Page]:
+    """The pages of one loop of a night (the latest by default). Raises InputError where it has no such loop."""
+    night = name or store.require()
+    rows = tuple(read_nights(store, [night], NIGHT_COLUMNS, {tag}))
+    if not rows:
+        near = get_close_matches(tag, store.read("nights", night, ["loop"]).column(0).to_pylist(), 3)
+        seen = f"loop {tag} is not in the night {night}"
+        raise InputError(seen, f"one of its loops ({', '.join(near) or 'none is near'})", "correct --loop")
+    shown = ShownNight(night, rows, {}, "", (), notes=read_notes(store.path), paged=(tag,))
+    shared = [g for g in read_groups(store, night) if any(r["loop"] == tag for r in g.rows)]
+    members = {r["loop"] for g in shared for r in g.rows[: PAGES.group_loops]}
+    nights = [n for n in store.nights() if n <= night][-PAGES.history :]
+    yield from _loop_pages(store, shown, nights, shared, read_trends(store, members, [night]))
+
+
 def side_by_side(store: Store, night: ShownNight) -> Page:
     """The page on which the loops that have a page of their own are laid beside each other on one time axis."""
     trends = read_trends(store, night.paged, [night.name])
@@ -72,8 +99,9 @@ def _loop_pages(
     trends = read_trends(store, night.paged, nights[-loop.WEEK :])
     by_number = {g.number: g for g in shared}
     explained = {r["loop"]: r for r in known(store, night.name)}
-    table = store.read_if_there("compared", night.name)
-    compared = {} if table is None else {r["loop"]: r["settings_page"] for r in table.to_pylist()}
+    columns, there = ("loop", "settings_page"), store.file("compared", night.name).exists()
+    tried = store.own_rows("compared", night.name, columns, night.paged) if there else []
+    compared = {r["loop"]: r["settings_page"] for r in tried}
     for tag in night.paged:
         own = rows[tag]
         found = explained.get(tag)

@@ -72,9 +72,10 @@ def ranked(
         Where there is no such store, night, column or area.
     """
     if column is not None and column not in SORTABLE:
-        near = get_close_matches(column, SORTABLE, 3)
-        expected = "one such as " + " or ".join(near) if near else "one of " + ", ".join(SORTABLE)
-        raise InputError(f"column {column!r}", expected, "correct --by")
+        in_words = (c for c in SORTABLE if get_close_matches(column, c.split("_"), 1, 0.75))
+        near = get_close_matches(column, SORTABLE, 3) or [*in_words][:3] or [SIGNIFICANCE, "period_s"]
+        remedy = "correct --by; 'triage rank --format csv' heads its columns with all names"
+        raise InputError(f"column {column!r}", "one such as " + " or ".join(near), remedy)
     name = night or store.require()
     known = notes.read_notes(store.path)
     rows = [
@@ -175,11 +176,20 @@ def as_table(
         for n in kept
     ]
     head, body = table(headings, [[cells[name] for name in kept] for cells in shown], width)
-    rule = " " + "\u2500" * (max(map(len, (head, *(line for lines in body for line in lines)))) - 1)
+    rule = " " + _line() * (max(map(len, (head, *(line for lines in body for line in lines)))) - 1)
     if interactive() and not os.environ.get("NO_COLOR"):
         for row, lines in zip(rows, body, strict=True):
             lines[0] = _coloured(lines[0], row["loop"], row["cause"])
     return "\n".join([f"Night {night}", "", head, rule, *(line for lines in body for line in lines)])
+
+
+def _line() -> str:
+    """What a line is drawn with, by what the output can show."""
+    try:
+        "\u2500".encode(getattr(sys.stdout, "encoding", None) or "utf-8")
+    except UnicodeEncodeError:
+        return "-"
+    return "\u2500"
 
 
 def _coloured(line: str, loop: str, cause: str | None) -> str:
@@ -234,4 +244,4 @@ def _setting_text(now: float | None, new: float | None, unit: str, off: str = "0
 
 def interactive() -> bool:
     """Whether the output is read on a terminal."""
-    return sys.stdout.isatty()
+    return sys.stdout is not None and sys.stdout.isatty()

@@ -107,7 +107,7 @@ def _figures(
 ) -> dict[str, dict[str, Floats]]:
     """Columns of numbers by loop, in the order of the nights that have the table, NaN where not known."""
     paths = [store.file(table, night) for night in nights] if loops else []
-    tables = [_read_loops(p, columns, sorted(loops)) for p in paths if p.exists()]
+    tables = [_read_loops(p, columns, loops) for p in paths if p.exists()]
     if not tables:
         return {}
     names = dict.fromkeys(n for t in tables for n in t.column_names if n not in ("loop", "night"))
@@ -119,11 +119,11 @@ def _figures(
     return {str(tag): {n: x[tags == tag] for n, x in held.items()} for tag in dict.fromkeys(tags)}
 
 
-def _read_loops(path: Path, columns: Sequence[str] | None, loops: Sequence[str]) -> pa.Table:
+def _read_loops(path: Path, columns: Sequence[str] | None, loops: Collection[str]) -> pa.Table:
     """The rows of some loops in a table, with those of some columns that it has."""
     held = None if columns is None else set(stored_names(path))
     wanted = None if held is None else [c for c in columns or () if c in held]
-    return read_stored(path, wanted, [("loop", "in", loops)])
+    return read_stored(path, wanted, loops)
 
 
 def read_hours(store: Store, loops: Collection[str], nights: Sequence[str]) -> dict[str, dict[str, Floats]]:

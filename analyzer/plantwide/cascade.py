@@ -28,6 +28,8 @@ from analyzer.words.reason import below_first
 
 COLUMN = {Tie.MASTER: "master", Tie.SPLIT: "split_of", Tie.RATIO: "ratio_of"}
 """The column that names the loop that another one hangs on."""
+READ = (*COLUMN.values(), "half_slope", "split_slope")
+"""Columns that are read here of a loop, beside those that a Finding has as values of their own."""
 OWN = (Cause.VALVE, Cause.TUNING)
 """Causes that are a loop's own."""
 HARMONICS = (1, 2, 3)

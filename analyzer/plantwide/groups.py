@@ -106,7 +106,7 @@ class _Neighbours:
         over = found / np.maximum(self._by_chance(one, near), 1e-9)
         kept = over >= limits.over_chance
         near, found, over = near[kept], found[kept], over[kept]
-        drifts = np.array([self._drift(wave, self.waves[j]) for j in near])
+        drifts = self._drifts(wave, [self.waves[j] for j in near])
         sure = (found >= strict) & (drifts <= limits.drift)
         sure |= (over >= limits.over_chance_in_step) & (drifts <= limits.drift_in_step)
         return zip(near[sure].tolist(), found[sure].tolist(), strict=True)
@@ -126,11 +126,13 @@ class _Neighbours:
         return np.asarray(np.max(found, axis=0))
 
     @staticmethod
-    def _drift(one: Wave, other: Wave) -> float:
-        """Turns over the record by which the phases of two waves drift apart, about the first one's period."""
+    def _drifts(one: Wave, others: Sequence[Wave]) -> Floats:
+        """Turns over the record by which the phases of others and of one drift apart, about that one's period."""
+        if not others:
+            return np.zeros(0)
         low, high, _ = band(one.line)
-        x, y = (w.lines[low - w.first : high - w.first] for w in (one, other))
-        return abs(drift(x, y))
+        x, *y = (w.lines[low - w.first : high - w.first] for w in (one, *others))
+        return np.abs(drift(x, np.array(y)))
 
 
 def groups_of(waves: Sequence[Wave], limits: PlantLimits) -> list[Group]:

@@ -31,6 +31,8 @@ from analyzer.plantwide.groups import Group, groups_of
 from analyzer.plantwide.source import Candidate, Lags, candidates_of
 from analyzer.plantwide.wave import Wave
 
+READ = ("usable_h", "evidence", "average_absolute_error_pct")
+"""Columns that are read here of a loop, beside those that a Finding has as values of their own."""
 Loops = Mapping[str, Finding]
 """The loops of a night by name."""
 

@@ -136,9 +136,9 @@ def _lag(one: Wave, other: Wave) -> Delay:
     return lag(x, y, one.duration_s, max(WAVES.lag_periods * one.period_s, WAVES.lag_least_s))
 
 
-def _foreseeing(waves: Sequence[Wave]) -> tuple[list[int], Floats]:
-    """Which of some waves have trends whose steps lie on each other, and Granger's F of each on each, shape (k, k);
-    none where fewer than two have, or over too few steps."""
+def _foreseeing(waves: Sequence[Wave], asked: int | None = None) -> tuple[list[int], Floats]:
+    """Which of some waves have trends whose steps lie on each other, and Granger's F of each on each, or of the pairs
+    of the one that is asked for, shape (k, k); none where fewer than two have, or over too few steps."""
     step = max((w.step_s for w in waves if w.trend.size), default=0.0)
     found: list[tuple[int, int, Floats]] = []
     for i, w in enumerate(waves):
@@ -151,7 +151,7 @@ def _foreseeing(waves: Sequence[Wave]) -> tuple[list[int], Floats]:
     if len(found) < 2 or end - begin < WAVES.least_steps:
         return [], np.zeros((0, 0))
     trends = np.array([x[begin - first : end - first] for _, first, x in found], float)
-    return [i for i, *_ in found], granger_f(trends, WAVES.foreseen)
+    return [i for i, *_ in found], granger_f(trends, WAVES.foreseen, asked)
 
 
 def foresees(waves: Sequence[Wave]) -> Floats:
@@ -168,7 +168,7 @@ def foresees(waves: Sequence[Wave]) -> Floats:
 
 def foresight(one: Wave, others: Sequence[Wave]) -> float:
     """F with which one wave's past foresees others, in the median; 0 where theirs foresees it as well or better."""
-    known, f = _foreseeing([one, *others])
+    known, f = _foreseeing([one, *others], 0)
     if known[:1] != [0]:
         return 0.0
     forth, back = float(np.median(f[0, 1:])), float(np.median(f[1:, 0]))

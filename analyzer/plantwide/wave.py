@@ -4,9 +4,11 @@ how those of many loops come onto one clock."""
 from __future__ import annotations
 
 import math
+import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
+from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
@@ -173,13 +175,36 @@ def waves_table(waves: Sequence[Wave]) -> pa.Table:
     return pa.table({**columns, "real": real, "imag": imag, "trend": trend})
 
 
-def waves_in(table: pa.Table | None) -> list[Wave]:
-    """The waves of a table, none without one."""
-    if table is None or not table.num_rows:
-        return []
-    known = table.select(SCALARS).to_pylist()
-    real, imag, trend = (table.column(name).to_numpy() for name in ("real", "imag", "trend"))
-    return [Wave(**s, lines=x + 1j * y, trend=t) for s, x, y, t in zip(known, real, imag, trend, strict=True)]
+class Laid:
+    """An array that lies in a file, read where it is asked for."""
+
+    __slots__ = ("_at", "_file", "_kind", "size")
+
+    def __init__(self, x: np.ndarray, file: BinaryIO) -> None:
+        self._file, self._at, self._kind, self.size = file, file.seek(0, os.SEEK_END), x.dtype, x.size
+        file.write(np.ascontiguousarray(x).data)
+
+    def __getitem__(self, part: slice) -> np.ndarray:
+        first, last, _ = part.indices(self.size)
+        wide = self._kind.itemsize
+        self._file.seek(self._at + first * wide)
+        return np.frombuffer(self._file.read(max(last - first, 0) * wide), self._kind)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return self[:] if dtype is None else self[:].astype(dtype)
+
+
+def waves_in(tables: Iterable[pa.Table], file: BinaryIO | None = None) -> list[Wave]:
+    """The waves of some tables; with a file their lines and trends lie in it, for a large plant has many."""
+    found = []
+    for table in tables:
+        known = table.select(SCALARS).to_pylist()
+        real, imag, trend = (table.column(name).to_numpy() for name in ("real", "imag", "trend"))
+        for scalars, x, y, t in zip(known, real, imag, trend, strict=True):
+            held: list[Any] = [x + 1j * y, t]
+            laid: list[Any] = held if file is None else [Laid(part, file) for part in held]
+            found.append(Wave(**scalars, lines=laid[0], trend=laid[1]))
+    return found
 
 
 def on_one_clock(waves: Sequence[Wave]) -> list[Wave]:

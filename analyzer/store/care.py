@@ -11,7 +11,7 @@ from pathlib import Path
 from analyzer.limits import STORE
 from analyzer.store import notes
 from analyzer.store.store import MAKE_ONE, SCHEMA, Store, is_night
-from analyzer.store.table import KEPT, DamagedError, read_stored
+from analyzer.store.table import KEPT, DamagedError, stored_parts
 from identification.errors import InputError, NotNowError
 from reports.whole_file import SUFFIX
 
@@ -74,7 +74,8 @@ def _wrong(path: Path, whole: set[str]) -> Problem | None:
     if path.suffix != ".parquet" or not is_night(path.stem):
         return Problem(f"{path}: not the name of a table of a night", "move it away")
     try:
-        read_stored(path)
+        for _ in stored_parts(path):
+            pass
     except DamagedError as error:
         return Problem(error.seen, AGAIN)
     except NotNowError as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -35,12 +35,11 @@ class Draft(Store):
         names = {p.stem for p in super().files(table)} | {n for t, n in self._made if t == table}
         return [self.file(table, n) for n in sorted(names) if self._made.get((table, n), True)]
 
-    def write(self, table: str, night: str, rows: pa.Table | None) -> None:
-        if rows is None:
+    def write(self, table: str, night: str, rows: pa.Table | Iterable[pa.Table] | None) -> None:
+        made = rows is not None and write_table(rows, self._beside(table, night))
+        if not made:
             self._beside(table, night).unlink(missing_ok=True)
-        else:
-            write_table(rows, self._beside(table, night))
-        self._made[table, night] = rows is not None
+        self._made[table, night] = made
 
     def keep(self) -> None:
         """Put all that was written in its place, the tables of nights last: a reader meets whole nights."""

@@ -16,7 +16,7 @@ from __future__ import annotations
 import contextlib
 import json
 import secrets
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import nullcontext
 from datetime import date
 from functools import partial
@@ -34,6 +34,7 @@ from analyzer.store.table import (
     rows_of_loops,
     rows_table,
     stored_names,
+    stored_parts,
     tables_beside,
     write_table,
 )
@@ -165,8 +166,7 @@ class Store:
     ) -> list[dict[str, Any]]:
         """The same as the night by itself has them."""
         names = set(self.columns(table, night))
-        where = None if loops is None else [("loop", "in", sorted(loops))]
-        found = read_stored(self.file(table, night), [c for c in columns if c in names], where)
+        found = read_stored(self.file(table, night), [c for c in columns if c in names], loops)
         return [{**dict.fromkeys(columns), **row} for row in found.to_pylist()]
 
     def read_if_there(self, table: str, night: str, columns: Sequence[str] | None = None) -> pa.Table | None:
@@ -176,12 +176,15 @@ class Store:
         except FileNotFoundError:
             return None
 
-    def write(self, table: str, night: str, rows: pa.Table | None) -> None:
-        """Keep one night of one table; where there are no rows, keep none."""
-        if rows is None:
+    def parts_if_there(self, table: str, night: str) -> Iterator[pa.Table]:
+        """One night of one table in parts, none where the store has none."""
+        with contextlib.suppress(FileNotFoundError):
+            yield from stored_parts(self.file(table, night))
+
+    def write(self, table: str, night: str, rows: pa.Table | Iterable[pa.Table] | None) -> None:
+        """Keep one night of one table, whole or in parts as they come; where there are no rows, keep none."""
+        if rows is None or not write_table(rows, self.file(table, night)):
             self.file(table, night).unlink(missing_ok=True)
-        else:
-            write_table(rows, self.file(table, night))
 
     def set_aside_damaged(self, night: str) -> list[str]:
         """Rename the damaged tables of a night, so that it can be written anew; sentences on them. Raises NotNowError
@@ -189,7 +192,8 @@ class Store:
         said = []
         for table in KEPT:
             try:
-                self.read_if_there(table.name, night)
+                for _ in self.parts_if_there(table.name, night):
+                    pass
             except DamagedError as error:
                 path = self.file(table.name, night)
                 aside = path.with_name(f"{path.name}.{secrets.token_hex(4)}.damaged")
@@ -229,19 +233,22 @@ class Store:
         """Nights that were begun and not finished."""
         return sorted(p.name for p in (self.path / "parts").glob("*") if p.is_dir() and is_night(p.name))
 
-    def read_parts(self, night: str, table: str, keys: Sequence[str]) -> pa.Table | None:
-        """The pieces of one table of a night that some chunks have written, None where there are none. Raises
-        DamagedError where one of them is gone."""
+    def read_parts(
+        self, night: str, table: str, keys: Sequence[str], columns: Sequence[str] | None = None
+    ) -> pa.Table | None:
+        """The pieces of one table of a night that some chunks have written, or some of its columns; None where there
+        are none. Raises DamagedError where one of them is gone."""
         paths = [self.part(night, table, key) for key in keys]
-        found = [
-            piece for piece in each(partial(self._piece, night, table), paths, keys) if piece is not None
-        ]
+        read = partial(self._piece, night, table, columns)
+        found = [piece for piece in each(read, paths, keys) if piece is not None]
         return pa.concat_tables(found) if found else None
 
-    def _piece(self, night: str, table: str, path: Path, key: str) -> pa.Table | None:
+    def _piece(
+        self, night: str, table: str, columns: Sequence[str] | None, path: Path, key: str
+    ) -> pa.Table | None:
         """One piece of one table, None where the chunk has written none."""
         try:
-            return read_stored(path)
+            return read_stored(path, columns)
         except FileNotFoundError:
             self._require_unwritten(night, table, key)
             return None

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any, cast
 
@@ -61,6 +62,8 @@ PARSED = frozenset(c.name for c in WITH_JSON if c.kind is Kind.JSON)
 """Columns that hold JSON; pages that are kept whole are not among them: those of another version are passed over."""
 WORDS: Mapping[str, Sequence[str]] = {"action": tuple(Action), "ti_unit": (*SECONDS, "repeats/min")}
 """Columns that hold one of a few words."""
+ROWS_AT_ONCE = 65_536
+"""Rows of a table that are read at a time where it is read in parts."""
 WRITTEN = "a table that 'triage run' wrote"
 REMEDY = (
     "'triage store check' names all such: restore them from a backup, or delete them and run the night anew"
@@ -78,24 +81,36 @@ def rows_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]) -> 
     return pa.Table.from_pylist([row_of(row, columns) for row in rows], schema=schema)
 
 
-def rows_of_loops(table: pa.Table, loops: Sequence[str], others: bool = False) -> pa.Table:
+def rows_of_loops(table: pa.Table, loops: Collection[str], others: bool = False) -> pa.Table:
     """Its rows of some loops, or of all others."""
     import pyarrow.compute as pc
 
     held = pc.cast(table.column("loop"), pa.string())
-    wanted = pc.is_in(held, value_set=pa.array(loops, pa.string()))
+    wanted = pc.is_in(held, value_set=pa.array(list(loops), pa.string()))
     return table.filter(pc.invert(wanted) if others else wanted)
 
 
-def write_table(table: pa.Table, path: Path) -> None:
-    """Write a table so that a reader sees all of it or nothing."""
+def write_table(rows: pa.Table | Iterable[pa.Table], path: Path) -> bool:
+    """Write a table, or parts of one below each other as they come, so that a reader sees all of it or nothing;
+    whether there was anything to write."""
+    parts = iter((rows,) if isinstance(rows, pa.Table) else rows)
+    first = next(parts, None)
+    if first is None:
+        return False
     if is_remote(path):  # from memory: nothing is left on this machine, however the process ends
         remote, sink = cast(Any, path), pa.BufferOutputStream()
-        pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
+        _write_parts(chain((first,), parts), first.schema, sink)
         remote.fs.pipe_file(remote.path, sink.getvalue().to_pybytes())
-        return
+        return True
     with whole_file(path, kept=True) as temporary:
-        pq.write_table(table, temporary, compression="zstd", write_page_checksum=True)
+        _write_parts(chain((first,), parts), first.schema, temporary)
+    return True
+
+
+def _write_parts(parts: Iterable[pa.Table], schema: pa.Schema, sink: Any) -> None:
+    with pq.ParquetWriter(sink, schema, compression="zstd", write_page_checksum=True) as file:
+        for part in parts:
+            file.write_table(part)
 
 
 BESIDE = b"beside"
@@ -115,21 +130,48 @@ def tables_beside(path: Path) -> list[str]:
 
 
 def read_stored(
-    path: Path, columns: Sequence[str] | None = None, filters: list[tuple[str, str, Any]] | None = None
+    path: Path, columns: Sequence[str] | None = None, loops: Collection[str] | None = None
 ) -> pa.Table:
-    """A table of the store, or some of its columns and rows. Raises FileNotFoundError where there is none;
-    DamagedError where Parquet finds the file damaged, or it holds other columns than results have; NotNowError where
-    it cannot be read at this time."""
+    """A table of the store, or some of its columns, of some loops or of all. Raises FileNotFoundError where there is
+    none; DamagedError where Parquet finds the file damaged, or it holds other columns than results have; NotNowError
+    where it cannot be read at this time."""
     wanted = list(columns) if columns else None
-    with _for_parquet(path) as held:
-        if filters is not None:
-            table = pq.read_table(held, columns=wanted, filters=filters, page_checksum_verification=True)
-        else:  # read_table would import pandas, which takes longer than the rest
-            with pq.ParquetFile(held, page_checksum_verification=True) as file:
-                table = file.read(columns=wanted)
+    with _for_parquet(path) as held, pq.ParquetFile(held, page_checksum_verification=True) as file:
+        table = file.read(columns=wanted) if loops is None else _of_loops(file, wanted, loops)
+    _require_right(path, table, wanted)
+    return table
+
+
+def stored_parts(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+    """The same in parts of so many rows that memory holds few; errors as of `read_stored`."""
+    wanted = list(columns) if columns else None
+    with _for_parquet(path) as held, pq.ParquetFile(held, page_checksum_verification=True) as file:
+        for group in range(file.num_row_groups):
+            for batch in file.iter_batches(ROWS_AT_ONCE, row_groups=[group], columns=wanted):
+                table = pa.Table.from_batches([batch])
+                _require_right(path, table, wanted)
+                yield table
+
+
+def _of_loops(file: pq.ParquetFile, columns: list[str] | None, loops: Collection[str]) -> pa.Table:
+    """Rows of some loops; parts of the file whose loops lie before or behind all of these are not read."""
+    names = file.schema_arrow.names
+    if "loop" not in names:
+        return file.read(columns=columns)  # which is refused
+    asked = [name for name in names if columns is None or name in columns]
+    at, found = names.index("loop"), [file.schema_arrow.empty_table()]
+    first, last = min(loops, default=""), max(loops, default="")
+    for group in range(file.num_row_groups):
+        ends = file.metadata.row_group(group).column(at).statistics
+        known = ends is not None and ends.has_min_max and isinstance(ends.min, str)
+        if not known or (ends.min <= last and ends.max >= first):
+            found.append(rows_of_loops(file.read_row_group(group, columns=[*asked, "loop"]), loops))
+    return pa.concat_tables([t.select(asked) for t in found]).unify_dictionaries()
+
+
+def _require_right(path: Path, table: pa.Table, wanted: list[str] | None) -> None:
     _require_declared(path, table.schema, wanted)
     _require_meant(path, table)
-    return table
 
 
 def stored_names(path: Path) -> list[str]:

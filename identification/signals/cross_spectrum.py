@@ -13,6 +13,7 @@ from functools import cache
 
 import numpy as np
 from numba import njit
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.fft import ifft, next_fast_len
 from scipy.special import betainccinv
@@ -106,19 +107,19 @@ def coherences(
     return out
 
 
-def drift(x: Complex, y: Complex) -> float:
-    """Turns over the record by which the phases of two signals drift apart, of either sign, at most three.
+def drift(x: Complex, y: Complex) -> Floats:
+    """Turns over the record by which the phases of a signal and of others drift apart, of either sign, at most three.
 
     Two signals of one source keep step: their phases differ by no more at the end than at the beginning. Of two
     others a Fourier line apart the difference turns once over the record.
 
-    x, y : complex, shape (m,), lines of the same numbers, not tapered.
+    x, y : complex, shapes (m,) and (k, m), lines of the same numbers, not tapered. Returns shape (k,).
     """
     size = next_fast_len(max(4 * x.size, 4 * DRIFT_BLOCKS))
-    product = ifft(x, size) * np.conj(ifft(y, size))
+    product = ifft(x, size) * np.conj(ifft(y, size, axis=1))
     edges = np.arange(DRIFT_BLOCKS) * size // DRIFT_BLOCKS
-    blocks = np.add.reduceat(product, edges)
-    return float(DRIFTS[int(np.argmax(np.abs(TURNS @ blocks)))])
+    turned = np.add.reduceat(product, edges, axis=1) @ TURNS.T
+    return np.asarray(DRIFTS[np.argmax(np.abs(turned), axis=1)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,38 +166,42 @@ RIDGE = 1e-9
 """Share of a column's power that is added to it: rounded trends have pasts that depend on each other."""
 
 
-def granger_f(signals: Floats, lags: int) -> Floats:
+def granger_f(signals: Floats, lags: int, asked: int | None = None) -> Floats:
     """F statistics of every signal's past in foreseeing every other beside that one's own past.
 
-    signals : shape (k, n), samples of one clock; lags : samples of the past that are used. Returns shape (k, k), F[i,
-    j]: signal i foresees signal j; 0 on the diagonal, and everywhere where n is under four times the constants of a
-    model.
+    signals : shape (k, n), samples of one clock; lags : samples of the past that are used; asked : the one signal
+    whose pairs are wanted, None for all pairs. Returns shape (k, k), F[i, j]: signal i foresees signal j; 0 on the
+    diagonal, for pairs that are not wanted, and everywhere where n is under four times the constants of a model.
     """
     k, n = signals.shape
     rows = n - lags
     out = np.zeros((k, k))
     if rows < 4 * (2 * lags + 1):
         return out
-    past = np.stack([signals[:, lags - 1 - i : n - 1 - i] for i in range(lags)], axis=1).reshape(
-        k * lags, rows
-    )
-    now = signals[:, lags:]
-    past = past - past.mean(axis=1, keepdims=True)
-    now = now - now.mean(axis=1, keepdims=True)
-    gram, cross = past @ past.T, past @ now.T
-    gram[np.diag_indices_from(gram)] *= 1.0 + RIDGE
-    gram[np.diag_indices_from(gram)] += 1e-300
-    power = np.einsum("ij,ij->i", now, now)
-
-    def left(j: int, columns: Whole) -> float:
-        own = cross[columns, j]
-        return float(power[j] - own @ np.linalg.solve(gram[np.ix_(columns, columns)], own))
-
-    each = [np.arange(i * lags, (i + 1) * lags) for i in range(k)]
-    for j in range(k):
-        alone = left(j, each[j])
-        for i in range(k):
-            both = left(j, np.concatenate((each[j], each[i]))) if i != j else alone
-            if i != j and both > 1e-12 * power[j]:
-                out[i, j] = max(alone - both, 0.0) / lags / (both / (rows - 2 * lags - 1))
+    past = np.ascontiguousarray(sliding_window_view(signals[:, :-1], rows, axis=1)[:, ::-1])
+    past -= past.mean(axis=2, keepdims=True)
+    now = signals[:, lags:] - signals[:, lags:].mean(axis=1, keepdims=True)
+    of, by = np.array([(j, i) for j in range(k) for i in range(k) if i != j and asked in (None, i, j)]).T
+    flat, wanted = past.reshape(k * lags, rows), slice(None) if asked is None else slice(asked, asked + 1)
+    shared = (past[wanted].reshape(-1, rows) @ flat.T).reshape(-1, lags, k, lags).transpose(0, 2, 1, 3)
+    cross = (flat @ now.T).reshape(k, lags, k).transpose(2, 0, 1)
+    own = past @ past.transpose(0, 2, 1)
+    own[:, range(lags), range(lags)] *= 1.0 + RIDGE
+    own[:, range(lags), range(lags)] += 1e-300
+    power = np.einsum("jn,jn->j", now, now)
+    alone = power - _explained(own, cross[range(k), range(k)])
+    if asked is None:
+        beside = shared[of, by]
+    else:
+        beside = np.where((of == asked)[:, None, None], shared[0, by], shared[0, of].transpose(0, 2, 1))
+    gram = np.block([[own[of], beside], [beside.transpose(0, 2, 1), own[by]]])
+    both = power[of] - _explained(gram, np.concatenate((cross[of, of], cross[of, by]), axis=1))
+    left = both > 1e-12 * power[of]
+    of, by, both = of[left], by[left], both[left]
+    out[by, of] = np.maximum(alone[of] - both, 0.0) / lags / (both / (rows - 2 * lags - 1))
     return out
+
+
+def _explained(gram: Floats, cross: Floats) -> Floats:
+    """Power that each of some sets of columns explains, by its normal equations, shape (s,)."""
+    return np.asarray(np.einsum("sc,sc->s", cross, np.linalg.solve(gram, cross[..., None])[..., 0]))

@@ -13,12 +13,14 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 
+from analyzer.belief import nights as believed
 from analyzer.cli import main
 from analyzer.columns import NIGHTS, names
+from analyzer.commands import options
 from analyzer.history.export import Export, open_export
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import find_loops
-from analyzer.night import batch, chunk
+from analyzer.night import batch, chunk, finish
 from analyzer.night.nights import Plant
 from analyzer.store.store import Store
 from identification.errors import InputError
@@ -208,6 +210,26 @@ def test_two_processes_give_what_one_gives(night, whole, tmp_path):
     assert tables(store) == tables(whole)
 
 
+def test_a_night_put_together_in_small_parts_is_the_same(night, whole, tmp_path, monkeypatch):
+    """Tables that are read and written three loops at a time have the rows of tables in one part, and of some loops
+    the same are read."""
+    monkeypatch.setattr(finish, "CHUNKS_AT_ONCE", 1)
+    monkeypatch.setattr(finish, "LOOPS_AT_ONCE", 3)
+    monkeypatch.setattr(believed, "LOOPS_AT_ONCE", 7)
+    export, specs = opened(night)
+    store = Store(tmp_path / "store")
+    batch.run(Plant(export, specs, CONFIG), store)
+    assert tables(store.path) == tables(whole)
+    assert pq.ParquetFile(store.file("nights", store.nights()[-1])).num_row_groups > 10
+    for table in ("nights", "hours", "trends", "beliefs"):
+        some = [store.read(table, store.nights()[-1]).to_pylist() for store in (store, Store(whole))]
+        wanted = {"L03", "L08", "L39"}
+        kept = [r for r in some[1] if r["loop"] in wanted]
+        names = list(kept[0])
+        assert store.own_rows(table, store.nights()[-1], names, wanted) == kept
+        assert store.own_rows(table, store.nights()[-1], names, []) == []
+
+
 def test_progress_counts_all_loops(night, tmp_path):
     """Progress runs from nothing to all loops."""
     export, specs = opened(night)
@@ -218,6 +240,32 @@ def test_progress_counts_all_loops(night, tmp_path):
         progress=lambda d, t: said.append((d, t)),
     )
     assert said == [(k, 20) for k in range(0, 21, 4)]
+
+
+def test_progress_counts_loops_of_chunks_in_hand(night, tmp_path):
+    """With worker processes progress never falls, ends with all loops, and tells of loops within a chunk."""
+    export, specs = opened(night)
+    said = []
+    plant = Plant(export, specs, CONFIG)
+    batch.run(plant, Store(tmp_path / "s"), 1, progress=lambda done, of: said.append((done, of)))
+    counts = [done for done, _ in said]
+    assert counts == sorted(counts)
+    assert said[0] == (0, LOOPS)
+    assert said[-1] == (LOOPS, LOOPS)
+    assert any(done % batch.chunk_size(LOOPS) for done in counts)
+
+
+def test_a_run_says_at_once_that_it_has_begun_and_what_takes_long(capsys, monkeypatch):
+    """A list of tenths begins with none, and says once that a first run compiles where nothing is done for long."""
+    told = options._tenths("loops")
+    told(0, 40)
+    monkeypatch.setattr(options, "COMPILING_S", -1.0)
+    for done in (0, 0, 3, 4, 4, 40):
+        told(done, 40)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "loops: 0 of 40"
+    assert "compiles" in lines[1]
+    assert lines[2:] == ["loops: 4 of 40", "loops: 40 of 40"]
 
 
 @pytest.mark.slow

@@ -167,17 +167,17 @@ def test_damaged_beliefs_of_the_night_before_are_made_anew(tmp_path: Path) -> No
 
 
 def test_beliefs_of_a_night_cost_little(tmp_path: Path) -> None:
-    """A night reads the beliefs of the night before and no older night, however many there are."""
+    """A night reads itself, the beliefs of the night before and no older night, however many there are."""
     rows = ten_nights()
     store = store_of(tmp_path / "s", rows[:9])
-    asked: list[str] = []
+    asked: list[tuple[str, str]] = []
     own = Store.own_rows
 
     def counted(self: Store, table: str, night: str, *more: Any) -> list[dict[str, Any]]:
-        asked.append(night)
+        asked.append((table, night))
         return own(self, table, night, *more)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Store, "own_rows", counted)
         keep(store, rows[9])
-    assert asked == ["2026-03-11"]
+    assert asked == [("beliefs", "2026-03-10"), ("nights", "2026-03-11")]

@@ -190,7 +190,7 @@ def test_harmonics_of_one_source_are_one_group():
 def test_waves_survive_the_store():
     """Waves written as a table and read back are the same to the last bit of their lines."""
     waves = [*loop("A", wave(12)), *loop("B", wave(13, period=70.0), seed=2)]
-    back = waves_in(waves_table(waves))
+    back = waves_in([waves_table(waves)])
     assert [(w.loop, w.period_s, w.own) for w in back] == [(w.loop, w.period_s, w.own) for w in waves]
     for old, new in zip(waves, back, strict=True):
         np.testing.assert_array_equal(old.lines, new.lines)
