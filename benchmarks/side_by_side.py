@@ -22,7 +22,8 @@ from importlib.util import find_spec
 import numpy as np
 
 from analyzer.config import Config
-from analyzer.loop.measure import measure, time_scale, window_of
+from analyzer.loop.fit_window import window_of
+from analyzer.loop.measure import measure, time_scale
 from identification.estimation.backlash_stiction import fit_linear
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.record import Floats, LoopRecord

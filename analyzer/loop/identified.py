@@ -176,6 +176,8 @@ def intervals(fit: Fit, valve: bool, limits: AdviceLimits) -> dict[str, Estimate
     out["dead_time_s"] = _around(dead_s, late, "s", least=0.0)
     if valve and window.decoded:
         spread[2] = INTERVALS.decoded * fit.valve.stickband
+    if valve and window.steps > 1:  # what OP did between the rows is drawn, not known
+        spread[2] = math.hypot(spread[2], INTERVALS.between * fit.valve.stickband)
     if valve:
         name = "backlash_pct" if fit.valve.slip_jump == 0 else "stickband_pct"
         out[name] = _around(fit.valve.stickband, half_width(spread[2]), "% of OP", least=0.0)

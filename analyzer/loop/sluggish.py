@@ -15,8 +15,9 @@ from scipy.signal import detrend
 
 from analyzer.config import Config
 from analyzer.lanes.standing import AVERAGING
+from analyzer.loop.fit_window import window_of
 from analyzer.loop.identified import intervals, load_of, tuned
-from analyzer.loop.measure import time_scale, window_of
+from analyzer.loop.measure import time_scale
 from analyzer.loop.ringing import between_samples
 from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import fit_linear

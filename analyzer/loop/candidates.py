@@ -1,0 +1,135 @@
+"""The rivals that explain one window: a process behind an ideal valve, behind play, and behind stick-slip."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+from analyzer.config import CauseLimits
+from identification.errors import NotAssessedError
+from identification.estimation.backlash_stiction import better_linear, fit_linear, fit_play, fit_stick_slip
+from identification.estimation.between_samples import Scans, settled, with_scans
+from identification.estimation.evidence import evidence, with_load_step
+from identification.estimation.gauss_newton import descend
+from identification.estimation.noise import judged
+from identification.estimation.stem_position import Seen, seen
+from identification.estimation.window import Fit, Window
+from identification.limits import FIT
+from identification.record import Mask
+
+Candidates = tuple[Fit, Fit, Fit | None]
+"""Fits behind an ideal valve, behind play, and behind stick-slip if that was tried."""
+Fits = tuple[Fit, Fit, Fit | None, Fit, float, float]
+"""Plain fit, play, stick-slip if it was tried, the better valve, its evidence and that of the jump [nat]."""
+
+
+class Question(NamedTuple):
+    """What is asked of a window: the period or another scale of the loop [s], where PV is due to answer the set
+    point, what the controller did within its rows (None: not known), and whether the loop is calm."""
+
+    scale_s: float
+    due: Mask
+    scans: Scans | None
+    calm: bool
+    limits: CauseLimits
+
+
+def fits_of(window: Window, q: Question) -> Fits:
+    """The candidates' fits, by a recorded stem where one shows a fault; with OP at the controller's scan where its
+    scans within a row are known."""
+    shown = None if window.position is None else seen(window.op, window.position)
+    if shown is not None:
+        return _stem_shown(window, shown, q)
+    rows = _candidates(replace(window, position=None), q)
+    found = rows if q.scans is None or q.calm else _at_scans(rows, q, q.scans)
+    return *found, *_compared(found, q)
+
+
+def check_judged(window: Window, limits: CauseLimits) -> None:
+    """Raise NotAssessedError where too few blocks follow on as many good ones as the noise model looks back."""
+    count = int(judged(window.usable, FIT.ar_order).sum())
+    if count < limits.judged:
+        raise NotAssessedError(
+            f"needs {limits.judged} stretches of {FIT.ar_order + 1} good samples in a row, has {count}"
+        )
+
+
+def refined(fits: Candidates, best: Fit, hopeless: bool) -> Candidates:
+    """Fits at the record's own interval, where the dead time is no shorter than a block; the valve's are left as they
+    are where it is `hopeless` to look for its fault."""
+    if best.window.factor == 1 or best.dead_time_s + best.window.half_block_s < best.window.dt_s:
+        return fits
+    linear, play = (replace(f, window=replace(f.window, fine=True)) for f in fits[:2])
+    stick = None if fits[2] is None else replace(fits[2], window=replace(fits[2].window, fine=True))
+    if not hopeless:
+        play = descend(play, free_width=best.window.position is None)
+        stick = None if stick is None else descend(stick)
+    return descend(linear), play, stick
+
+
+def hopeful(window: Window, q: Question) -> float:
+    """Evidence [nat] from which it is worth looking for the fault of a valve whose loop does not oscillate."""
+    count = int(judged(window.usable, FIT.ar_order).sum())
+    return q.limits.hopeless * q.limits.needed(count, bool(q.due.any()), False)
+
+
+def _is_searched(linear: Fit, play: Fit, q: Question) -> bool:
+    """Whether a play explains enough for the whole search of the valve's fault."""
+    if q.calm and play.window.y.size < FIT.short:
+        return True
+    least = hopeful(play.window, q) if q.calm else FIT.screened
+    return play.log_likelihood - linear.log_likelihood >= least
+
+
+def _candidates(window: Window, q: Question) -> Candidates:
+    """The fits of one window."""
+    linear = fit_linear(window, q.scale_s)
+    short = q.calm and window.y.size < FIT.short
+    play = fit_play(linear, q.scale_s, hopeful(window, q) if q.calm and not short else None)
+    if not _is_searched(linear, play, q):
+        return linear, play, None
+    gained = play.log_likelihood - linear.log_likelihood
+    wide = play.valve.stickband > 0.25 * window.reach
+    sticks = short or not q.calm or (wide and gained >= q.limits.evidence)
+    return better_linear(linear, play), play, fit_stick_slip(play, q.scale_s) if sticks else None
+
+
+def _at_scans(rows: Candidates, q: Question, scans: Scans) -> Candidates:
+    """The fits with OP at the controller's scan, each as its own model makes it, unless those of OP at the rows are
+    clearly likelier: a controller that computes no faster holds it between them."""
+    first = _likeliest(rows)
+    within = with_scans(settled(first, scans), scans).window
+    linear, play, stick = _candidates(within, q)
+    stick = None if stick is None else settled(stick, scans)
+    found = settled(linear, scans), settled(play, scans), stick
+    gained = _likeliest(found).log_likelihood - first.log_likelihood
+    return found if gained > -q.limits.evidence else rows
+
+
+def _likeliest(fits: Candidates) -> Fit:
+    return max((f for f in fits if f is not None), key=lambda f: f.log_likelihood)
+
+
+def _compared(found: Candidates, q: Question) -> tuple[Fit, float, float]:
+    """The better valve, its evidence over an ideal one, and that of the jump over a play [nat]."""
+    linear, play, stick = found
+    if stick is None and not _is_searched(linear, play, q):
+        return play, play.log_likelihood - linear.log_likelihood, 0.0
+    best, jump = play, 0.0
+    if stick is not None:
+        jump = evidence(stick, play) - max(play.log_likelihood - stick.log_likelihood, 0.0)
+        best = stick if jump > q.limits.evidence_jump else play
+    gained = evidence(best, with_load_step(linear, q.due, best.ar))
+    return best, gained - (q.limits.evidence_jump if best is stick else 0.0), jump
+
+
+def _stem_shown(window: Window, shown: Seen, q: Question) -> Fits:
+    """The same where the stem is recorded: its fault is seen, and PV answers the stem itself."""
+    linear = fit_linear(window, q.scale_s)
+    behind = window if window.position is None else replace(window, op=window.position)
+    play = descend(replace(fit_linear(behind, q.scale_s), window=window, valve=shown.play))
+    stick = None if shown.jumping is None else replace(play, valve=shown.jumping)
+    best = play if stick is None else stick
+    gained = evidence(best, with_load_step(linear, q.due, best.ar))
+    return linear, play, stick, best, gained, 0.0 if stick is None else math.inf

@@ -1,0 +1,112 @@
+"""The stretch of a record that is fitted, in blocks; where PV is due to answer the set point; what OP did within."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from analyzer.config import CauseLimits
+from analyzer.limits import LOOP
+from analyzer.loop.assessments import noise_band
+from identification.estimation.between_samples import Rows, Scans, scans_per_row
+from identification.estimation.window import Window, block_means
+from identification.models import Pid
+from identification.record import Floats, LoopRecord, Mask
+
+
+def latest_fit_stretch(record: LoopRecord, n: int, calm: bool = False) -> int:
+    """First sample of the latest stretch of n samples with the fewest out of use, or, of a calm loop, with few more
+    where the set point moves farther in it: its moves tell the process apart from load and valve. In a cycle they do
+    not: of a tight loop of the sample mill they left the time constant unsure by three times."""
+    firsts = np.arange(len(record) - n, -1, -max(n // 4, 1))
+
+    def within(x: Floats) -> Floats:
+        total = np.concatenate(([0.0], np.cumsum(x)))
+        return np.asarray(total[firsts + n] - total[firsts])
+
+    out = within((~record.usable).astype(np.float64))
+    if not calm:
+        return int(firsts[int(np.argmin(out))])
+    moved = np.abs(np.diff(record.sp, prepend=record.sp[:1]))
+    far, least = within(np.where(record.usable, moved, 0.0)), out <= out.min()
+    farther = (out <= out.min() + LOOP.few_more * n) & (far > far[least].max())
+    among = np.flatnonzero(farther if farther.any() else least)
+    return int(firsts[among[far[among] >= far[among].max() - 1e-9][0]])
+
+
+def bridged(usable: Mask, period: float) -> Mask:
+    """Usable samples, shape (n,), and those in holes shorter than a share of a period [samples]."""
+    most = int(LOOP.bridged * period)
+    out = usable.copy()
+    edges = np.flatnonzero(np.diff(np.concatenate(([1], usable.astype(np.int8), [1]))))
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        if last - first <= most:
+            out[first:last] = True
+    return out
+
+
+def across(x: Floats, hole: Mask) -> Floats:
+    """A signal, shape (n,), with a straight line from end to end of each hole."""
+    if not hole.any() or hole.all():
+        return x
+    at = np.flatnonzero(~hole)
+    return np.where(hole, np.interp(np.arange(x.size), at, x[at]), x)
+
+
+def window_of(
+    record: LoopRecord, scale_s: float, limits: CauseLimits, kind: str = "", calm: bool = False
+) -> Window:
+    """The latest stretch with the fewest samples out of use, in blocks of a fraction of the period."""
+    factor = max(round(scale_s / limits.blocks_per_period / record.dt_s), 1)
+    n = min(len(record) // factor, limits.window) * factor
+    first = latest_fit_stretch(record, n, calm)
+    part = record.span(first, first + n)
+    whole = bridged(part.usable, scale_s / record.dt_s)
+    usable = block_means(whole.astype(np.float64), factor) > 0.99
+    known = {name: (t, dead) for name, t, dead in limits.fast_process}
+    most = known.get(kind.lower(), (math.inf, math.inf))
+    op = np.ascontiguousarray(part.op)
+    stem = None if part.position is None else np.ascontiguousarray(part.position)
+    return Window(
+        block_means(across(part.pv, whole & ~part.usable), factor),
+        op,
+        usable,
+        record.dt_s * factor,
+        factor,
+        *most,
+        position=stem,
+        first=first,
+        sp=None if part.sp_estimated or not np.ptp(part.sp) else block_means(part.sp, factor),
+        turn=0 if calm else max(round(2 * scale_s / record.dt_s), 2),
+    )
+
+
+def scans_of(record: LoopRecord, window: Window, law: Pid | None) -> Scans | None:
+    """What the controller did within the rows of a window; None where it computes no faster than they come, or what
+    it acts on is not known."""
+    count = scans_per_row(law, record.dt_s)
+    if law is None or count == 1 or record.sp_estimated:
+        return None
+    part = record.span(window.first, window.first + window.y.size * window.factor)
+    pv, sp, op = across(part.pv, ~part.usable), np.ascontiguousarray(part.sp), np.ascontiguousarray(part.op)
+    return Scans(Rows(pv, sp, op), law, count)
+
+
+def due_to_answer(record: LoopRecord, window: Window, scale_s: float) -> Mask:
+    """True where PV is due to answer a set point move, shape of the window.
+
+    From a move for scale_s [s], and on until PV has come to the set point, however long the valve takes.
+    """
+    sp = record.sp[window.first :: window.factor][: window.y.size]
+    moves = np.flatnonzero(np.abs(np.diff(sp)) > 1e-6) + 1
+    out = np.zeros(window.y.size, dtype=bool)
+    if record.sp_estimated or not 0 < moves.size <= window.y.size / 10:
+        return out
+    reach = max(round(scale_s / window.dt_s), 1)
+    error = np.abs(sp - window.y)
+    near = error <= 3 * noise_band(window.y)
+    for at, end in zip(moves, [*moves[1:], window.y.size], strict=True):
+        there = np.flatnonzero(near[at + 1 : end])
+        out[at : max(at + reach, at + 2 + int(there[0]) if there.size else end)] = True
+    return out
