@@ -24,6 +24,10 @@ Fits = tuple[Fit, Fit, Fit | None, Fit, float, float]
 """Plain fit, play, stick-slip if it was tried, the better valve, its evidence and that of the jump [nat]."""
 
 
+SEARCHED = 2
+"""Paths of OP while valves are searched: ours, for time; those found are followed with all."""
+
+
 class Question(NamedTuple):
     """What is asked of a window: the period or another scale of the loop [s], where PV is due to answer the set
     point, what the controller did within its rows (None: not known), and whether the loop is calm."""
@@ -41,8 +45,9 @@ def fits_of(window: Window, q: Question) -> Fits:
     shown = None if window.position is None else seen(window.op, window.position)
     if shown is not None:
         return _stem_shown(window, shown, q)
-    rows = _candidates(replace(window, position=None), q)
-    found = rows if q.scans is None or q.calm else _at_scans(rows, q, q.scans)
+    window = replace(window, position=None)
+    found = None if q.scans is None or q.calm else _at_scans(window, q, q.scans)
+    found = found or _candidates(window, q)
     return *found, *_compared(found, q)
 
 
@@ -95,16 +100,17 @@ def _candidates(window: Window, q: Question) -> Candidates:
     return better_linear(linear, play), play, fit_stick_slip(play, q.scale_s) if sticks else None
 
 
-def _at_scans(rows: Candidates, q: Question, scans: Scans) -> Candidates:
-    """The fits with OP at the controller's scan, each as its own model makes it, unless those of OP at the rows are
-    clearly likelier: a controller that computes no faster holds it between them."""
-    first = _likeliest(rows)
-    within = with_scans(settled(first, scans), scans).window
+def _at_scans(window: Window, q: Question, scans: Scans) -> Candidates | None:
+    """The fits with OP at the controller's scan, each as its own model makes it; None where those of OP at the rows
+    are clearly likelier: a controller that computes no faster holds it between them."""
+    linear = fit_linear(window, q.scale_s)
+    rows = _likeliest((linear, fit_play(linear, q.scale_s), None))
+    within = with_scans(settled(rows, scans), scans, SEARCHED).window
     linear, play, stick = _candidates(within, q)
     stick = None if stick is None else settled(stick, scans)
     found = settled(linear, scans), settled(play, scans), stick
-    gained = _likeliest(found).log_likelihood - first.log_likelihood
-    return found if gained > -q.limits.evidence else rows
+    gained = _likeliest(found).log_likelihood - rows.log_likelihood
+    return found if gained > -q.limits.evidence else None
 
 
 def _likeliest(fits: Candidates) -> Fit:

@@ -78,17 +78,17 @@ def settled(fit: Fit, scans: Scans) -> Fit:
     return best or fit
 
 
-def with_scans(fit: Fit, scans: Scans) -> Fit:
-    """A fit whose window has OP at the controller's scan, as its model makes it."""
-    window, paths = fit.window, op_at_scans(fit, scans)
+def with_scans(fit: Fit, scans: Scans, count: int = PATHS) -> Fit:
+    """A fit whose window has so many paths of OP at the controller's scan, as its model makes it."""
+    window, paths = fit.window, op_at_scans(fit, scans, count)
     turn = window.turn // window.steps * scans.per_row
     return replace(fit, window=replace(window, op=paths[0], paths=paths, steps=scans.per_row, turn=turn))
 
 
-def op_at_scans(fit: Fit, scans: Scans) -> Floats:
-    """Paths of OP at every scan [% OP], shape (PATHS, n * scans), each as likely as the next: the recorded OP at each
-    row, within rows what the law makes of PV with noise of its own. Noise is drawn from a fixed seed, each with its
-    opposite.
+def op_at_scans(fit: Fit, scans: Scans, paths: int = PATHS) -> Floats:
+    """An even number of paths of OP at every scan [% OP], shape (paths, n * scans), each as likely as the next: the
+    recorded OP at each row, within rows what the law makes of PV with noise of its own. Noise is drawn from a fixed
+    seed, each with its opposite.
     """
     rows, count = scans.rows, scans.per_row
     step_s, process = fit.window.row_s / count, fit.process
@@ -96,8 +96,8 @@ def op_at_scans(fit: Fit, scans: Scans) -> Floats:
     valve = StemLaw(*(float(x) for x in fit.valve))
     loop = LoopAtScan(per_scan(scans.law, step_s), valve, lag, process.gain)
     gains, noise_sd = _predictor(rows, loop, count)
-    out = np.empty((PATHS, rows.pv.size * count))
-    drawn = noise_sd * np.random.default_rng(SEED).standard_normal((PATHS // 2, rows.pv.size, count))
+    out = np.empty((paths, rows.pv.size * count))
+    drawn = noise_sd * np.random.default_rng(SEED).standard_normal((paths // 2, rows.pv.size, count))
     for i, noise in enumerate((*drawn, *-drawn)):
         out[i] = _stepped(rows, loop, gains, noise)[0].ravel()
     return out
