@@ -192,6 +192,6 @@ LISTED = {
     "one hour": ("needs data", "new settings need 2 good hours"),
     "no OP in the export": ("needs data", "needs OP"),
     "settings in loops.csv that were changed long ago": ("check settings", "are not those of the controller"),
-    "no settings in loops.csv": ("repair valve", "valve backlash"),
+    "no settings in loops.csv": ("retune", "valve backlash"),
 }
 """What the list says, of the mistakes that end in a night: the action, and a part of the reason."""
