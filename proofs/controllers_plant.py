@@ -122,6 +122,102 @@ def _lag(drive, pole, out):  # type: ignore[no-untyped-def]
         out[k] = x
 
 
+@dataclass
+class _Law:
+    """A controller as it is simulated and as loops.csv states it: gains kp, ki, kd; filter of PV [s], gap, squared,
+    set point weight, scan [s], gain above an OP of 50 %; highest OP and its rate; the row, what it leaves out, and
+    the settings of the ideal form."""
+
+    kp: float
+    ki: float
+    kd: float
+    ideal: tuple[float, float, float]
+    row: dict[str, object]
+    extra: dict[str, object] = field(default_factory=dict)
+    filter_s: float = 0.0
+    gap: float = 0.0
+    squared: float = 0.0
+    weight: float = 1.0
+    hold: float = 1.0
+    upper: float = 1.0
+    high: float = 100.0
+    rate: float = math.inf
+
+
+def _with_derivative(law: _Law, form: str, settings: tuple[float, float, float], narrow: float) -> None:
+    """The three forms of a PID."""
+    kp, ti, td = settings
+    law.extra = {"td_filter": narrow}
+    if form == "series PID":
+        law.ideal = (kp * (1 + td / ti), ti + td, ti * td / (ti + td))
+        law.row["form"], law.kp = "series", law.ideal[0]
+    elif form == "parallel PID":
+        law.row |= {"form": "parallel", "ti": ti / kp, "td": kp * td}
+
+
+def _with_form(law: _Law, form: str, plant: Plant, load: np.ndarray, rng: np.random.Generator) -> None:
+    """What a form has beside gain and integral time."""
+    gain, lag, dead = plant
+    kp, ti, _ = law.ideal
+    match form:
+        case "P only":
+            law.ki, law.row["ti"], law.ideal = 0.0, 0.0, (kp, math.inf, 0.0)
+        case "integral only":
+            law.ki = 0.5 / (gain * (lag + dead) * rng.uniform(1.0, 2.0))
+            law.row |= {"kp": 0.0, "ti": 1.0 / law.ki}
+            law.kp, law.ideal = 0.0, (0.0, 1.0 / law.ki, 0.0)
+        case "gap":
+            law.gap = round(rng.uniform(0.1, 0.5), 2)
+            law.extra = {"gap": law.gap}
+        case "error squared":
+            law.squared, law.kp = 1.0, float(f"{kp * rng.uniform(15, 60):.3g}")
+            law.ki, law.ideal, law.extra = law.kp / ti, (law.kp, ti, 0.0), {"error_form": "squared"}
+            law.row["kp"] = law.kp
+        case "PV filter":
+            law.filter_s = round(dead * rng.uniform(0.2, 1.0), 1)
+            law.extra = {"pv_filter_s": law.filter_s}
+        case "slow scan":
+            law.hold = float(rng.choice([2, 5]))
+        case "limit of OP's rate":
+            law.rate = round(rng.uniform(0.05, 0.5), 2)
+            law.extra = {"op_rate": law.rate}
+        case "limit of OP":
+            law.high = round(50 + rng.uniform(0.3, 2.0) * load.std() / gain, 1)
+            law.extra = {"op_hi_limit": law.high}
+        case "set point weight":
+            law.weight = round(rng.uniform(0.0, 0.6), 1)
+            law.extra = {"sp_weight": law.weight}
+        case "gain schedule":  # the gain stated is that below an OP of 50 %
+            law.upper = round(rng.uniform(0.2, 0.6), 1)
+
+
+Plant = tuple[float, float, float]
+"""Gain [% PV/% OP], lag and dead time [s]."""
+
+
+def _drawn(rng: np.random.Generator, form: str, tight: float) -> tuple[Plant, tuple[float, float, float]]:
+    """A plant, and gain, integral and derivative time of its controller."""
+    gain, lag, dead = rng.uniform(0.7, 2.0), 10 ** rng.uniform(1.7, 2.7), 10 ** rng.uniform(0.7, 1.5)
+    aim = dead * rng.uniform(1.2, 3.0)
+    kp = tight * min(lag / (gain * (aim + dead)), 12.0)
+    ti = min(lag, 4 * (aim + dead)) * rng.uniform(0.8, 1.3)
+    td = dead * rng.uniform(0.3, 1.0) if "PID" in form else 0.0
+    if form == "fast PI":
+        lag, dead = rng.uniform(3.0, 10.0), 1.0
+        kp, ti = round(rng.uniform(0.2, 0.6) / gain, 2), round(lag * rng.uniform(0.5, 1.2), 1)
+        return (gain, lag, dead), (kp, ti, td)
+    return (gain, lag, dead), (float(f"{kp:.3g}"), float(f"{ti:.3g}"), float(f"{td:.3g}"))
+
+
+def _set_points(rng: np.random.Generator, n: int, scene: str) -> np.ndarray:
+    """SP at each second [% PV], shape (n,)."""
+    if scene != "set point moves":
+        return np.full(n, 50.0)
+    sp = 50.0 + np.repeat(rng.uniform(-4, 4, math.ceil(n / 7200)), 7200)[:n]
+    sp[:7200] = 50.0
+    return sp
+
+
 def controlled(
     form: str,
     scene: str,
@@ -134,78 +230,25 @@ def controlled(
     controller under the same load, where they are given."""
     rng = np.random.default_rng([seed, FORMS.index(form), SCENES.index(scene)])
     n = int(days * DAY_S)
-    gain, lag, dead = rng.uniform(0.7, 2.0), 10 ** rng.uniform(1.7, 2.7), 10 ** rng.uniform(0.7, 1.5)
-    aim = dead * rng.uniform(1.2, 3.0)
-    kp = tight * min(lag / (gain * (aim + dead)), 12.0)
-    ti = min(lag, 4 * (aim + dead)) * rng.uniform(0.8, 1.3)
-    td = dead * rng.uniform(0.3, 1.0) if "PID" in form else 0.0
-    kp, ti, td = float(f"{kp:.3g}"), float(f"{ti:.3g}"), float(f"{td:.3g}")
-    if form == "fast PI":
-        lag, dead = rng.uniform(3.0, 10.0), 1.0
-        kp, ti = round(rng.uniform(0.2, 0.6) / gain, 2), round(lag * rng.uniform(0.5, 1.2), 1)
+    plant, settings = _drawn(rng, form, tight)
+    (gain, lag, dead), (kp, ti, td) = plant, settings
     noise = rng.standard_normal(n) * rng.choice([0.01, 0.02, 0.04])
     load = _walk(rng, n, rng.uniform(0.5, 2.0), lag * rng.uniform(1, 4))
-    sp = np.full(n, 50.0)
-    if scene == "set point moves":
-        sp = 50.0 + np.repeat(rng.uniform(-4, 4, math.ceil(n / 7200)), 7200)[:n]
-        sp[:7200] = 50.0
-    row: dict[str, object] = {"kp": kp, "ti": ti, "td": td, "form": "ideal"}
-    ideal, kd, ki, extra = (kp, ti, td), kp * td, kp / ti, {}
-    filter_s, gap, squared, weight, hold, upper = 0.0, 0.0, 0.0, 1.0, 1.0, 1.0
-    low, high, rate = 0.0, 100.0, math.inf
-    narrow = rng.choice([4.0, 8.0, 10.0])
+    sp, narrow = _set_points(rng, n, scene), rng.choice([4.0, 8.0, 10.0])
+    law = _Law(kp, kp / ti, kp * td, settings, {"kp": kp, "ti": ti, "td": td, "form": "ideal"})
     if "PID" in form:
-        extra = {"td_filter": narrow}
-    if form == "series PID":
-        ideal = (kp * (1 + td / ti), ti + td, ti * td / (ti + td))
-        row["form"], kp, ki, kd = "series", ideal[0], kp / ti, kp * td
-    elif form == "parallel PID":
-        row |= {"form": "parallel", "ti": ti / kp, "td": kp * td}
-    elif form == "P only":
-        ki, row["ti"], ideal = 0.0, 0.0, (kp, math.inf, 0.0)
-    elif form == "integral only":
-        ki = 0.5 / (gain * (lag + dead) * rng.uniform(1.0, 2.0))
-        row |= {"kp": 0.0, "ti": 1.0 / ki}
-        kp, ideal = 0.0, (0.0, 1.0 / ki, 0.0)
-    elif form == "gap":
-        gap = round(rng.uniform(0.1, 0.5), 2)
-        extra = {"gap": gap}
-    elif form == "error squared":
-        squared, kp = 1.0, float(f"{kp * rng.uniform(15, 60):.3g}")
-        ki, ideal, extra = kp / ti, (kp, ti, 0.0), {"error_form": "squared"}
-        row["kp"] = kp
-    elif form == "PV filter":
-        filter_s = round(dead * rng.uniform(0.2, 1.0), 1)
-        extra = {"pv_filter_s": filter_s}
-    elif form == "slow scan":
-        hold = float(rng.choice([2, 5]))
-    elif form == "limit of OP's rate":
-        rate = round(rng.uniform(0.05, 0.5), 2)
-        extra = {"op_rate": rate}
-    elif form == "limit of OP":
-        high = round(50 + rng.uniform(0.3, 2.0) * load.std() / gain, 1)
-        extra = {"op_hi_limit": high}
-    elif form == "set point weight":
-        weight = round(rng.uniform(0.0, 0.6), 1)
-        extra = {"sp_weight": weight}
-    elif form == "gain schedule":  # the gain stated is that below an OP of 50 %
-        upper = round(rng.uniform(0.2, 0.6), 1)
-    row["scan_s"] = SCAN_S * hold
+        _with_derivative(law, form, settings, narrow)
+    _with_form(law, form, plant, load, rng)
+    law.row["scan_s"] = SCAN_S * law.hold
     if typed is not None:
-        row["kp"], row["ti"] = typed
-        kp, ki = typed[0], typed[0] / typed[1]
+        law.row["kp"], law.row["ti"] = typed
+        law.kp, law.ki = typed[0], typed[0] / typed[1]
     play = rng.uniform(0.5, 2.5) if scene == "worn" else 0.0
-    out = np.empty((3, n))
-    tracks = float(rng.random() < 0.5)
+    out, tracks = np.empty((3, n)), float(rng.random() < 0.5)
+    gains = law.kp, law.ki, law.kd, float(td / narrow)
+    extras = law.filter_s, law.gap, law.squared, law.weight, law.hold, law.upper
     _run(
-        sp,
-        load,
-        noise,
-        (gain, lag, round(dead), play),
-        (kp, ki, kd, float(td / narrow)),
-        (filter_s, gap, squared, weight, hold, upper),
-        (low, high, rate, tracks),
-        out,
+        sp, load, noise, (gain, lag, round(dead), play), gains, extras, (0.0, law.high, law.rate, tracks), out
     )
-    row |= {"pv_lo": 0, "pv_hi": 100, "type": "temperature"}
-    return Controlled(form, scene, sp, out[0], out[1], row, extra, ideal)
+    law.row |= {"pv_lo": 0, "pv_hi": 100, "type": "temperature"}
+    return Controlled(form, scene, sp, out[0], out[1], law.row, law.extra, law.ideal)
