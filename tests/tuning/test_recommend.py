@@ -13,7 +13,7 @@ from tuning.forecast import assess, run, settled
 from tuning.frequency_response import integral_s, maximum_sensitivity
 from tuning.limit_cycle import confirm
 from tuning.limits import LIMITS
-from tuning.rules import backlash_rule, simc
+from tuning.rules import backlash_rule, from_ringing, sensitivity_at, simc
 from tuning.search import allowed, rejection
 
 STUDY = Loop(Fopdt(80, 200, 1), Pid(1, 10), Backlash(1.0))
@@ -294,12 +294,54 @@ def test_extremes_do_not_raise():
             assert (p.controller is not None) == (p.action == "retune")
 
 
-def test_a_step_halfway_is_between_present_and_robust_settings():
-    """Where the dead time is unsure, the proposal lies between the present settings and the robust ones."""
+def test_a_first_step_is_between_present_and_robust_settings():
+    """Where the dead time is unsure, the gain proposed lies between the present one and the robust one."""
     process = Fopdt(1.5, 100, 8)
     nominal = simc(process, scan_s=1.0)
     loop = Loop(process, replace(nominal, kp=3 * nominal.kp, ti_s=0.4 * nominal.ti_s))
     lively = load(np.random.default_rng(3), 6000, 1.0, 10.0, 0.02)
     robust, half = (recommend(loop, "tuning", load=lively, halfway=h).controller for h in (False, True))
     assert robust.kp < half.kp < loop.controller.kp
-    assert loop.controller.ti_s < half.ti_s < robust.ti_s
+    assert loop.controller.ti_s <= half.ti_s
+
+
+def ringing(process):
+    """A PI controller that leaves a lag with dead time at its limit of stability, and the period [s]: L(jw) = -1."""
+    at = [Loop(process, Pid(kp, 40.0)) for kp in np.geomspace(0.1, 100.0, 2000)]
+    kp = max(loop.controller.kp for loop in at if math.isfinite(maximum_sensitivity(loop)))
+    omega = np.geomspace(1e-3, 1.0, 200_000)
+    s = 1j * omega
+    response = kp * (1 + 1 / (40 * s)) * process.gain * np.exp(-process.dead_time_s * s)
+    response /= 1 + process.time_constant_s * s
+    return Pid(kp, 40.0), 2 * math.pi / omega[np.argmin(np.abs(1 + response))]
+
+
+def test_the_ringing_itself_tells_what_new_settings_leave():
+    """At the limit of stability half the gain leaves a sensitivity of 2 at the ringing, whatever the process."""
+    old, period = ringing(Fopdt(1.5, 120.0, 9.0))
+    half = replace(old, kp=old.kp / 2)
+    assert sensitivity_at(old, half, period) == pytest.approx(2.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("dead_time", [9.0, 40.0, 120.0])
+def test_settings_from_the_ringing_alone_are_robust(dead_time):
+    """Two thirds of the response left at the limit of stability leave an Ms of about 3, on any dead time."""
+    process = Fopdt(1.5, 120.0, dead_time)
+    old, period = ringing(process)
+    new = from_ringing(old, period, 2 / 3)
+    assert new.kp <= old.kp
+    assert new.ti_s >= old.ti_s
+    assert maximum_sensitivity(Loop(process, new)) < 1.25 / (1 - 2 / 3)
+
+
+def test_settings_that_ring_on_at_the_observed_period_are_not_proposed():
+    """A model that takes the process for far tamer than its ringing shows gets settings from the ringing instead."""
+    true = Fopdt(1.5, 120.0, 9.0)
+    old, period = ringing(true)
+    tame = Loop(Fopdt(0.1, 400.0, 20.0), old)
+    believed = tuning.recommend.recommend(tame, "tuning").new
+    assert maximum_sensitivity(Loop(true, believed)) > 5.0
+    seen = tuning.recommend.recommend(tame, "tuning", ringing_s=period)
+    assert maximum_sensitivity(Loop(true, seen.new)) < 1.25 / (1 - 2 / 3)
+    assert "rings at" in seen.reason
+    assert seen.ms is None
