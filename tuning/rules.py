@@ -5,14 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
-
 from identification.models import Fopdt, Integrator, Pid, Process
-from tuning.frequency_response import controller_response, integral_s
+from tuning.frequency_response import integral_s
 from tuning.limits import METHOD
-
-RINGING_PER_INTEGRAL = 1.2
-"""Period of the ringing over the integral time of a PI controller (Ziegler, Nichols 1942)."""
 
 
 def effective_delay(process: Process, scan_s: float = 0.0) -> float:
@@ -69,28 +64,3 @@ def backlash_rule(process: Process, controller: Pid) -> Pid:
     if isinstance(process, Integrator):
         return controller
     return replace(controller, ti_s=max(integral_s(controller), process.time_constant_s))
-
-
-def at_period(old: Pid, new: Pid, period_s: float) -> complex:
-    """The response of new settings over that of the old ones at a period [-]."""
-    omega = np.array([2.0 * math.pi / period_s])
-    then, now = (controller_response(c, omega)[0] for c in (old, new))
-    return complex(now / then)
-
-
-def sensitivity_at(old: Pid, new: Pid, ringing_s: float) -> float:
-    """Sensitivity that new settings leave at the period at which the loop rings with the old ones [-].
-
-    There the loop's response is nearly -1, whatever the process: Ziegler, Nichols (1942) take settings from that
-    point alone.
-    """
-    return 1.0 / max(abs(1.0 - at_period(old, new, ringing_s)), 1e-9)
-
-
-def from_ringing(old: Pid, ringing_s: float, share: float) -> Pid:
-    """Settings that keep a share of the loop's present response at the period at which it rings [s].
-
-    The integral time is at least that period over 1.2 (Ziegler, Nichols 1942), off where it is off; Kp is not raised.
-    """
-    new = replace(old, ti_s=max(integral_s(old), ringing_s / RINGING_PER_INTEGRAL))
-    return replace(new, kp=old.kp * min(share / abs(at_period(old, new, ringing_s)), 1.0))

@@ -8,12 +8,14 @@ import pytest
 
 import tuning.recommend
 from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Stiction
+from identification.signals.spectrum import spectrum
 from proofs.valve_loops import backlash_case, corners, level_case, load, stick_case
 from tuning.forecast import assess, run, settled
-from tuning.frequency_response import integral_s, maximum_sensitivity
+from tuning.frequency_response import integral_s, maximum_sensitivity, resonance_s
 from tuning.limit_cycle import confirm
 from tuning.limits import LIMITS
-from tuning.rules import backlash_rule, from_ringing, sensitivity_at, simc
+from tuning.ringing import error_ratio, from_ringing, rung, sensitivity_at
+from tuning.rules import backlash_rule, simc
 from tuning.search import allowed, rejection
 
 STUDY = Loop(Fopdt(80, 200, 1), Pid(1, 10), Backlash(1.0))
@@ -341,7 +343,22 @@ def test_settings_that_ring_on_at_the_observed_period_are_not_proposed():
     tame = Loop(Fopdt(0.1, 400.0, 20.0), old)
     believed = tuning.recommend.recommend(tame, "tuning").new
     assert maximum_sensitivity(Loop(true, believed)) > 5.0
-    seen = tuning.recommend.recommend(tame, "tuning", ringing_s=period)
+    swing = np.sin(2 * np.pi * np.arange(0.0, 40 * period) / period)
+    seen = tuning.recommend.recommend(tame, "tuning", seen=rung(period, spectrum(swing, 1.0)))
     assert maximum_sensitivity(Loop(true, seen.new)) < 1.25 / (1 - 2 / 3)
     assert "rings at" in seen.reason
     assert seen.ms is None
+
+
+@pytest.mark.parametrize("corner_s", [10.0, 300.0, 3000.0, 30_000.0])
+@pytest.mark.parametrize("gain", [8.0, 10.0])
+def test_the_recorded_errors_spectrum_tells_what_a_step_costs(corner_s, gain):
+    """Simulated under fast and slow loads, a calmer loop's error is what the spectrum says, or up to a fifth less."""
+    loop = Loop(Fopdt(1.5, 120.0, 9.0), Pid(gain, 120.0))
+    walk = load(np.random.default_rng(5), 40_000, 1.0, corner_s, 0.0)
+    before = run(loop, walk).error[4000:]
+    new = from_ringing(loop.controller, resonance_s(loop), 0.67)
+    after = run(replace(loop, controller=new), walk).error[4000:]
+    told = error_ratio(loop.controller, new, rung(resonance_s(loop), spectrum(before, 1.0)))
+    true = np.std(after) / np.std(before)
+    assert 0.95 * true < told < 1.25 * true
