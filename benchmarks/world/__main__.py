@@ -85,7 +85,7 @@ def right(d: Drawn, row: dict[str, Any]) -> bool:
         return row["cause"] == "valve"
     if d.kind == "worn-sine":
         return row["cause"] in ("load", "valve") and row["valve_fault"] not in ("none", None)
-    return row["cause"] == d.cause
+    return row["cause"] == d.cause and row["valve_fault"] in ("none", None)
 
 
 def line(d: Drawn, row: dict[str, Any], said: str) -> str:
