@@ -95,6 +95,10 @@ class Verdict:
         return self if self.steady is None or self.cause is not Cause.VALVE else self.steady
 
 
+TEMPER_NAT = 50.0
+"""Gain in log likelihood [nat] by which the doubt in a model's verdict falls to a third; ours: benchmarks/world."""
+LEAST_AGREED = 0.25
+"""Chance of a cause by the other signs [-] from which they do not contradict the model that names it; ours."""
 NO_CAUSE = Verdict(Cause.NONE, dict.fromkeys(CAUSES, 0.0), Fault.NONE)
 
 
@@ -197,9 +201,12 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
     if not np.isfinite(seen).all():
         return replace(not_assessed(None), measured=m)
     found = chances(seen)
+    told = None if m.ringing is None else m.ringing.likelier(m.evidence, limits)
+    if told is not None and found[told[0]] >= LEAST_AGREED and _may_be(told[0], m, limits):
+        return _likelier(m, *told, limits)
     first = max(found, key=lambda c: found[c])
     confidence = {c: 100.0 * p for c, p in found.items()}
-    if first is Cause.VALVE and (m.size < limits.least_size or not speaks(m, limits, True)):
+    if not _may_be(first, m, limits):
         confidence[first] = min(confidence[first], 0.9 * limits.named_pct)
     if m.ringing is not None and m.ringing.is_seen(
         limits
@@ -223,6 +230,21 @@ def _rings(m: Measured, ringing: Ringing, oscillation: Oscillation, limits: Caus
     )
     told = replace(m, linear=as_fit(ringing.smooth, m.window))
     return Verdict(Cause.TUNING, confidence, Fault.NONE, signs, measured=told)
+
+
+def _may_be(cause: Cause, m: Measured, limits: CauseLimits) -> bool:
+    """Whether a cause may be named: any but a valve of whose fault PV does not speak, or that OP hardly feels."""
+    return cause is not Cause.VALVE or (m.size >= limits.least_size and speaks(m, limits, True))
+
+
+def _likelier(m: Measured, cause: Cause, nat: float, limits: CauseLimits) -> Verdict:
+    """The verdict on a cycle that one of valve and load explains better than the other, by so much [nat]: their
+    odds, tempered, since models of loops are never quite true."""
+    pct = limits.ringing_pct - (limits.ringing_pct - limits.load_pct) * math.exp(-nat / TEMPER_NAT)
+    confidence = {**dict.fromkeys(CAUSES, 0.5 * (100.0 - pct)), cause: pct}
+    signs = (Sign(cause, pct / 100.0, SignKind.LIKELIER, (str(cause), nat)),)
+    fault = fault_of(m, limits) if cause is Cause.VALVE else Fault.NONE
+    return Verdict(cause, confidence, fault, signs, measured=m)
 
 
 def _least(cause: Cause, m: Measured, limits: CauseLimits) -> float:

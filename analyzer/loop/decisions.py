@@ -37,6 +37,7 @@ class SignKind(StrEnum):
     REGULARITY = "kurtosis"
     RINGING = "ringing"
     SMOOTH_LOAD = "smooth load"
+    LIKELIER = "likelier model"
     LIMITS = "saturated"
     DEAD_TIME = "dead_time_share"
     CALM_EVIDENCE = "evidence of a calm loop"

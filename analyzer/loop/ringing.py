@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.config import CauseLimits
+from analyzer.loop.decisions import Cause
 from identification.estimation.smooth_load import SmoothFit, fit_line, fit_smooth, resonant_starts
 from identification.estimation.window import Fit, Window
 from identification.models import Loop, Pid, Process
@@ -59,6 +60,19 @@ class Ringing:
         if math.isinf(self.ms) and m.limited:  # it must cycle, whatever the load does
             return self.rings(limits) and not faulty
         return self.rings(limits) and not (faulty or self.has_line(limits)) and self.is_as_regular(m, limits)
+
+    def likelier(self, evidence: float, limits: CauseLimits) -> tuple[Cause, float] | None:
+        """Whether a faulty valve or a line of the load explains the cycle, and by how much more than the other and
+        than neither [nat]; None where neither is ahead by what its constants cost.
+
+        evidence, for a faulty valve under a free noise model [nat]; the lower of both counts.
+        """
+        valve, need = min(evidence, self.valve_nat), self.line_needed(limits)
+        if valve - max(self.line_nat, 0.0) >= need:
+            return Cause.VALVE, valve - max(self.line_nat, 0.0)
+        if self.has_line(limits) and self.line_nat - max(valve, 0.0) >= need:
+            return Cause.LOAD, self.line_nat - max(valve, 0.0)
+        return None
 
     def is_as_regular(self, m: Regularity, limits: CauseLimits) -> bool:
         """Whether the loop makes a cycle as regular as the observed one. Where OP reaches its limit in each cycle,

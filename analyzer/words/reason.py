@@ -215,6 +215,7 @@ SAYS: Mapping[SignKind, Callable[..., Chosen]] = {
         ("ringing_unstable",) if math.isinf(ms) else ("ringing", duration(period_s), ms)
     ),
     SignKind.SMOOTH_LOAD: lambda nat: ("smooth_load", nat),
+    SignKind.LIKELIER: lambda cause, nat: (f"likelier_{cause}", nat),
     SignKind.LIMITS: lambda share: ("at_limits" if 100 * share >= 1 else "off_limits", 100 * share),
     SignKind.DEAD_TIME: lambda period_s, dead_s: (
         ("long_period",) if period_s > 50 * dead_s else ("dead_times", period_s / dead_s)

@@ -71,6 +71,7 @@ BOTH_WAYS = {
     SignKind.REGULARITY: ((1.5, 0.9), (1.5, 0.1), (2.9, 0.9), (2.9, 0.1)),
     SignKind.RINGING: ((math.inf, 90.0), (5.0, 90.0)),
     SignKind.SMOOTH_LOAD: ((2.0,),),
+    SignKind.LIKELIER: (("valve", 40.0), ("load", 40.0)),
     SignKind.LIMITS: ((0.0,), (0.2,)),
     SignKind.DEAD_TIME: ((300.0, 0.0), (300.0, 100.0)),
     SignKind.CALM_EVIDENCE: ((9.0,),),

@@ -12,12 +12,13 @@ from analyzer.history.series import Series
 from analyzer.loop.advice import sought_for
 from analyzer.loop.agreement import agreement
 from analyzer.loop.assess import Assessment, assess
+from analyzer.loop.decisions import SignKind
 from analyzer.loop.identified import load_of
 from analyzer.loop.judged_stretch import controller_of
 from analyzer.loop.oscillation import counting
 from analyzer.loop.quality import prepare
 from benchmarks.world.__main__ import spec_of
-from benchmarks.world.draw import Drawn, run
+from benchmarks.world.draw import HOURS, Drawn, drawn, run
 from benchmarks.world.recorder import recorded
 from benchmarks.world.simulate import BACKLASH, Controller, Process, Valve, sensitivity
 from identification.models import Pid
@@ -30,9 +31,9 @@ WORN = Drawn("B", "backlash", PROCESS, Controller(3.5, 40.0), Valve(BACKLASH, 3.
 HEALTHY = Drawn("H", "healthy", PROCESS, Controller(2.5, 150.0), Valve(), 25, 0.0, 0.0, 1.0, 2.0)
 
 
-def assessed(d: Drawn, way: str = "plain") -> tuple[Assessment, Pid]:
-    """What eight hours of a loop come to, and its controller."""
-    r, spec = recorded(run(d, hours=8), way, 1), spec_of(d)
+def assessed(d: Drawn, way: str = "plain", hours: float = 8) -> tuple[Assessment, Pid]:
+    """What some hours of a loop come to, and its controller."""
+    r, spec = recorded(run(d, hours=hours), way, 1), spec_of(d)
     stamp, good = START_S + r["stamp_s"], np.zeros(r["pv"].size, dtype=bool)
     found = {f"{d.name}.{role.upper()}": Series(stamp, r[role], good) for role in ("sp", "pv", "op")}
     made = prepare(spec, found, Config().quality)
@@ -42,12 +43,21 @@ def assessed(d: Drawn, way: str = "plain") -> tuple[Assessment, Pid]:
 
 
 @pytest.mark.parametrize("way", ["plain", "rows missing"])
-@pytest.mark.parametrize(("drawn", "cause"), [(HEALTHY, "none"), (SINE, "load"), (TIGHT, "tuning")])
-def test_the_loop_or_its_load_makes_the_cycle(drawn: Drawn, cause: str, way: str) -> None:
+@pytest.mark.parametrize(("loop", "cause"), [(HEALTHY, "none"), (SINE, "load"), (TIGHT, "tuning")])
+def test_the_loop_or_its_load_makes_the_cycle(loop: Drawn, cause: str, way: str) -> None:
     """A loop of Ms above 4 that rings is tuning's; under a sine the same process well tuned has a load's cycle, and
     without one none; missing rows change nothing."""
-    assert (sensitivity(drawn.process, drawn.controller)[0] > 4.0) == (cause == "tuning")
-    assert assessed(drawn, way)[0].verdict.cause == cause
+    assert (sensitivity(loop.process, loop.controller)[0] > 4.0) == (cause == "tuning")
+    assert assessed(loop, way)[0].verdict.cause == cause
+
+
+@pytest.mark.parametrize(("kind", "seed", "number"), [("backlash", 115, 7), ("load", 117, 2)])
+def test_the_likelier_model_names_what_other_signs_leave_open(kind: str, seed: int, number: int) -> None:
+    """A worn valve and a sine are named where one of both models explains PV far better than the other."""
+    d = drawn(seed, 8, (kind,))[number]
+    verdict = assessed(d, hours=HOURS)[0].verdict
+    assert verdict.cause == d.cause
+    assert [s.kind for s in verdict.signs] == [SignKind.LIKELIER]
 
 
 def test_a_simulated_present_is_believed_only_where_it_agrees() -> None:
