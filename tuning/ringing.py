@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
 
 from identification.models import Integrator, Loop, Pid
 from identification.record import Floats
@@ -19,6 +18,8 @@ from tuning.frequency_response import controller_response, integral_s, loop_resp
 
 PER_INTEGRAL = 1.2
 """Period of the ringing over the integral time of a PI controller (Ziegler, Nichols 1942)."""
+TIMES, RAISED = 9, 2.0
+"""Integral times that are tried, and how far the gain may rise; ours: it doubles where Ti was far too short."""
 BINS = 300
 """Bins of the error's spectrum, of equal ratio; ours: over five decades they are 4 % wide."""
 
@@ -53,19 +54,24 @@ def sensitivity_at(old: Pid, new: Pid, period_s: float) -> float:
     return 1.0 / max(abs(1.0 - at_period(new, period_s) / at_period(old, period_s)), 1e-9)
 
 
-def from_ringing(old: Pid, period_s: float, share: float) -> Pid:
+def process_of(old: Pid, period_s: float) -> Integrator:
+    """The integrator with dead time that rings at a period [s] with these settings: more sluggish at high frequencies
+    than a lag through the same point, and cautious so."""
+    there, ringing = at_period(old, period_s), 2.0 * math.pi / period_s
+    return Integrator(ringing / abs(there), max(0.5 * math.pi + float(np.angle(there)), 0.0) / ringing)
+
+
+def from_ringing(old: Pid, period_s: float, share: float) -> list[Pid]:
     """Settings that keep a share of the loop's present response at the period at which it rings [s].
 
-    The integral time grows up to that period over 1.2, off where it is off; where that is not enough Kp falls.
+    The integral time grows up to that period over 1.2; it stays where it is longer, or off. Kp follows; it rises by
+    RAISED at most, where the integral time was what makes the loop ring.
     """
-
-    def kept(ti_s: float) -> float:
-        return abs(at_period(replace(old, ti_s=ti_s), period_s) / at_period(old, period_s))
-
-    ti_s = max(integral_s(old), period_s / PER_INTEGRAL)
-    if kept(ti_s) < share:
-        return replace(old, ti_s=float(brentq(lambda x: kept(x) - share, integral_s(old), ti_s)))
-    return replace(old, ti_s=ti_s, kp=old.kp * share / kept(ti_s))
+    longest = max(integral_s(old), period_s / PER_INTEGRAL)
+    times = np.geomspace(integral_s(old), longest, TIMES) if longest > integral_s(old) else [old.ti_s]
+    made = [replace(old, ti_s=float(ti)) for ti in times]
+    kept = (share * abs(at_period(old, period_s) / at_period(new, period_s)) for new in made)
+    return [replace(new, kp=old.kp * k) for new, k in zip(made, kept, strict=True) if k <= RAISED]
 
 
 def error_ratio(old: Pid, new: Pid, seen: Rung) -> float:
@@ -76,9 +82,7 @@ def error_ratio(old: Pid, new: Pid, seen: Rung) -> float:
     ringing L is -1. Between, the process counts as the integrator with dead time that gives -1 there.
     """
     laws = [replace(c, scan_s=0.0) for c in (old, new)]
-    there, ringing = at_period(laws[0], seen.period_s), 2.0 * math.pi / seen.period_s
-    dead_time_s = max(0.5 * math.pi + float(np.angle(there)), 0.0) / ringing
-    process = Integrator(ringing / abs(there), dead_time_s)
+    process = process_of(laws[0], seen.period_s)
     before, after = (1.0 + loop_response(Loop(process, c), seen.omega) for c in laws)
     ratio = float(np.sum(seen.power * np.abs(before / after) ** 2)) / max(float(np.sum(seen.power)), 1e-300)
     return math.sqrt(ratio)

@@ -201,16 +201,14 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
     if not np.isfinite(seen).all():
         return replace(not_assessed(None), measured=m)
     found = chances(seen)
-    told = None if m.ringing is None else m.ringing.likelier(m.evidence, limits)
-    if told is not None and found[told[0]] >= LEAST_AGREED and _may_be(told[0], m, limits):
-        return _likelier(m, *told, limits)
+    told = _by_likelihood(m, found, limits)
+    if told is not None:
+        return _likelier(m, *told, limits, signs_of(m, oscillation, seen))
     first = max(found, key=lambda c: found[c])
     confidence = {c: 100.0 * p for c, p in found.items()}
     if not _may_be(first, m, limits):
         confidence[first] = min(confidence[first], 0.9 * limits.named_pct)
-    if m.ringing is not None and m.ringing.is_seen(
-        limits
-    ):  # the model has said that the loop does not ring by itself
+    if m.ringing is not None and m.ringing.is_seen(limits):  # and the loop does not ring by itself
         confidence[Cause.TUNING] = min(confidence[Cause.TUNING], 0.9 * limits.named_pct)
     cause = first if confidence[first] >= _least(first, m, limits) else Cause.UNDECIDED
     fault = fault_of(m, limits) if cause is Cause.VALVE else Fault.NONE
@@ -237,12 +235,23 @@ def _may_be(cause: Cause, m: Measured, limits: CauseLimits) -> bool:
     return cause is not Cause.VALVE or (m.size >= limits.least_size and speaks(m, limits, True))
 
 
-def _likelier(m: Measured, cause: Cause, nat: float, limits: CauseLimits) -> Verdict:
+def _by_likelihood(m: Measured, found: dict[Cause, float], limits: CauseLimits) -> tuple[Cause, float] | None:
+    """The cause whose model is likelier than the others, and by how much [nat]; None where none is, where the other
+    signs contradict it, or where it is a valve with so narrow a fault that a neighbour's wave has it, too."""
+    told = None if m.ringing is None else m.ringing.likelier(m.evidence, limits)
+    if told is None or found[told[0]] < LEAST_AGREED or not _may_be(told[0], m, limits):
+        return None
+    return None if told[0] is Cause.VALVE and m.size < limits.small_size else told
+
+
+def _likelier(
+    m: Measured, cause: Cause, nat: float, limits: CauseLimits, others: tuple[Sign, ...]
+) -> Verdict:
     """The verdict on a cycle that one of valve and load explains better than the other, by so much [nat]: their
-    odds, tempered, since models of loops are never quite true."""
+    odds, tempered, since models of loops are never quite true. others, the other signs."""
     pct = limits.ringing_pct - (limits.ringing_pct - limits.load_pct) * math.exp(-nat / TEMPER_NAT)
     confidence = {**dict.fromkeys(CAUSES, 0.5 * (100.0 - pct)), cause: pct}
-    signs = (Sign(cause, pct / 100.0, SignKind.LIKELIER, (str(cause), nat)),)
+    signs = (Sign(cause, pct / 100.0, SignKind.LIKELIER, (str(cause), nat)), *others)
     fault = fault_of(m, limits) if cause is Cause.VALVE else Fault.NONE
     return Verdict(cause, confidence, fault, signs, measured=m)
 
