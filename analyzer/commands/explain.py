@@ -68,7 +68,7 @@ def explain(
     from analyzer.explain.explained import abstained, explained, with_night
     from analyzer.explain.models import read_model
     from analyzer.explain.page import abstention, explanation_page
-    from analyzer.night.asked import guarded
+    from analyzer.night.opened import guarded
 
     decision = None
     try:

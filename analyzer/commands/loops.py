@@ -28,7 +28,7 @@ def loops(asked: Asked, out: Path | None) -> None:
     Example: triage loops export.parquet --out loops.csv
     """
     from analyzer.finder.draft import as_csv
-    from analyzer.night.asked import drafted
+    from analyzer.night.opened import drafted
     from reports.whole_file import whole_file
 
     with bar("tags") as progress:

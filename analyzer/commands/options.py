@@ -269,9 +269,9 @@ def bar(what: str) -> Iterator[Report]:
         yield _tenths(what)
         return
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(what, total=None)
         yield lambda done, total: progress.update(task, completed=done, total=total)
@@ -282,37 +282,53 @@ COMPILING_S = 10.0
 a tenth of a second."""
 
 
+STILL_S = 60.0
+"""Seconds without a line after which how far it is is said again [s]."""
+
+
 def _tenths(what: str) -> Report:
-    """A line on stderr at the beginning, at every tenth, and where the first thing takes long."""
+    """A line on stderr at the beginning, at every tenth, where the first thing takes long, and once a minute."""
     said, begun = set[int](), time.monotonic()
+    said_s = begun
 
     def report(done: int, total: int) -> None:
-        if done == 0 and -1 not in said and time.monotonic() - begun > COMPILING_S:
-            said.add(-1)
-            print(
-                f"{what}: the first run after an installation compiles for minutes",
-                file=sys.stderr,
-                flush=True,
-            )
-        tenth = 10 * done // max(total, 1)
-        if tenth not in said:
-            said.add(tenth)
-            print(f"{what}: {done} of {total}", file=sys.stderr, flush=True)
+        nonlocal said_s
+        now, tenth = time.monotonic(), 10 * done // max(total, 1)
+        compiling = done == 0 and now - begun > COMPILING_S and -1 not in said
+        new = -1 if compiling else tenth
+        if new in said and now - said_s < STILL_S:
+            return
+        after = f" after {now - begun:.0f} s" if new in said else ""
+        far = "the first run after an installation compiles for minutes"
+        click.echo(f"{what}: {far if compiling else f'{done} of {total}{after}'}", err=True)
+        said.add(new)
+        said_s = now
 
     return report
 
 
 @contextmanager
 def watched(what: str) -> Iterator[None]:
-    """Say what is done, for as long as it is done, where somebody looks at a terminal."""
+    """Say what is done: on a terminal for as long as it is done, elsewhere in a line on stdout: where something goes
+    wrong stderr has one line alone."""
     seen = sys.stderr is not None and sys.stderr.isatty()
     if seen:
         click.echo(f"\r\033[K{visible(what)}", nl=False, err=True)
+    else:
+        _to_stdout(visible(what))
     try:
         yield
     finally:
         if seen:
             click.echo("\r\033[K", nl=False, err=True)
+
+
+def _to_stdout(line: str) -> None:
+    """A line that nobody has to read: whoever closed stdout loses it, and nothing else."""
+    try:
+        click.echo(line)
+    except OSError:
+        sys.stdout = None  # which says nothing at the end of the process either
 
 
 @contextmanager

@@ -223,7 +223,7 @@ def _run_night(
     with scratch(place, how["resume"]) as copies:
         more = f" and {len(asked.export) - 1} more" if len(asked.export) > 1 else ""
         with watched(f"reading {asked.export[0]}{more}"):
-            from analyzer.night.asked import opened_apart  # takes a second
+            from analyzer.night.opened import opened_apart  # takes a second
 
             plant = opened_apart(replace(asked, reading={**asked.reading, "scratch": copies}))
         store = Store(place)

@@ -33,8 +33,9 @@ from analyzer.loop.sample_clock import onto_clock, snapped
 from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import controller
-from analyzer.night.asked import Asked, guarded
-from analyzer.night.nights import ALWAYS, Night, Plant, cut
+from analyzer.night.asked import ALWAYS, Asked
+from analyzer.night.nights import Night, Plant, cut
+from analyzer.night.opened import guarded
 from identification.controller.check import StatedSettings
 from identification.errors import InputError, NotAssessedError
 from identification.estimation.evidence import trials_between_moves

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from analyzer.finder.law import (
     TINY,
@@ -322,6 +321,8 @@ def _held_elsewhere(bag: Bag, scores: Scores, tag: int, own: Cause) -> bool:
 def _with_set_points(bag: Bag, pairs: Sequence[FoundPair]) -> list[FoundPair]:
     """The pairs with set points that never move, one each, by how near they lie to the mean of PV; PV and OP change
     places where one lies nearer to OP."""
+    from scipy.optimize import linear_sum_assignment  # half a second, for those who look for loops alone
+
     taken = {p.sp for p in pairs if p.sp is not None}
     free = [k for k in bag.still if k not in taken]
     if not free or not pairs:

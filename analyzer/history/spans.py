@@ -4,36 +4,45 @@ from __future__ import annotations
 
 import re
 import zipfile
-from collections.abc import Iterator, Sequence
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
+from typing import IO
+from xml.parsers import expat
 
 from analyzer.limits import HISTORY
 from identification.errors import InputError
 
-SHEET = re.compile(r"xl/worksheets/[^/]+\.xml")
 CELL = re.compile(rb"<(?:\w+:)?c\b[^>]*?\br=\"([A-Za-z]{1,7})(\d{1,9})\"")
 BLOCK_BYTES = 1 << 20
 LONGEST = 200
 """Bytes of a cell's first tag at most, which may begin in one block and end in the next."""
+ROW_RECORD, CELL_RECORDS = 0, 11
+"""Kinds of records of a binary sheet (MS-XLSB): the start of a row, and the last of those of cells."""
+LAST, LONGEST_HEAD = 0x7F, 10
+"""The largest last byte of a number in a record's head; bytes of a head and of the number behind it at most."""
+UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, NotImplementedError)
+"""What an archive raises that is damaged, has a password or is packed as none that is known."""
 
 
 @dataclass(slots=True)
 class Spread:
-    """The last row and column that have a cell, the cell that is farthest, and how many cells there are."""
+    """The last row and column of a sheet that have a cell, the farthest cell, and how many cells there are."""
 
+    name: str
     row: int = 0
     column: int = 0
     cells: int = 0
-    far: str = ""
+    far: tuple[int, int] = (0, 0)
 
-    def take(self, column: bytes, row: bytes) -> None:
-        """Count a cell."""
+    def take(self, row: int, column: int) -> None:
+        """Count a cell; rows and columns from 1 on."""
         self.cells += 1
-        across, down = column_number(column), int(row)
-        if across > self.column or down > self.row:
-            self.far = f"{column.decode()}{row.decode()}"
-        self.column, self.row = max(self.column, across), max(self.row, down)
+        if column > self.column or row > self.row:
+            self.far = row, column
+            self.row, self.column = max(self.row, row), max(self.column, column)
 
 
 def column_number(letters: bytes) -> int:
@@ -44,29 +53,127 @@ def column_number(letters: bytes) -> int:
     return number
 
 
+def column_letters(number: int) -> str:
+    """The letters of a column from 1 on: 1 is A, 27 is AA."""
+    letters = ""
+    while number:
+        number, last = divmod(number - 1, 26)
+        letters = chr(65 + last) + letters
+    return letters
+
+
 def require_dense(path: Path, members: Sequence[zipfile.ZipInfo]) -> None:
     """Raise InputError where a sheet's cells span far more cells than there are: one stray cell in a far corner."""
     for info in members:
-        if not SHEET.fullmatch(info.filename):
+        spreads = next((read for part, read in SHEETS.items() if part.fullmatch(info.filename)), None)
+        if spreads is None:
             continue
-        with zipfile.ZipFile(path) as archive, archive.open(info) as sheet:
-            found = Spread()
-            for cell in _cells(iter(lambda: sheet.read(BLOCK_BYTES), b"")):
-                found.take(*cell)
-        span = found.row * found.column
-        if span > HISTORY.spanned_cells and span > HISTORY.spanned_times * found.cells:
-            name = Path(info.filename).stem
-            seen = f"{path}, {name}: {found.cells} cells that span {span}, as far as cell {found.far}"
-            remedy = f"delete what stands alone far from the table, such as {found.far}, or save it as CSV"
-            raise InputError(seen, "a table without stray cells", remedy)
+        with suppress(*UNREADABLE), zipfile.ZipFile(path) as archive, archive.open(info) as sheet:
+            for found in spreads(sheet, PurePosixPath(info.filename).stem):
+                _require_dense(path, found)
 
 
-def _cells(blocks: Iterator[bytes]) -> Iterator[tuple[bytes, bytes]]:
-    """Column and row of each cell of a sheet's text."""
-    kept = b""
-    for block in blocks:
+def _require_dense(path: Path, found: Spread) -> None:
+    span = found.row * found.column
+    if span > HISTORY.spanned_cells and span > HISTORY.spanned_times * found.cells:
+        far = f"{column_letters(found.far[1])}{found.far[0]}"
+        seen = f"{path}, {found.name}: {found.cells} cells that span {span}, as far as cell {far}"
+        remedy = f"delete what stands alone far from the table, such as {far}, or save it as CSV"
+        raise InputError(seen, "a table without stray cells", remedy)
+
+
+def _of_xml(sheet: IO[bytes], name: str) -> Iterator[Spread]:
+    """The sheet of an xlsx or xlsm workbook."""
+    found, kept = Spread(name), b""
+    for block in iter(lambda: sheet.read(BLOCK_BYTES), b""):
         text = kept + block
         end = max(text.rfind(b">"), len(text) - LONGEST)
-        yield from (found.groups() for found in CELL.finditer(text[: end + 1]))  # type: ignore
+        for column, row in CELL.findall(text[: end + 1]):
+            found.take(int(row), column_number(column))
         kept = text[end + 1 :]
-    yield from (found.groups() for found in CELL.finditer(kept))  # type: ignore
+    yield found
+
+
+def _of_records(sheet: IO[bytes], name: str) -> Iterator[Spread]:
+    """The sheet of an xlsb workbook: a row begins with its number, a cell with its column, both from 0 on."""
+    found, row = Spread(name), 0
+    for kind, first in _records(sheet):
+        if kind == ROW_RECORD:
+            row = first + 1
+        elif kind <= CELL_RECORDS:
+            found.take(row, first + 1)
+    yield found
+
+
+def _records(sheet: IO[bytes]) -> Iterator[tuple[int, int]]:
+    """Kind of each record, and the number in the four bytes behind its head."""
+    kept, at = b"", 0
+    while True:
+        block = sheet.read(BLOCK_BYTES)
+        kept, at = kept[at:] + block, max(at - len(kept), 0)
+        end = len(kept) - (LONGEST_HEAD if block else 0)
+        while at < end:
+            kind, size = kept[at], kept[at + 1] if at + 1 < len(kept) else 0
+            begun = at + 2
+            if kind > LAST or size > LAST:
+                kind, begun = _number(kept, at, 2)
+                size, begun = _number(kept, begun, 4)
+            yield kind, int.from_bytes(kept[begun : begun + 4], "little")
+            at = begun + size
+        if not block:
+            return
+
+
+def _number(data: bytes, at: int, most: int) -> tuple[int, int]:
+    """A number of seven bits a byte, the lowest first, of so many bytes at most, and where the next begins."""
+    number = 0
+    for k, byte in enumerate(data[at : at + most]):
+        number |= (byte & LAST) << 7 * k
+        if byte <= LAST:
+            return number, at + k + 1
+    return number, at + most
+
+
+class _OpenDocument:
+    """Handlers of the elements of content.xml: tables, their rows and cells, each of which may stand for many."""
+
+    def __init__(self) -> None:
+        self.sheets = [Spread("")]
+        self._row = self._column = 0
+        self._rows = 1
+
+    def start(self, element: str, stated: Mapping[str, str]) -> None:
+        """Take a table, a row or a cell."""
+        if element == "table:table":
+            self.sheets.append(Spread(stated.get("table:name", "")))
+            self._row = 0
+        elif element == "table:table-row":
+            self._rows = _times(stated, "rows")
+            self._row, self._column = self._row + self._rows, 0
+        elif element in ("table:table-cell", "table:covered-table-cell"):
+            self._column += _times(stated, "columns")
+            if any(name.startswith("office:") or name == "table:formula" for name in stated):
+                self.sheets[-1].take(self._row, self._column)
+
+
+def _times(stated: Mapping[str, str], of: str) -> int:
+    """How many rows or columns an element stands for."""
+    text = stated.get(f"table:number-{of}-repeated", "")
+    return int(text) if text.isdecimal() and len(text) < 20 else 1
+
+
+def _of_open_document(sheet: IO[bytes], name: str) -> Iterator[Spread]:
+    """The sheets of an ods workbook."""
+    found, parser = _OpenDocument(), expat.ParserCreate()
+    parser.StartElementHandler = found.start
+    with suppress(expat.ExpatError):  # which its reader tells
+        parser.ParseFile(sheet)
+    yield from found.sheets
+
+
+SHEETS: dict[re.Pattern[str], Callable[[IO[bytes], str], Iterator[Spread]]] = {
+    re.compile(r"xl/worksheets/[^/]+\.xml"): _of_xml,
+    re.compile(r"xl/worksheets/[^/]+\.bin"): _of_records,
+    re.compile(r"content\.xml"): _of_open_document,
+}
+"""Parts of an archive that hold sheets, and how their cells are found."""

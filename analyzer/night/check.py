@@ -17,8 +17,9 @@ from analyzer.loop.quality import Prepared, prepare
 from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import no_loops
-from analyzer.night.asked import Asked, guarded
+from analyzer.night.asked import Asked
 from analyzer.night.nights import Plant
+from analyzer.night.opened import guarded
 from analyzer.words.experiments import found_lines
 from identification.errors import TriageError
 

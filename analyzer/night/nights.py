@@ -18,13 +18,10 @@ from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_setting
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec, spec_of
+from analyzer.night.asked import ALWAYS, Span
 from identification.errors import InputError
 from identification.models import Pid
 from identification.record import LoopRecord
-
-Span = tuple[float, float]
-"""Start and end of a span of time [s since 1970-01-01 UTC]."""
-ALWAYS: Span = (-math.inf, math.inf)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
+from functools import lru_cache
 
 from analyzer.explain.night import known
 from analyzer.limits import PAGES
@@ -19,6 +20,7 @@ from analyzer.pages.reading import (
     read_night,
     read_nights,
     read_trends,
+    told_of,
 )
 from analyzer.pages.words import ALL_LOOPS, pv_scale_of
 from analyzer.plantwide.view import GroupView, read_groups
@@ -121,11 +123,11 @@ def dated_pages(store: Store, name: str | None, written: Callable[[str], bool]) 
     left out of which `written` says that their page was written after their results."""
     last = name or store.require()
     nights = [n for n in store.nights() if n <= last][-PAGES.dated :]
-    sums = morning.read_sums(store, last)
+    sums, told = morning.read_sums(store, last), lru_cache(PAGES.usual_nights)(told_of)
     for night in nights:
         if night in nights[-2:] or not written(night):
             # loops' pages are the latest night's
-            shown = replace(read_night(store, night, PAGES.dated_loops), paged=())
+            shown = replace(read_night(store, night, PAGES.dated_loops, told=told), paged=())
             own = [s for s in sums if s.name <= night]
             found = morning.morning_page(shown, read_groups(store, night), own)
             links, choices = (*nights_around(nights, night), LATEST), nights_to_choose(nights, night)

@@ -248,15 +248,27 @@ def followers_under(rows: Sequence[Row]) -> list[Row]:
     return out + [r for rest in under.values() for r in rest]
 
 
-def read_night(store: Store, name: str | None, top: int, drawn: bool = True) -> ShownNight:
-    """What the morning page of a night needs, with trends of the worst loops if they are to be drawn."""
+def told_of(store: Store, night: str) -> list[dict[str, Any]]:
+    """What pages of later nights read of a night."""
+    return read_nights(store, [night], REMEMBERED)
+
+
+def read_night(
+    store: Store,
+    name: str | None,
+    top: int,
+    drawn: bool = True,
+    told: Callable[[Store, str], list[dict[str, Any]]] = told_of,
+) -> ShownNight:
+    """What the morning page of a night needs, with trends of the worst loops if they are to be drawn; `told` reads
+    nights before it, of which whoever asks for several nights keeps some."""
     nights = store.nights()
     night = name or store.require()
     store.read("nights", night, ["loop"])
     earlier = [n for n in nights if n < night]
     rows = worst_first(read_nights(store, [night], NIGHT_COLUMNS))
-    remembered = by_loop(read_nights(store, earlier[-PAGES.usual_nights :], REMEMBERED))
-    remembered = {loop: told for loop, told in remembered.items() if told[-1]["night"] == earlier[-1]}
+    remembered = by_loop([r for n in earlier[-PAGES.usual_nights :] for r in told(store, n)])
+    remembered = {loop: own for loop, own in remembered.items() if own[-1]["night"] == earlier[-1]}
     known = notes.read_notes(store.path)
     most = largest_loss(rows)
     looked = [

@@ -208,12 +208,10 @@ def _with_foresight(group: Group, beside: _Neighbours, limits: PlantLimits) -> G
     """A group with loops that move with it too loosely to be coherent, and yet foresee it: a source that sticks and
     slips without a rhythm moves others by what of it their filters let through."""
     clearest = sorted(group.waves.values(), key=lambda w: -w.prominence)[: limits.heard]
+    near = (beside.waves[k] for k in beside.near(next(iter(group.waves.values())).line, limits.near_period))
+    asked = [w for w in near if w.loop not in group.waves and w.harmonic == 1 and _shows(w, limits)]
     best: dict[str, tuple[float, Wave]] = {}
-    for k in beside.near(next(iter(group.waves.values())).line, limits.near_period):
-        wave = beside.waves[k]
-        if wave.loop in group.waves or wave.harmonic != 1 or not _shows(wave, limits):
-            continue
-        level = foresight(wave, clearest)
+    for wave, level in zip(asked, foresight(asked, clearest), strict=True):
         if level >= limits.foresight and level > best.get(wave.loop, (0.0, wave))[0]:
             best[wave.loop] = level, wave
     return group.with_lacking({loop: wave for loop, (_, wave) in best.items()}, dict.fromkeys(best, 0.0))

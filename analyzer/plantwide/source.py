@@ -22,6 +22,9 @@ from analyzer.plantwide.wave import Wave, in_steps
 from identification.record import Floats
 from identification.signals.cross_spectrum import Delay, band, granger_f, lag, tapered
 
+AT_ONCE = 64
+"""Waves whose foresight is worked out at a time."""
+
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
@@ -138,7 +141,8 @@ def _lag(one: Wave, other: Wave) -> Delay:
 
 def _foreseeing(waves: Sequence[Wave], asked: int | None = None) -> tuple[list[int], Floats]:
     """Which of some waves have trends whose steps lie on each other, and Granger's F of each on each, or of the pairs
-    of the one that is asked for, shape (k, k); none where fewer than two have, or over too few steps."""
+    of so many of the first with those behind them, shape (k, k); none where fewer than two have, or over too few
+    steps."""
     step = max((w.step_s for w in waves if w.trend.size), default=0.0)
     found: list[tuple[int, int, Floats]] = []
     for i, w in enumerate(waves):
@@ -151,7 +155,8 @@ def _foreseeing(waves: Sequence[Wave], asked: int | None = None) -> tuple[list[i
     if len(found) < 2 or end - begin < WAVES.least_steps:
         return [], np.zeros((0, 0))
     trends = np.array([x[begin - first : end - first] for _, first, x in found], float)
-    return [i for i, *_ in found], granger_f(trends, WAVES.foreseen, asked)
+    known = [i for i, *_ in found]
+    return known, granger_f(trends, WAVES.foreseen, asked and sum(i < asked for i in known))
 
 
 def foresees(waves: Sequence[Wave]) -> Floats:
@@ -166,10 +171,19 @@ def foresees(waves: Sequence[Wave]) -> Floats:
     return out
 
 
-def foresight(one: Wave, others: Sequence[Wave]) -> float:
-    """F with which one wave's past foresees others, in the median; 0 where theirs foresees it as well or better."""
-    known, f = _foreseeing([one, *others], 0)
-    if known[:1] != [0]:
-        return 0.0
-    forth, back = float(np.median(f[0, 1:])), float(np.median(f[1:, 0]))
-    return forth if forth > back else 0.0
+def foresight(ones: Sequence[Wave], others: Sequence[Wave]) -> Floats:
+    """F with which each wave's past foresees others, in the median, shape (k,); 0 where theirs foresees it as well or
+    better."""
+    out = np.zeros(len(ones))
+    alike: dict[tuple[float, int, int], list[int]] = {}
+    for i, one in enumerate(ones):
+        alike.setdefault((one.step_s, one.trend_first, one.trend.size), []).append(i)
+    for at in (same[k : k + AT_ONCE] for same in alike.values() for k in range(0, len(same), AT_ONCE)):
+        known, f = _foreseeing([*(ones[i] for i in at), *others], len(at))
+        if known[:1] == [0] and len(known) > len(at):
+            forth, back = (
+                np.median(f[: len(at), len(at) :], axis=1),
+                np.median(f[len(at) :, : len(at)], axis=0),
+            )
+            out[at] = np.where(forth > back, forth, 0.0)
+    return out

@@ -154,7 +154,7 @@ def stored_parts(path: Path, columns: Sequence[str] | None = None) -> Iterator[p
 
 
 def _of_loops(file: pq.ParquetFile, columns: list[str] | None, loops: Collection[str]) -> pa.Table:
-    """Rows of some loops; parts of the file whose loops lie before or behind all of these are not read."""
+    """Rows of some loops; parts of the file that hold none of them are not read."""
     names = file.schema_arrow.names
     if "loop" not in names:
         return file.read(columns=columns)  # which is refused
@@ -164,7 +164,8 @@ def _of_loops(file: pq.ParquetFile, columns: list[str] | None, loops: Collection
     for group in range(file.num_row_groups):
         ends = file.metadata.row_group(group).column(at).statistics
         known = ends is not None and ends.has_min_max and isinstance(ends.min, str)
-        if not known or (ends.min <= last and ends.max >= first):
+        near = not known or (ends.min <= last and ends.max >= first)
+        if near and rows_of_loops(file.read_row_group(group, columns=["loop"]), loops).num_rows:
             found.append(rows_of_loops(file.read_row_group(group, columns=[*asked, "loop"]), loops))
     return pa.concat_tables([t.select(asked) for t in found]).unify_dictionaries()
 

@@ -16,12 +16,12 @@ set -- "exports/$EXPORT" --loops loops.csv --timezone "$ZONE" --store store --jo
 [ -f changes.csv ] && set -- "$@" --changes changes.csv
 
 LOGGED=$(wc -c 2>/dev/null <triage.log || echo 0)
-$TRIAGE run "$@" 2>>triage.err
+$TRIAGE run "$@" >/dev/null 2>>triage.err
 STATUS=$?
 # killed, stopped by a signal, or a storage that failed for a while: what was done is kept, so one more try goes on
 if [ "$STATUS" -gt 2 ]; then
     [ "$STATUS" -eq 75 ] && sleep "${AGAIN_S:-600}"
-    $TRIAGE run "$@" --resume 2>>triage.err
+    $TRIAGE run "$@" --resume >/dev/null 2>>triage.err
     STATUS=$?
 fi
 # a Python that cannot start ends with 1, too: it is a night only where the log of this night says so

@@ -13,7 +13,6 @@ from functools import cache
 
 import numpy as np
 from numba import njit
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.fft import ifft, next_fast_len
 from scipy.special import betainccinv
@@ -169,37 +168,59 @@ RIDGE = 1e-9
 def granger_f(signals: Floats, lags: int, asked: int | None = None) -> Floats:
     """F statistics of every signal's past in foreseeing every other beside that one's own past.
 
-    signals : shape (k, n), samples of one clock; lags : samples of the past that are used; asked : the one signal
-    whose pairs are wanted, None for all pairs. Returns shape (k, k), F[i, j]: signal i foresees signal j; 0 on the
-    diagonal, for pairs that are not wanted, and everywhere where n is under four times the constants of a model.
+    signals : shape (k, n), samples of one clock; lags : samples of the past that are used; asked : so many of the
+    first signals, whose pairs with those behind them are wanted, None for all pairs. Returns shape (k, k), F[i, j]:
+    signal i foresees signal j; 0 on the diagonal, for pairs that are not wanted, and everywhere where n is under four
+    times the constants of a model.
     """
     k, n = signals.shape
     rows = n - lags
     out = np.zeros((k, k))
     if rows < 4 * (2 * lags + 1):
         return out
-    past = np.ascontiguousarray(sliding_window_view(signals[:, :-1], rows, axis=1)[:, ::-1])
-    past -= past.mean(axis=2, keepdims=True)
-    now = signals[:, lags:] - signals[:, lags:].mean(axis=1, keepdims=True)
-    of, by = np.array([(j, i) for j in range(k) for i in range(k) if i != j and asked in (None, i, j)]).T
-    flat, wanted = past.reshape(k * lags, rows), slice(None) if asked is None else slice(asked, asked + 1)
-    shared = (past[wanted].reshape(-1, rows) @ flat.T).reshape(-1, lags, k, lags).transpose(0, 2, 1, 3)
-    cross = (flat @ now.T).reshape(k, lags, k).transpose(2, 0, 1)
-    own = past @ past.transpose(0, 2, 1)
-    own[:, range(lags), range(lags)] *= 1.0 + RIDGE
-    own[:, range(lags), range(lags)] += 1e-300
-    power = np.einsum("jn,jn->j", now, now)
-    alone = power - _explained(own, cross[range(k), range(k)])
-    if asked is None:
-        beside = shared[of, by]
-    else:
-        beside = np.where((of == asked)[:, None, None], shared[0, by], shared[0, of].transpose(0, 2, 1))
-    gram = np.block([[own[of], beside], [beside.transpose(0, 2, 1), own[by]]])
-    both = power[of] - _explained(gram, np.concatenate((cross[of, of], cross[of, by]), axis=1))
-    left = both > 1e-12 * power[of]
-    of, by, both = of[left], by[left], both[left]
-    out[by, of] = np.maximum(alone[of] - both, 0.0) / lags / (both / (rows - 2 * lags - 1))
+    level = signals - signals.mean(axis=1, keepdims=True)
+    own = _lagged(level[:, None], level[:, None], lags)[:, 0, 0]
+    ridge = range(1, lags + 1)
+    own[:, ridge, ridge] *= 1.0 + RIDGE
+    own[:, ridge, ridge] += 1e-300
+    first, later = (level, level) if asked is None else (level[:asked], level[asked:])
+    between = _lagged(first[None], later[None], lags)[0]
+    one, other = np.indices(between.shape[:2]).reshape(2, -1) + np.array([[0], [asked or 0]])
+    once = one < other
+    one, other, pairs = one[once], other[once], between.reshape(-1, lags + 1, lags + 1)[once]
+    beside, alone = pairs[:, 1:, 1:], own[:, 0, 0] - _explained(own[:, 1:, 1:], own[:, 1:, 0])
+    for of, by, shared, cross in (
+        (other, one, beside.transpose(0, 2, 1), pairs[:, 1:, 0]),
+        (one, other, beside, pairs[:, 0, 1:]),
+    ):
+        gram = np.block([[own[of, 1:, 1:], shared], [shared.transpose(0, 2, 1), own[by, 1:, 1:]]])
+        power = own[of, 0, 0]
+        both = power - _explained(gram, np.concatenate((own[of, 1:, 0], cross), axis=1))
+        left = both > 1e-12 * power
+        gained = np.maximum(alone[of[left]] - both[left], 0.0) / lags
+        out[by[left], of[left]] = gained / (both[left] / (rows - 2 * lags - 1))
     return out
+
+
+def _lagged(x: Floats, y: Floats, lags: int) -> Floats:
+    """Sums of products of signals with others, each as far back as every number of samples up to `lags`, about the
+    means: those of the first numbers, and what one sample more at the start and one fewer at the end makes of them.
+
+    x, y : shapes (s, a, n) and (s, b, n). Returns shape (s, a, b, lags + 1, lags + 1).
+    """
+    n = x.shape[-1]
+    back = [slice(lags - k, n - k) for k in range(lags + 1)]
+    out = np.empty((*x.shape[:2], y.shape[1], lags + 1, lags + 1))
+    turned = y.transpose(0, 2, 1)
+    for k in range(lags + 1):
+        out[..., 0, k] = x[..., back[0]] @ turned[:, back[k]]
+        out[..., k, 0] = x[..., back[k]] @ turned[:, back[0]]
+    begun, ended = y[:, None, :, lags - 1 :: -1][..., :lags], y[:, None, :, : n - lags - 1 : -1]
+    for k in range(1, lags + 1):
+        gone = x[..., lags - k, None, None] * begun - x[..., n - k, None, None] * ended
+        out[..., k, 1:] = out[..., k - 1, :-1] + gone
+    means = [np.stack([z[..., part].sum(axis=-1) for part in back], axis=-1) for z in (x, y)]
+    return out - means[0][:, :, None, :, None] * means[1][:, None, :, None, :] / (n - lags)
 
 
 def _explained(gram: Floats, cross: Floats) -> Floats:

@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from workbooks import binary_book, open_book, open_row, packed
 
 KINDS: dict[str, Callable[[], bytes]] = {}
 """File names, and what makes the bytes of each."""
@@ -63,20 +64,17 @@ def texts(**of: str) -> None:
         KINDS[f"{stem}.{ending}"] = lambda text=text: text.encode("utf-8", "surrogatepass")  # type: ignore
 
 
-def packed(members: dict[str, bytes | str], method: int = zipfile.ZIP_DEFLATED) -> bytes:
-    """A zip archive."""
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w", method) as archive:
-        for name, data in members.items():
-            archive.writestr(name, data)
-    return out.getvalue()
-
-
 def book(cells: str, **more: str) -> bytes:
     """A workbook whose sheet holds some XML of rows."""
     main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
     sheet = f'<?xml version="1.0"?><worksheet xmlns="{main}"><sheetData>{cells}</sheetData></worksheet>'
     return packed({**BOOK, "xl/worksheets/sheet1.xml": sheet, **more})
+
+
+def _members(data: bytes) -> dict[str, bytes]:
+    """What an archive holds, by name."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
 
 
 def cell(at: str, value: object = 1) -> str:
@@ -259,6 +257,68 @@ def _() -> bytes:
 @kind("beyond-last-cell.xlsx")
 def _() -> bytes:
     return book(f'<row r="1">{cell("A1")}</row><row r="4294967295">{cell("ZZZZZZ4294967295")}</row>')
+
+
+@kind("far-cell.xlsb")
+def _() -> bytes:
+    return binary_book([(0, 0, 1.0), (0, 1, 1.0), (199_999, 2000, 1.0)])
+
+
+@kind("beyond-last-cell.xlsb")
+def _() -> bytes:
+    return binary_book([(0, 0, 1.0), (2**32 - 1, 2**32 - 1, 1.0)])
+
+
+@kind("cut-sheet.xlsb")
+def _() -> bytes:
+    members = {name: data[: len(data) - 9] for name, data in _members(binary_book([(0, 0, 1.0)])).items()}
+    return packed(members)
+
+
+@kind("far-cell.ods")
+def _() -> bytes:
+    return open_book(open_row(1.0, 1.0) + open_row(1, times=200_000) + open_row(2000, 1.0))
+
+
+@kind("cells-without-end.ods")
+def _() -> bytes:
+    one = '<table:table-cell table:number-columns-repeated="99999999999" office:value-type="float" office:value="1"/>'
+    return open_book(f'<table:table-row table:number-rows-repeated="999999999999">{one}</table:table-row>')
+
+
+@kind("rows-without-end.ods")
+def _() -> bytes:
+    return open_book(open_row(1.0, 1.0, times=10**18))
+
+
+@kind("laughs.ods")
+def _() -> bytes:
+    entities = "".join(f'<!ENTITY l{k} "{f"&l{k - 1};" * 10}">' for k in range(1, 10))
+    return packed({"content.xml": f'<!DOCTYPE x [<!ENTITY l0 "lol">{entities}]><x>&l9;</x>'})
+
+
+@kind("cut-xml.ods")
+def _() -> bytes:
+    content = _members(open_book(open_row(1.0, 1.0) * 50))["content.xml"]
+    return packed(
+        {"mimetype": "application/vnd.oasis.opendocument.spreadsheet", "content.xml": content[:3000]}
+    )
+
+
+@kind("flipped.xlsx")
+def _() -> bytes:
+    data = bytearray(book("".join(f'<row r="{k}">{cell(f"A{k}", k)}</row>' for k in range(1, 3000))))
+    for at in range(data.find(b"sheet1.xml"), len(data) // 2, 97):
+        data[at] ^= 0x5A
+    return bytes(data)
+
+
+@kind("far-cell-elsewhere.xlsx")
+def _() -> bytes:
+    members = _members(book(f'<row r="1">{cell("A1")}</row><row r="1048576">{cell("XFD1048576")}</row>'))
+    sheet, listed = "xl/worksheets/sheet1.xml", "xl/_rels/workbook.xml.rels"
+    members["xl/elsewhere"] = members.pop(sheet)
+    return packed({**members, listed: members[listed].replace(b"worksheets/sheet1.xml", b"elsewhere")})
 
 
 @kind("false-shared-strings.xlsx")

@@ -256,7 +256,8 @@ def test_progress_counts_loops_of_chunks_in_hand(night, tmp_path):
 
 
 def test_a_run_says_at_once_that_it_has_begun_and_what_takes_long(capsys, monkeypatch):
-    """A list of tenths begins with none, and says once that a first run compiles where nothing is done for long."""
+    """A list of tenths begins with none, says once that a first run compiles where nothing is done for long, and how
+    far it is where nothing new is done for a minute."""
     told = options._tenths("loops")
     told(0, 40)
     monkeypatch.setattr(options, "COMPILING_S", -1.0)
@@ -266,6 +267,33 @@ def test_a_run_says_at_once_that_it_has_begun_and_what_takes_long(capsys, monkey
     assert lines[0] == "loops: 0 of 40"
     assert "compiles" in lines[1]
     assert lines[2:] == ["loops: 4 of 40", "loops: 40 of 40"]
+    monkeypatch.setattr(options, "STILL_S", -1.0)
+    told(40, 40)
+    assert capsys.readouterr().err.startswith("loops: 40 of 40 after ")
+
+
+def test_a_run_begins_with_a_line_before_it_reads(tmp_path):
+    """What is read stands on stderr before anything that takes long is imported, in under two seconds of work."""
+    export, seen = tmp_path / "day.csv", tmp_path / "seen"
+    export.write_text("timestamp,FIC1.PV\n")
+    show = f"""
+import sys, time
+from contextlib import contextmanager
+import analyzer.cli, analyzer.commands.run as run
+@contextmanager
+def watched(what):
+    heavy = sorted({{"numba", "pandas", "scipy"}} & set(sys.modules))
+    open({str(seen)!r}, "w").write(f"{{what}}|{{heavy}}|{{time.process_time()}}")
+    yield
+run.watched = watched
+analyzer.cli.main()
+"""
+    told = [sys.executable, "-c", show, "run", str(export), "--store", str(tmp_path / "store")]
+    subprocess.run(told, capture_output=True, check=False)
+    what, heavy, processor_s = seen.read_text().split("|")
+    assert what == f"reading {export}"
+    assert heavy == "[]"
+    assert float(processor_s) < 2.0
 
 
 @pytest.mark.slow

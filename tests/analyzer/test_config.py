@@ -14,7 +14,8 @@ from analyzer.cli import main
 from analyzer.config import Config, configured, limit_of, limits_document, read_config
 from analyzer.explain.case import asked_cases, whole
 from analyzer.loops.changes import TuningChange
-from analyzer.night.asked import Asked, guarded
+from analyzer.night.asked import Asked
+from analyzer.night.opened import guarded
 from analyzer.store.store import Store
 from proofs.plant import START_S, Sketch, simulate, write_export
 from tests.reports.small_store import small_store

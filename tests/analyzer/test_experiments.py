@@ -14,6 +14,7 @@ from analyzer.cli import main
 from analyzer.config import Config
 from analyzer.loop.experiments import learned
 from analyzer.night.asked import asked_of
+from analyzer.night.opened import opened
 
 INPUTS = Path(__file__).parents[2].parent / "shared" / "inputs"
 shared = pytest.mark.skipif(
@@ -31,7 +32,7 @@ def said(*arguments):
 def taught(name, loops=None):
     """What the experiments of a file of the study tell of its one loop."""
     export = INPUTS / f"{name}.csv"
-    plant = asked_of([export], loops and INPUTS / loops, None, Config()).opened()
+    plant = opened(asked_of([export], loops and INPUTS / loops, None, Config()))
     one = plant.last_night(plant.loops[0])
     return learned(one.spec, plant.trends(one.spec.tags, one.night), one.prepared, plant.config)
 

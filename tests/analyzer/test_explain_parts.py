@@ -16,8 +16,9 @@ from analyzer.history.series import Series
 from analyzer.limits import EXPLAIN
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.spec import LoopSpec
-from analyzer.night.asked import Asked, guarded
+from analyzer.night.asked import Asked
 from analyzer.night.nights import ALWAYS
+from analyzer.night.opened import guarded
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
 from tests.analyzer.test_explain import asked

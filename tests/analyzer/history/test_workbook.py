@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import datetime as dt
+import io
+import random
 import sys
 import zipfile
 from pathlib import Path
@@ -10,9 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from workbooks import binary_book, open_book, open_row, record
 
 from analyzer.cli import main
+from analyzer.history import spans
 from analyzer.history.export import open_export
+from analyzer.history.spans import require_dense
 from analyzer.history.table import ReadOptions
 from identification.errors import InputError
 
@@ -60,6 +65,53 @@ def test_serial_days_without_a_format_are_stamps(tmp_path):
     series = open_export([write(tmp_path / "day.xlsx", {"Data": rows})]).read(["FIC1.PV"])["FIC1.PV"]
     begin = BEGIN.replace(tzinfo=dt.UTC).timestamp()
     np.testing.assert_allclose(series.stamp_s, begin + 5 * np.arange(N), atol=0.01)
+
+
+def test_binary_and_open_workbooks_read_as_their_cells(tmp_path):
+    """The sheet of an xlsb and of an ods workbook, each by its own specification, reads as a sheet of xlsx does."""
+    first = (BEGIN - dt.datetime(1899, 12, 30)).days
+    head = ["Time", "FIC1.PV", "FIC1.OP"]
+    rows = [head, *([first + 5 * k / 86400, float(PV[k]), float(OP[k])] for k in range(N))]
+    cells = [(r, c, value) for r, row in enumerate(rows) for c, value in enumerate(row)]
+    (tmp_path / "day.xlsb").write_bytes(binary_book(cells))
+    (tmp_path / "day.ods").write_bytes(open_book("".join(open_row(*row) for row in rows)))
+    for name in ("day.xlsb", "day.ods"):
+        series = open_export([tmp_path / name]).read(["FIC1.PV"])["FIC1.PV"]
+        np.testing.assert_allclose(series.value, PV)
+        np.testing.assert_allclose(
+            series.stamp_s, BEGIN.replace(tzinfo=dt.UTC).timestamp() + 5 * np.arange(N), atol=0.01
+        )
+
+
+@pytest.mark.parametrize("far", [(9, 20), (199_999, 2000)])
+def test_a_stray_cell_is_named_where_it_makes_a_sheet_vast(tmp_path, far):
+    """A cell beside a small table is read over; one that spans four hundred million cells is refused by its name."""
+    row, column = far
+    table = [(r, c, float(10 * r + c)) for r in range(5) for c in range(3)]
+    rows = "".join(open_row(*(float(10 * r + c) for c in range(3))) for r in range(5))
+    books = {
+        "x.xlsb": binary_book([*table, (row, column, 7.0)]),
+        "x.ods": open_book(rows + open_row(1, times=row - 5) + open_row(column, 7.0)),
+    }
+    for name, data in books.items():
+        (tmp_path / name).write_bytes(data)
+        with zipfile.ZipFile(tmp_path / name) as archive:
+            members = archive.infolist()
+        if row < 100:
+            require_dense(tmp_path / name, members)
+        else:
+            with pytest.raises(InputError, match="16 cells that span 400200000, as far as cell BXY200000"):
+                require_dense(tmp_path / name, members)
+
+
+@pytest.mark.parametrize("block", [11, 64, 1000])
+def test_records_of_a_binary_sheet_are_found_wherever_blocks_end(monkeypatch, block):
+    """Kinds and first numbers of records come back, whatever parts of the sheet are read at a time."""
+    rng = random.Random(block)
+    wrote = [(rng.randrange(16_384), rng.randbytes(rng.choice([4, 8, 130, 5000]))) for _ in range(40)]
+    monkeypatch.setattr(spans, "BLOCK_BYTES", block)
+    found = spans._records(io.BytesIO(b"".join(record(kind, data) for kind, data in wrote)))
+    assert list(found) == [(kind, int.from_bytes(data[:4], "little")) for kind, data in wrote]
 
 
 def test_a_long_sheet_reads_with_its_quality(tmp_path):

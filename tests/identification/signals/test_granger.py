@@ -36,14 +36,14 @@ def test_every_pair_is_statsmodels_test(lags):
             assert found[i, j] == pytest.approx(one[lags][0]["ssr_ftest"][0], rel=1e-4, abs=1e-4)
 
 
-@pytest.mark.parametrize("asked", [0, 1, 2])
-def test_pairs_of_one_signal_are_those_of_all_pairs(asked):
-    """The pairs of one signal have the F that they have among all pairs, and no other pair has any."""
+@pytest.mark.parametrize("asked", [1, 2])
+def test_pairs_of_the_first_signals_are_those_of_all_pairs(asked):
+    """Pairs of the first signals with the others have the F that they have among all, and no other pair has any."""
     whole, found = granger_f(coupled(4), 12), granger_f(coupled(4), 12, asked)
-    assert found[asked] == pytest.approx(whole[asked], rel=1e-9)
-    assert found[:, asked] == pytest.approx(whole[:, asked], rel=1e-9)
-    others = np.delete(np.delete(found, asked, 0), asked, 1)
-    assert not others.any()
+    wanted = np.zeros((3, 3), dtype=bool)
+    wanted[:asked, asked:] = wanted[asked:, :asked] = True
+    assert found[wanted] == pytest.approx(whole[wanted], rel=1e-9)
+    assert not found[~wanted].any()
 
 
 def test_what_drives_foresees():

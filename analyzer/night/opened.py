@@ -1,0 +1,196 @@
+"""The export that is asked for, opened: its loops, what there is to say of them, and the worker that reads it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+from weakref import finalize
+
+from analyzer.config import WorkerLimits
+from analyzer.finder.draft import Row, draft, found_told
+from analyzer.history.export import Export, ReadOptions, open_export
+from analyzer.history.files import own_scratch
+from analyzer.history.series import Series
+from analyzer.limits import HISTORY
+from analyzer.loops.changes import TuningChange
+from analyzer.loops.spec import ROLES, LoopSpec, unknown_columns
+from analyzer.loops.tags import find_loops, match, read_loops
+from analyzer.night.asked import Asked
+from analyzer.night.nights import Plant
+from analyzer.night.workers import Died, Workers
+from analyzer.places import is_remote
+from identification.errors import InputError
+
+MOST_NAMES = 10
+"""Loops that are named in a note; the rest is counted."""
+
+
+def opened(asked: Asked) -> Plant:
+    """The export and its loops, found by their tags' endings where no loops.csv is given, and what there is to
+    say of them and of the changes."""
+    stated = (
+        () if asked.loops is None else read_loops(asked.loops, asked.zone, asked.reading.get("day_first"))
+    )
+    tags = frozenset(tag for s in stated for role in ROLES if (tag := getattr(s, role)))
+    source = open_export(list(asked.export), ReadOptions(**asked.reading, stated=tags))
+    notes: tuple[str, ...] = ()
+    if asked.loops is None and asked.finding:
+        rows = draft(source, (), asked.span)
+        specs = tuple(row.as_run for row in rows if row.sure)
+        notes = found_told(rows)
+    elif asked.loops is None:
+        specs = find_loops(source.tags)
+    else:
+        specs, notes = match(stated, source.tags)
+        own = unknown_columns(stated)
+        if own:
+            kept = (
+                f"{asked.loops}: columns {', '.join(own)} mean nothing here and are kept as the plant's own"
+            )
+            notes = (kept, *notes)
+    specs, currents = in_milliamperes(source, specs)
+    notes = (*notes, *currents, *_of_no_loop(asked.changes, specs))
+    return Plant(source, specs, asked.config, asked.span, asked.changes, asked.zone, notes)
+
+
+def drafted(asked: Asked, told: Callable[[int, int], None]) -> list[Row]:
+    """The rows of a draft of loops.csv, those of a given one first; `told` is told of tags read, and of all. Raises
+    InputError where the export cannot be used."""
+    plant = guarded(asked)
+    return draft(plant.export, () if asked.loops is None else plant.specs, asked.span, told)
+
+
+def in_milliamperes(
+    source: Export, specs: tuple[LoopSpec, ...]
+) -> tuple[tuple[LoopSpec, ...], tuple[str, ...]]:
+    """The loops, marked where their OPs look like currents, and a note on that: where no range of OP is stated, of
+    two or more loops, and each OP that is looked at lies within the range of a signal of 4 to 20 mA."""
+    unstated = [
+        s for s in specs if s.op and s.pv and s.stated.isdisjoint(("op_lo", "op_hi")) and s.op_hi == 100.0
+    ]
+    looked_at = unstated[: HISTORY.ma_loops]
+    if len(unstated) < 2 or not all(
+        _lies_within(source, str(s.op), HISTORY.ma_low, HISTORY.ma_high) for s in looked_at
+    ):
+        return specs, ()
+    said = f"OP of {len(unstated)} loops lies between 4 and 20, like mA: nothing is told in % of OP; state "
+    marked = tuple(replace(s, in_ma=True) if s in unstated else s for s in specs)
+    return marked, (f"{said}op_lo 4 and op_hi 20 in loops.csv, or 0 and 100 where it is percent",)
+
+
+def _lies_within(source: Export, tag: str, low: float, high: float) -> bool:
+    """Whether all good values of a tag lie between two others."""
+    with suppress(InputError):  # a damaged file is told of where its loop is assessed
+        series = source.read([tag])[tag]
+        value = series.value[~series.bad]
+        return value.size > 0 and bool(low <= value.min() and value.max() <= high)
+    return False
+
+
+def _of_no_loop(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> tuple[str, ...]:
+    """A note on changes of loops that are not among those that are read."""
+    strange = sorted({change.loop for change in changes} - {spec.loop for spec in specs})
+    more = f" and {len(strange) - MOST_NAMES} more" if len(strange) > MOST_NAMES else ""
+    text = f"{', '.join(strange[:MOST_NAMES])}{more}: no such loop is read; these changes are left aside"
+    return (f"--changes: {text}: correct the name",) if strange else ()
+
+
+def opened_apart(asked: Asked) -> Plant:
+    """What is asked, opened in a worker process: a damaged file may take memory or time without end. Raises
+    InputError where the export cannot be used, or the process that read it died."""
+    with Workers(1, find_out, _allowed(asked)) as workers:
+        workers.submit(asked)
+        (found,) = workers.results()
+    if isinstance(found, Died):
+        raise _ended(asked.export[0], found.why)
+    return found
+
+
+def _ended(path: Path, why: str) -> InputError:
+    seen = f"{path}: reading it ended without a result ({why})"
+    remedy = "export them again or in parts; 'triage check FILE' on each finds the one"
+    return InputError(seen, "files that are whole and fit into memory", remedy)
+
+
+def guarded(asked: Asked) -> Plant:
+    """The same, its samples read in a worker process too, whenever they are asked for; errors as of `opened_apart`,
+    also where samples are read."""
+    scratch = asked.reading.get("scratch") or own_scratch()  # gone with this process, however a worker ends
+    plant = opened_apart(replace(asked, reading={**asked.reading, "scratch": scratch}))
+    return replace(plant, export=Guarded.of(plant.export, asked.config.workers))
+
+
+class Guarded(Export):
+    """An export whose samples are read in a worker process with limits of memory and time."""
+
+    __slots__ = ("__weakref__", "_plain", "_told", "_worker")
+    _plain: Export
+    _told: list[Export]
+    _worker: Workers[Any, dict[str, Series]]
+
+    @classmethod
+    def of(cls, plain: Export, limits: WorkerLimits) -> Guarded:
+        """An export, read under limits; the worker ends with it."""
+        made = cls(**{f.name: getattr(plain, f.name) for f in fields(plain)})
+        worker = Workers(1, read_apart, limits)
+        for name, value in (("_plain", plain), ("_told", []), ("_worker", worker)):
+            object.__setattr__(made, name, value)
+        finalize(made, worker.__exit__)
+        return made
+
+    def read(self, tags: Sequence[str]) -> dict[str, Series]:
+        self._check_known(tags)
+        self._worker.submit((None if self._told else self._plain, tuple(tags)))
+        (found,) = self._worker.results()
+        if isinstance(found, Died):
+            self._told.clear()
+            raise _ended(self.sources[self._homes[tags[0]][0]].path, found.why)
+        self._told[:] = [self._plain]
+        self._met.update({tag: series.found for tag, series in found.items() if series.found})
+        return found
+
+
+_reading: list[Export] = []
+"""The export that a worker process reads."""
+
+
+def read_apart(given: tuple[Export | None, Sequence[str]], began: Callable[[int], None]) -> dict[str, Series]:
+    """What a worker reads of an export, which it is given once."""
+    _be_silent()
+    export, tags = given
+    if export is not None:
+        _reading[:] = [export]
+    return _reading[0].read(tags)
+
+
+def _be_silent() -> None:
+    """Let nothing of a library reach the terminal, such as the last words of a reader that aborts."""
+    with open(os.devnull, "wb") as nowhere:
+        os.dup2(nowhere.fileno(), 2)
+
+
+def _allowed(asked: Asked) -> WorkerLimits:
+    """What opening the export may cost, by its size; of shared storage the copying is not known beforehand."""
+    near = [path for path in asked.export if not is_remote(path)]
+    files = [file for path in near for file in (path.rglob("*") if path.is_dir() else [path])]
+    limits = asked.config.opening
+    more_s = sum(file.stat().st_size for file in files if file.is_file()) / limits.bytes_per_s
+    more_s += limits.fetched_s * (len(near) < len(asked.export))
+    taking = {"processor_s": limits.processor_s + more_s, "wall_s": limits.wall_s + 6.0 * more_s}
+    return replace(asked.config.workers, memory_mb=limits.memory_mb, **taking)
+
+
+def find_out(asked: Asked, began: Callable[[int], None]) -> Plant:
+    """What a worker finds out about an export, its span of time included."""
+    _be_silent()
+    plant = opened(asked)
+    for spec in plant.specs:
+        if spec.pv is not None:
+            plant.export.span(spec.pv)
+    with suppress(InputError):  # of files without a loop it is nobody's fault
+        plant.export.span()
+    return plant
