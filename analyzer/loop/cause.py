@@ -117,17 +117,19 @@ def needed(m: Measured, limits: CauseLimits, oscillating: bool) -> float:
     return limits.needed(m.play.count, m.excited, oscillating)
 
 
-def _crossed(m: Measured, limits: CauseLimits) -> bool:
-    """Whether OP goes far enough to move a stem behind a fault of the width found: over all of its range,
-    tails too."""
-    return m.play.valve.stickband <= limits.widest * float(np.ptp(m.window.op))
+def _crossed(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
+    """Whether OP goes far enough to move a stem behind a fault of the width found: over all of its range, tails too,
+    in a cycle; of a calm loop, whose tails are kicks of its set point, over its usual range."""
+    return m.play.valve.stickband <= limits.widest * float(np.ptp(m.window.op)) and (
+        oscillating or m.size <= 1.0
+    )
 
 
 def speaks(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
     """Whether PV speaks for a fault of the valve: enough evidence, a process that goes the controller's way, and a
     width that OP has crossed."""
     wrong_way = m.controller is not None and m.controller.kp * m.play.gain < 0
-    return m.evidence >= needed(m, limits, oscillating) and not wrong_way and _crossed(m, limits)
+    return m.evidence >= needed(m, limits, oscillating) and not wrong_way and _crossed(m, limits, oscillating)
 
 
 def agrees(m: Measured, limits: CauseLimits) -> bool:

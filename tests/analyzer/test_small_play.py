@@ -5,9 +5,12 @@ Loops are stepped by hand here: an integrating process, a play and a PI law, sha
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from analyzer import api
 from analyzer.loop.assess import Assessment
 from analyzer.loop.quality import prepare
 from analyzer.night.chunk import assess_loop
@@ -65,3 +68,15 @@ def test_a_load_that_swings_a_worn_valve_is_not_the_valve(seed: int) -> None:
     found = tank(0.012, 0.6, 400.0, half, wandering(seed) + sine, seed)
     assert found.oscillations.first is not None
     assert found.verdict.cause != "valve"
+
+
+LEVEL = Path(__file__).parents[2].parent / "shared" / "inputs" / "p-only-level-repair-valve"
+
+
+@pytest.mark.skipif(not LEVEL.is_dir(), reason="needs the recorded inputs beside the repository")
+def test_a_play_wider_than_op_of_a_calm_loop_is_none() -> None:
+    """A sound P-only level whose set point kicks OP is blamed for no play that is wider than OP's usual range."""
+    record = api.read(LEVEL / "export.parquet", loops=LEVEL / "loops.csv").loop("TIC25")
+    found = api.assess(record).verdict
+    assert found.rests_on.size > 1.0
+    assert (found.cause, found.fault) == ("none", "none")
