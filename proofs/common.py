@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import subprocess
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,9 @@ def parser_of(about: str | None, **defaults: Any) -> argparse.ArgumentParser:
             made.add_argument(f"--{name}", action="store_true")
         else:
             several = isinstance(default, list)
-            kind = type(default[0]) if several else Path if isinstance(default, Path) else type(default)
+            kind = (
+                type((default or [0])[0]) if several else Path if isinstance(default, Path) else type(default)
+            )
             made.add_argument(f"--{name}", type=kind, default=default, nargs="+" if several else None)
     return made
 
@@ -45,8 +48,19 @@ def table(heads: str, rows: Iterable[Iterable[object]], numbers: bool = False) -
     return "\n".join([f"| {heads} |", rule, *(f"| {' | '.join(map(str, cells))} |" for cells in rows)])
 
 
+def _commit() -> list[str]:
+    """The sentence that names the commit of the code, none where git or its history is missing."""
+    asked = ["git", "describe", "--always", "--dirty=, changed since"]
+    try:
+        found = subprocess.run(asked, cwd=Path(__file__).parent, capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return []
+    return [f"Measured with the code of commit {found.stdout.strip()}."]
+
+
 def publish(file: str | Path, title: str, *parts: str) -> None:
-    """Write a page of these paragraphs beside the proof (or to a file of another name), and print it."""
-    text = "\n\n".join([f"# {title}", *(p.rstrip() for p in parts)]) + "\n"
+    """Write a page of these paragraphs beside the proof (or to a file of another name), and print it; it says of which
+    commit it is, where git knows."""
+    text = "\n\n".join([f"# {title}", *_commit(), *(p.rstrip() for p in parts)]) + "\n"
     Path(file).with_suffix(".md").write_text(text, encoding="utf-8")
     print(text)

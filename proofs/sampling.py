@@ -1,9 +1,10 @@
-"""Worn valves by the interval of the rows: python -m proofs.sampling FOLDER ... [--every 1 10 30]
+"""Worn valves by the interval of the rows: python -m proofs.sampling FOLDER ... [--every 1 10 30] [--seed 51 52]
 
-Folders of plants as ../shared/plants has them (export.parquet, loops.csv, truth.json). One row in so many is kept of
-each loop whose valve is worn, and the loop is assessed. Counted are loops whose cycle has fifteen rows or more at
-that interval: named as the valve's fault, width of the play or stickband within 15 %, slope within 25 %, dead time
-within 30 % or half a row, and the 90 % interval of the width holding the truth. Writes proofs/sampling.md.
+Folders of plants as ../shared/plants has them (export.parquet, loops.csv, truth.json); with --seed worn valves of
+benchmarks/world. One row in so many is kept of each loop whose valve is worn, and the loop is assessed. Counted are
+loops whose cycle has fifteen rows or more at that interval: named as the valve's fault, width of the play or stickband
+within 15 %, slope within 25 %, dead time within 30 % or half a row, and the 90 % interval of the width holding the
+truth. Writes proofs/sampling.md.
 """
 
 from __future__ import annotations
@@ -16,16 +17,22 @@ from multiprocessing import Pool
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pyarrow.parquet as pq
 
 from analyzer import api
 from analyzer.loop.decisions import Cause
 from analyzer.loop.identified import intervals
+from benchmarks.world.__main__ import export
+from benchmarks.world.draw import Drawn, drawn, run
+from benchmarks.world.recorder import recorded
 from identification.errors import NotAssessedError
 from proofs.common import command, command_line, publish
 
 ROWS = 15
 """Rows a cycle from which a loop counts."""
+WORN = 8
+"""Valves with play, and as many that stick, of one draw of the world."""
 KINDS = ("named", "width", "slope", "dead time", "interval")
 
 
@@ -68,17 +75,49 @@ def of_plant(folder: Path, every: int, jobs: int) -> Counter[str]:
             return sum((x.get() for x in each), Counter())
 
 
+def of_world(seed: int, every: int, jobs: int) -> Counter[str]:
+    """Counts of the worn valves of one draw of benchmarks/world at one interval."""
+    loops = drawn(seed, WORN, ("backlash", "stiction"))
+    with tempfile.TemporaryDirectory() as temporary, Pool(jobs) as pool:
+        folder = Path(temporary)
+        stated = [{"loop": d.name, "pv_lo": 0, "pv_hi": 100, **settings(d)} for d in loops]
+        pd.DataFrame(stated).to_csv(folder / "loops.csv", index=False)
+        each = []
+        for d in loops:
+            (folder / d.name).mkdir()
+            (file,) = export(folder / d.name, {d.name: recorded(run(d), f"every {every} s", d.seed)})
+            truth = {
+                "backlash": d.valve.band,
+                "K": d.process.gain,
+                "T": d.process.lag_s or 1.0,
+                "L": d.process.dead_s,
+            }
+            each.append(pool.apply_async(judged, (d.name, file, folder / "loops.csv", truth, every)))
+        return sum((x.get() for x in each), Counter())
+
+
+def settings(d: Drawn) -> dict[str, float]:
+    """What loops.csv states of a loop's controller."""
+    return {"kp": d.controller.kp, "ti": d.controller.ti_s, "scan_s": d.controller.scan_s}
+
+
 def main() -> None:
     """Count each plant at each interval and write the table beside this file."""
-    options = command_line(__doc__, folders="+", every=[1, 10, 30], jobs=2)
+    options = command_line(__doc__, folders="*", every=[1, 10, 30], seed=[], jobs=2)
     lines = ["| plant | every | loops | " + " | ".join(KINDS) + " |", "|---|--:|" + "--:|" * (1 + len(KINDS))]
     for folder in options.folders:
         for every in options.every:
             counts = of_plant(folder, every, options.jobs)
             cells = " | ".join(str(counts[k]) for k in KINDS)
             lines.append(f"| {folder.name} | {every} s | {counts['loops']} | {cells} |")
+    for seed in options.seed:
+        for every in options.every:
+            counts = of_world(seed, every, options.jobs)
+            cells = " | ".join(str(counts[k]) for k in KINDS)
+            lines.append(f"| world {seed} | {every} s | {counts['loops']} | {cells} |")
     places = (f"../shared/plants/{f.name}" for f in options.folders)
-    publish(__file__, "Worn valves by the interval of the rows", command(__file__, *places), "\n".join(lines))
+    asked = command(__file__, *places, **({"seed": options.seed} if options.seed else {}))
+    publish(__file__, "Worn valves by the interval of the rows", asked, "\n".join(lines))
 
 
 if __name__ == "__main__":

@@ -383,7 +383,9 @@ def with_worn_valve(verdict: Verdict, period_s: float, limits: CauseLimits) -> V
     m = verdict.measured
     if m is None or verdict.cause is Cause.VALVE or m.window.position is not None:
         return verdict
-    if verdict.cause is Cause.TUNING and m.evidence <= 0.0:  # ringing is no line: both ways of looking must see it
+    if (
+        verdict.cause is Cause.TUNING and m.evidence <= 0.0
+    ):  # ringing is no line: both ways of looking must see it
         return verdict
     found = beside_line(m.linear, m.play, period_s)
     if not is_worn_beside(found, m, limits):

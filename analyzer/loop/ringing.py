@@ -56,7 +56,7 @@ class Ringing:
         evidence, for that fault under a free noise model [nat]; a fault that explains less than a line of the load
         is neither.
         """
-        faulty = min(evidence, self.valve_nat) >= max(self.line_needed(limits), self.line_nat)
+        faulty = min(evidence, self.valve_nat) >= max(limits.evidence, self.line_nat)
         if math.isinf(self.ms) and m.limited:  # it must cycle, whatever the load does
             return self.rings(limits) and not faulty
         return self.rings(limits) and not (faulty or self.has_line(limits)) and self.is_as_regular(m, limits)
