@@ -126,7 +126,7 @@ def averaged(found: Sequence[Fitted], closed: bool = False) -> Averaged:
     told = [(f, s) for f, s in tried if f is best or s.log_gain < EXPERIMENTS.loose]
     weight, at, own = _mixture(told, closed)
     mean = weight @ at
-    wide = EXPERIMENTS.wider * np.sqrt(weight @ (own**2 + (at - mean) ** 2))
+    wide = np.sqrt(weight @ (own**2 + (at - mean) ** 2))
     dead = ninety(weight, at[:, 2], own[:, 2])
     deviation_s = (dead.high - dead.low) / (2.0 * NINETY)
     sign = math.copysign(1.0, best.gain)
@@ -193,7 +193,7 @@ def _lags(fit: Fitted, spread: Spread) -> dict[str, Estimate]:
     out = {}
     order = np.argsort(-fit.times[: TIMES[fit.shape.kind]])
     for name, at in zip(("time_constant_s", "second_lag_s"), order, strict=False):
-        log = EXPERIMENTS.wider * math.sqrt(max(spread.covariance[at, at], 0.0))
+        log = math.sqrt(max(spread.covariance[at, at], 0.0))
         out[name] = _factor(float(np.exp(fit.times[at])), log, "s")
     return out
 
@@ -201,7 +201,7 @@ def _lags(fit: Fitted, spread: Spread) -> dict[str, Estimate]:
 def _rest(fit: Fitted, spread: Spread) -> dict[str, Estimate]:
     """Play, inverse response, drift and neighbours' gains, as far as the candidate has them."""
     out, shape, first = {}, fit.shape, fit.times.size
-    deviation = EXPERIMENTS.wider * np.sqrt(np.maximum(np.diag(spread.covariance), 0.0))
+    deviation = np.sqrt(np.maximum(np.diag(spread.covariance), 0.0))
     at = first + shape.answers + 1
     if shape.kind is Kind.INVERSE:
         share = fit.linear[1] / fit.linear[0]
