@@ -16,6 +16,7 @@ import numpy as np
 
 from analyzer.config import Config
 from analyzer.history.series import Series
+from analyzer.loop.decisions import LacksError
 from analyzer.loop.experiments import learned
 from analyzer.loop.quality import prepare
 from analyzer.loops.spec import LoopSpec
@@ -52,7 +53,10 @@ def asked(seed: int) -> tuple[Truth, list[Asked]]:
     series = {"T.PV": Series(r.stamp_s, r.pv, none, None), "T.OP": Series(r.stamp_s, r.op, none, None)}
     spec = LoopSpec("T", pv="T.PV", op="T.OP", pv_lo=0.0, pv_hi=100.0)
     config = Config()
-    found = learned(spec, series, prepare(spec, series, config.quality), config)
+    try:
+        found = learned(spec, series, prepare(spec, series, config.quality), config)
+    except LacksError:  # a test too short for a record
+        found = None
     model = None if found is None else found.model
     names = {"gain": t.gain, "sum of lags": sum(t.lags_s), "dead time": t.dead_s}
     if t.kind == "integrator":

@@ -16,7 +16,7 @@ from analyzer.loop.judged_stretch import controller_of
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loop.sample_clock import constant_stretches, snapped
 from analyzer.loops.spec import LoopSpec
-from identification.controller.pi_regression import ControlLaw, Trends, fed_back, unstated_law
+from identification.controller.pi_regression import ControlLaw, Trends, unstated_law
 from identification.errors import NotAssessedError, TriageError
 from identification.experiments.find import Experiment, by_hand, in_automatic
 from identification.experiments.model import Modelled, Pooled, modelled, pooled
@@ -59,21 +59,15 @@ class Learned:
 
 
 def manual_of(spec: LoopSpec, prepared: Prepared, series: Mapping[str, Series], config: Config) -> Mask:
-    """True where OP is moved by hand or by a script, shape (n,): in manual by its mode; everywhere, where no SP is
-    recorded and OP, which mostly stands, does not answer PV; else where OP stands for long, at a limit too."""
-    record, q = prepared.record, LIMITS.controller
+    """True where OP is moved by hand or by a script, shape (n,): in manual; without a mode also where OP stands at a
+    limit for long."""
+    record = prepared.record
     stands = constant_stretches(
         record.op, record.dt_s, config.quality.manual_s, config.quality.manual_samples
     )
     if spec.mode in series:
         return record.mask("manual")
-    if record.sp_estimated and _stands(record.op) and fed_back(record.op, record.pv) < q.feedback:
-        return np.ones(len(record), dtype=bool)
     return record.mask("manual") | (stands & record.mask("saturated"))
-
-
-def _stands(op: Floats) -> bool:
-    return float(np.mean(np.diff(op) != 0.0)) < EXPERIMENTS.moving
 
 
 def on_even_clock(

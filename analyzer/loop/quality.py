@@ -29,6 +29,9 @@ from analyzer.loop.sample_clock import (
 from analyzer.loop.shared_valve import Shared, half, selected
 from analyzer.loops.spec import STATED, LoopSpec
 from identification.controller.check import runs
+from identification.controller.pi_regression import fed_back
+from identification.experiments.find import by_hand
+from identification.limits import EXPERIMENTS, LIMITS
 from identification.record import Floats, LoopRecord, Mask
 
 RECORDED_RANGE = (0.005, 0.995)
@@ -211,7 +214,10 @@ def _masked(
     stands = stale.any() and (not op_known or float(np.ptp(op[stale])) == 0.0)
     if stands and not _driven_to_limit(record, stale, saturated, q):
         stale = none
-    manual = _manual(mode, clock, record, q) if op_known else none
+    by_script = mode is None and op_known and moved_by_script(record)
+    if by_script:  # OP at 0 before a test and after it is at no limit
+        saturated = none
+    manual = ~none if by_script else _manual(mode, clock, record, q) if op_known else none
     masks = {
         "gap": gap,
         "stale": stale,
@@ -236,6 +242,16 @@ def _driven_to_limit(record: LoopRecord, stale: Mask, saturated: Mask, q: Qualit
         and off > q.frozen_ends_pct
         and not record.sp_estimated
     )
+
+
+def moved_by_script(record: LoopRecord) -> bool:
+    """Whether a hand, or a script, moves OP from first to last: no SP is recorded, and OP, which mostly stands, does
+    not answer PV."""
+    op = record.op
+    stands = record.sp_estimated and float(np.mean(np.diff(op) != 0.0)) < EXPERIMENTS.moving
+    if not stands or not by_hand(record, np.ones(op.size, dtype=bool)):
+        return False
+    return fed_back(op, record.pv) < LIMITS.controller.feedback
 
 
 def _manual(mode: Series | None, clock: Floats, record: LoopRecord, q: QualityLimits) -> Mask:

@@ -15,11 +15,13 @@ from scipy.optimize import least_squares
 from identification.experiments.columns import Kind, Trial, answers, stem_of
 from identification.experiments.wander import Wander, log_likelihood, wander_of, whitened
 from identification.limits import EXPERIMENTS
-from identification.record import Floats
+from identification.record import Floats, Mask
 from identification.simulation.lag import respond, unit_lag
 
 TIMES = {Kind.NO_ANSWER: 0, Kind.LAG: 1, Kind.TWO_LAGS: 2, Kind.INVERSE: 2, Kind.INTEGRATOR: 0}
 """Lags of each kind."""
+ALIKE = {Kind.LAG: (Kind.TWO_LAGS,), Kind.TWO_LAGS: (Kind.LAG,)}
+"""Kinds that one experiment may not tell apart."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,26 +165,38 @@ def bounds_of(trial: Trial, shape: Shape) -> tuple[Floats, Floats]:
     return np.array(low), np.array(high)
 
 
-def descended(trial: Trial, shape: Shape, start: Floats, noise: Wander) -> Fitted:
-    """A candidate at its optimum from a start, under a noise."""
+def descended(trial: Trial, shape: Shape, start: Floats, noise: Wander, late: bool = True) -> Fitted:
+    """A candidate at its optimum from a start, under a noise; late, whether its dead time is searched for too."""
     low, high = bounds_of(trial, shape)
     times = np.clip(start, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
-    if times.size:
-        scale = np.ones(times.size)
-        if shape.answers:
-            scale[TIMES[shape.kind]] = max(0.2 * times[TIMES[shape.kind]], trial.dt_s)
+    free, scale = np.ones(times.size, dtype=bool), np.ones(times.size)
+    if shape.answers:
+        free[TIMES[shape.kind]] = late
+        scale[TIMES[shape.kind]] = max(0.2 * times[TIMES[shape.kind]], trial.dt_s)
+
+    def left(t: Floats) -> Floats:
+        return projected(trial, shape, placed(times, free, t), noise)[0]
+
+    if free.any():
         found = least_squares(
-            lambda t: projected(trial, shape, t, noise)[0],
-            times,
-            bounds=(low, high),
-            x_scale=scale,
+            left,
+            times[free],
+            bounds=(low[free], high[free]),
+            x_scale=scale[free],
             diff_step=1e-4,
             max_nfev=EXPERIMENTS.steps,
         )
-        times = np.asarray(found.x)
+        times = placed(times, free, found.x)
     e, linear, logs = projected(trial, shape, times, noise)
     squares, count = float((e**2).sum()), int(trial.usable.sum())
     return Fitted(shape, trial, times, linear, log_likelihood(squares, logs, count), squares / count, noise)
+
+
+def placed(all_times: Floats, free: Mask, found: Floats) -> Floats:
+    """Times with those that were searched for in their places."""
+    out = all_times.copy()
+    out[free] = found
+    return out
 
 
 def settled(fit: Fitted) -> Fitted:
@@ -264,14 +278,16 @@ def _makes_sense(fit: Fitted) -> bool:
 
 
 def _with_more(found: list[Fitted]) -> list[Fitted]:
-    """The best candidates with more: a start away from rest, play where OP reverses, and of neighbours what lowers
-    the criterion."""
+    """The best candidates, and the best of each kind that may be taken for theirs, with more: a start away from rest,
+    play where OP reverses, and of neighbours what lowers the criterion."""
     best, more = found[0], []
+    alike = {f.shape.kind: f for f in reversed(found) if f.shape.kind in ALIKE.get(best.shape.kind, ())}
+    bases = [best, *(f for f in alike.values() if f is not best)]
     if not best.shape.is_ramp:
-        more.append(best_of(best.trial, replace(best.shape, start=True), [best.times], best.wander))
+        more += [best_of(f.trial, replace(f.shape, start=True), [f.times], f.wander) for f in bases]
     if tells_play(best.trial.op):
         travel = float(np.ptp(best.trial.op))
-        for base in found[: EXPERIMENTS.with_play]:
+        for base in {id(f): f for f in (*bases, *found[: EXPERIMENTS.with_play])}.values():
             shape = replace(base.shape, play=True)
             worn = (with_term(base, shape, [math.log(w * travel), s]) for w, s in EXPERIMENTS.play_starts)
             more.append(max(worn, key=lambda f: f.log_likelihood))

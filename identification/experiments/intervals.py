@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.special import ndtr
 
 from identification.estimation.descent import NINETY
 from identification.experiments.columns import Kind
-from identification.experiments.fit import TIMES, Fitted, columns
+from identification.experiments.fit import TIMES, Fitted, columns, descended
 from identification.experiments.wander import whitened
 from identification.limits import EXPERIMENTS
 from identification.models import Estimate
@@ -51,7 +52,7 @@ def covariance_of(fit: Fitted) -> Floats:
     logs = np.zeros(size.size)
     logs[: times.size] = EXPERIMENTS.log_known**-2
     if shape.answers:
-        logs[own] = max(sum(fit.lags_s) + fit.dead_s, trial.block_s) ** -2.0
+        logs[own] = (sum(fit.lags_s) + fit.dead_s if fit.lags_s else trial.duration_s) ** -2.0
     gram += np.diag(logs + 1e-10 * size**2 / fit.variance)
     scale = np.sqrt(np.diag(gram))
     return np.asarray(np.linalg.inv(gram / np.outer(scale, scale)) / np.outer(scale, scale))
@@ -83,7 +84,7 @@ class Averaged:
 
     gain: float
     lags_s: float
-    dead_s: float
+    dead: Estimate
     spread: Spread
 
 
@@ -94,21 +95,75 @@ def _counts(f: Fitted, best: Fitted) -> bool:
     return same and f.shape.kind is not Kind.INVERSE
 
 
-def averaged(found: Sequence[Fitted]) -> Averaged:
+def along_dead_time(fit: Fitted, step_s: float) -> list[Fitted]:
+    """A candidate with its other constants at their optimum at each of a row of dead times, as far as these are
+    likely: what a second lag, or play, does late goes with dead time, and far beyond the curvature at one optimum."""
+    own, out = TIMES[fit.shape.kind], [fit]
+    most = 0.5 * fit.trial.duration_s
+    for way in (-1.0, 1.0):
+        at = fit
+        for _ in range(EXPERIMENTS.dead_times):
+            times = at.times.copy()
+            times[own] = min(max(times[own] + way * step_s, 0.0), most)
+            if times[own] == at.times[own]:
+                break
+            at = descended(fit.trial, fit.shape, times, fit.wander, late=False)
+            out.append(at)
+            if at.log_likelihood < fit.log_likelihood - EXPERIMENTS.unlikely:
+                break
+    return out
+
+
+def averaged(found: Sequence[Fitted], closed: bool = False) -> Averaged:
     """The constants of a best candidate and of all others of its family, best first: a lag cannot always be told from
-    two, nor drift from none, and an interval has to hold whichever it is."""
+    two, nor drift from none, and an interval has to hold whichever it is.
+
+    Each is taken along its dead times; not those of an experiment in automatic (closed), whose constants a fit to the
+    noise that they leave would move.
+    """
     best = found[0]
     tried = [(f, spread_of(f)) for f in found if f is best or _counts(f, best)]
     told = [(f, s) for f, s in tried if f is best or s.log_gain < EXPERIMENTS.loose]
-    same, spreads = [f for f, _ in told], [s for _, s in told]
-    weight = weights_of(same)
-    rows = np.array([[math.log(abs(f.gain)), math.log(max(sum(f.lags_s), 1e-9)), f.dead_s] for f in same])
-    inner = np.array([[s.log_gain, s.log_lags, s.dead_s] for s in spreads])
-    mean = weight @ rows
-    wide = EXPERIMENTS.wider * np.sqrt(weight @ (inner**2 + (rows - mean) ** 2))
+    weight, at, own = _mixture(told, closed)
+    mean = weight @ at
+    wide = np.sqrt(weight @ (own**2 + (at - mean) ** 2))
+    dead = ninety(weight, at[:, 2], own[:, 2])
+    deviation_s = (dead.high - dead.low) / (2.0 * NINETY)
     sign = math.copysign(1.0, best.gain)
-    spread = Spread(float(wide[0]), float(wide[1]), float(wide[2]), spreads[0].covariance)
-    return Averaged(sign * math.exp(mean[0]), math.exp(mean[1]), float(mean[2]), spread)
+    spread = Spread(float(wide[0]), float(wide[1]), deviation_s, told[0][1].covariance)
+    return Averaged(sign * math.exp(mean[0]), math.exp(mean[1]), dead, spread)
+
+
+def _mixture(told: Sequence[tuple[Fitted, Spread]], closed: bool) -> tuple[Floats, Floats, Floats]:
+    """Weights, shape (m,), log gains, log sums of lags and dead times [s], shape (m, 3), and their deviations."""
+    rows, inner, weight = [], [], []
+    # OP was moved at any time between two samples, and a record shows it at the second
+    unseen_s = told[0][0].trial.dt_s
+    for share, (f, s) in zip(weights_of([f for f, _ in told]), told, strict=True):
+        if share < EXPERIMENTS.counts:
+            continue
+        step_s = max(EXPERIMENTS.dead_step * s.dead_s, 0.05 * unseen_s)
+        row = [f] if closed else along_dead_time(f, step_s)
+        likely = np.exp([x.log_likelihood - f.log_likelihood for x in row])
+        weight += (share * likely / likely.sum()).tolist()
+        rows += [
+            (math.log(abs(x.gain)), math.log(max(sum(x.lags_s), 1e-9)), x.dead_s + 0.5 * unseen_s)
+            for x in row
+        ]
+        within_s = s.dead_s if closed else step_s / math.sqrt(12.0)
+        inner += [(s.log_gain, s.log_lags, math.hypot(within_s, unseen_s / math.sqrt(12.0)))] * len(row)
+    return np.array(weight) / sum(weight), np.array(rows), np.array(inner)
+
+
+def ninety(weight: Floats, at: Floats, wide: Floats) -> Estimate:
+    """Median [s] and 90 % interval, 0 at least, of a mixture of normal densities; shape (m,) each.
+
+    Where a lag and two lags are as likely, the mean of their dead times is neither's.
+    """
+    grid = np.linspace(min(float((at - 3.0 * wide).min()), 0.0), float((at + 3.0 * wide).max()), 1000)
+    below = ndtr((grid[:, None] - at) / wide) @ weight
+    low, middle, high = np.maximum(np.interp((0.05, 0.5, 0.95), below, grid), 0.0).tolist()
+    return Estimate(middle, low, high, "s")
 
 
 def _factor(value: float, log_deviation: float, unit: str) -> Estimate:
@@ -129,12 +184,7 @@ def estimates_of(found: Sequence[Fitted], mean: Averaged) -> dict[str, Estimate]
         out["gain"] = _factor(mean.gain, wide.log_gain, "%/%")
         out["lags_s"] = _factor(mean.lags_s, wide.log_lags, "s")
         out |= _lags(best, wide)
-    # OP was moved up to one sample before the sample that first shows it
-    late_s, before_s = NINETY * wide.dead_s, EXPERIMENTS.unseen * best.trial.dt_s
-    dead_s = mean.dead_s
-    out["dead_time_s"] = Estimate(
-        dead_s, max(dead_s - late_s, 0.0), dead_s + math.hypot(late_s, before_s), "s"
-    )
+    out["dead_time_s"] = mean.dead
     return out | _rest(best, wide)
 
 
@@ -143,7 +193,7 @@ def _lags(fit: Fitted, spread: Spread) -> dict[str, Estimate]:
     out = {}
     order = np.argsort(-fit.times[: TIMES[fit.shape.kind]])
     for name, at in zip(("time_constant_s", "second_lag_s"), order, strict=False):
-        log = EXPERIMENTS.wider * math.sqrt(max(spread.covariance[at, at], 0.0))
+        log = math.sqrt(max(spread.covariance[at, at], 0.0))
         out[name] = _factor(float(np.exp(fit.times[at])), log, "s")
     return out
 
@@ -151,7 +201,7 @@ def _lags(fit: Fitted, spread: Spread) -> dict[str, Estimate]:
 def _rest(fit: Fitted, spread: Spread) -> dict[str, Estimate]:
     """Play, inverse response, drift and neighbours' gains, as far as the candidate has them."""
     out, shape, first = {}, fit.shape, fit.times.size
-    deviation = EXPERIMENTS.wider * np.sqrt(np.maximum(np.diag(spread.covariance), 0.0))
+    deviation = np.sqrt(np.maximum(np.diag(spread.covariance), 0.0))
     at = first + shape.answers + 1
     if shape.kind is Kind.INVERSE:
         share = fit.linear[1] / fit.linear[0]

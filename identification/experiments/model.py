@@ -84,7 +84,7 @@ def modelled(record: LoopRecord, x: Experiment, beside: Sequence[Floats] = ()) -
     part = replace(part, bad=part.bad | lone_pv, op=without_lone(part.op, lone_op))
     others = tuple(b[x.first : x.last] for b in beside if float(np.ptp(b[x.first : x.last])) > 0.0)
     found, nat = _candidates(part, x, others)
-    best, mean = found[0], averaged(found)
+    best, mean = found[0], averaged(found, x.course.closed)
     if nat < EXPERIMENTS.answers or NINETY * mean.spread.log_gain > EXPERIMENTS.most_gain:
         raise NotAssessedError(f"PV does not answer OP beyond its noise in this {x.course}")
     trial, start_s = best.trial, x.first * record.dt_s
@@ -169,12 +169,9 @@ def pooled(found: Sequence[Modelled]) -> Pooled:
     if not ramp:
         mean, deviation, _ = together([(math.log(m.mean.lags_s), m.mean.spread.log_lags) for m in used])
         out["lags_s"] = _around_log(out["lags_s"], 1.0, mean, deviation)
-    mean, deviation, _ = together([(m.mean.dead_s, max(m.mean.spread.dead_s, 1e-9)) for m in used])
-    late, old = NINETY * deviation, out["dead_time_s"]
-    unseen = old.high - old.value
-    out["dead_time_s"] = Estimate(
-        mean, max(mean - late, 0.0), mean + max(late, min(unseen, late + unseen)), "s"
-    )
+    mean, deviation, _ = together([(m.mean.dead.value, max(m.mean.spread.dead_s, 1e-9)) for m in used])
+    late = NINETY * deviation
+    out["dead_time_s"] = Estimate(mean, max(mean - late, 0.0), mean + late, "s")
     return Pooled(surest.kind, out, tuple(weights.tolist()), tuple(used))
 
 

@@ -93,6 +93,25 @@ def test_a_test_plan_names_size_levels_and_times(bump):
     assert "the gain within" in plan
 
 
+def test_op_at_zero_before_and_after_a_test_is_no_limit(tmp_path):
+    """An oven stepped 0, 30, 0 % by a script, no SP and no mode recorded: its record is in manual, OP at no limit."""
+    t = np.arange(0.0, 12000.0, 10.0)
+    op = np.where((t > 600.0) & (t < 6000.0), 30.0, 0.0)
+    pv, y = np.empty(t.size), 0.0
+    for k in range(t.size):
+        pv[k] = y
+        y += 10.0 * (1.5 * op[max(k - 10, 0)] - y) / 900.0
+    pv += 25.0 + 0.1 * np.random.default_rng(3).normal(size=t.size)
+    stamps = pd.date_range("2026-05-04 08:00", periods=t.size, freq="10s")
+    pd.DataFrame({"timestamp": stamps, "T5.PV": pv, "T5.OP": op}).to_csv(tmp_path / "oven.csv", index=False)
+    assert "saturated" not in said("check", tmp_path / "oven.csv")
+    said("run", tmp_path / "oven.csv", "--store", tmp_path / "s", "--jobs", "1")
+    (row,) = json.loads(said("rank", tmp_path / "s", "--format", "json"))
+    assert "model from steps of OP" in row["reason"]
+    assert "limit" not in row["reason"]
+    assert row["action"] == "check settings"  # none are stated, and the model has some
+
+
 def test_a_loop_in_automatic_is_not_taken_for_an_experiment():
     """Of the sample mill's 22 loops FIC2117 alone, which operators move in manual, has experiments by hand."""
     mill = Path(__file__).parents[2] / "sample_data"

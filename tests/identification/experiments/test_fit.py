@@ -8,6 +8,7 @@ import pytest
 from identification.errors import NotAssessedError
 from identification.experiments.columns import Kind
 from identification.experiments.find import Course, Experiment, by_hand, in_automatic
+from identification.experiments.intervals import ninety
 from identification.experiments.model import modelled, pooled, together
 from identification.record import LoopRecord
 from proofs.step_test_plant import behind_play
@@ -43,6 +44,28 @@ def moves(*levels, each=400):
 def whole(r, course=Course.STEPS):
     """All of a record as one experiment."""
     return Experiment(course, 0, len(r), 3, float(np.ptp(r.op)))
+
+
+def test_a_move_between_two_samples_leaves_dead_time_where_it_is():
+    """OP that moves half a sample before the sample that shows it: dead time is neither shortened nor lengthened."""
+    fine = moves(40, 45, 38, 44, each=4000)
+    op = np.concatenate((np.full(5, 40.0), fine))[: fine.size]  # a move 5 s before the next sample
+    pv = (
+        stepped(op, (100.0,), 60.0, 1.5, fine=2) + 50.0 + 0.01 * np.random.default_rng(5).normal(size=op.size)
+    )
+    r = record(pv[::10], op[::10], dt=10.0)
+    e = modelled(r, whole(r)).estimates["dead_time_s"]
+    assert e.value == pytest.approx(60.0, abs=1.0)
+    assert e.low < 56.0 < 64.0 < e.high  # by any part of a sample
+
+
+def test_ninety_per_cent_of_a_mixture():
+    """One density gives the normal interval; of two apart the median lies in the heavier, not between them."""
+    one = ninety(np.ones(1), np.array([50.0]), np.array([4.0]))
+    assert (one.low, one.value, one.high) == pytest.approx((50 - 6.58, 50.0, 50 + 6.58), abs=0.05)
+    two = ninety(np.array([0.3, 0.7]), np.array([10.0, 100.0]), np.array([1.0, 1.0]))
+    assert two.value == pytest.approx(100.0, abs=1.5)
+    assert two.low < 12.0 < two.high
 
 
 NOISE = np.random.default_rng(7).normal(size=8000)
