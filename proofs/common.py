@@ -59,8 +59,8 @@ def _commit() -> list[str]:
 
 
 def publish(file: str | Path, title: str, *parts: str) -> None:
-    """Write a page of these paragraphs beside the proof (or to a file of another name), and print it; it says of which
-    commit it is, where git knows."""
+    """Write a page of these paragraphs beside the proof (or to a file of another name), and print it; it says of
+    which commit it is, where git knows."""
     text = "\n\n".join([f"# {title}", *_commit(), *(p.rstrip() for p in parts)]) + "\n"
     Path(file).with_suffix(".md").write_text(text, encoding="utf-8")
     print(text)
