@@ -3,8 +3,8 @@
 Folders of plants as ../shared/plants has them (export.parquet, loops.csv, truth.json); with --seed worn valves of
 benchmarks/world. One row in so many is kept of each loop whose valve is worn, and the loop is assessed. Counted are
 loops whose cycle has fifteen rows or more at that interval: named as the valve's fault, width of the play or
-stickband within 15 %, slope within 25 %, dead time within 30 % or half a row, and the 90 % interval of the width holding the
-truth. Writes proofs/sampling.md.
+stickband within 15 %, slope within 25 %, dead time within 30 % or half a row, and the 90 % interval of the width
+holding the truth. Writes proofs/sampling.md.
 """
 
 from __future__ import annotations
