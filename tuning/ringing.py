@@ -58,7 +58,9 @@ def process_of(old: Pid, period_s: float) -> Integrator:
     """The integrator with dead time that rings at a period [s] with these settings: more sluggish at high frequencies
     than a lag through the same point, and cautious so."""
     there, ringing = at_period(old, period_s), 2.0 * math.pi / period_s
-    return Integrator(ringing / abs(there), max(0.5 * math.pi + float(np.angle(there)), 0.0) / ringing)
+    way = math.copysign(1.0, old.kp)  # of a controller that acts the other way the process does, too
+    dead_time_s = max(0.5 * math.pi + float(np.angle(way * there)), 0.0) / ringing
+    return Integrator(way * ringing / abs(there), dead_time_s)
 
 
 def from_ringing(old: Pid, period_s: float, share: float) -> list[Pid]:

@@ -364,3 +364,15 @@ def test_the_recorded_errors_spectrum_tells_what_a_step_costs(corner_s, gain):
     told = error_ratio(loop.controller, new, rung(resonance_s(loop), spectrum(before, 1.0)))
     true = np.std(after) / np.std(before)
     assert 0.95 * true < told < 1.25 * true
+
+
+def test_a_first_step_is_a_mirror_under_the_other_sign():
+    """A controller of the other action on a process of the other sign gets the same first step, mirrored."""
+    old, period = ringing(Fopdt(1.5, 120.0, 9.0))
+    seen = rung(period, spectrum(np.sin(2 * np.pi * np.arange(0.0, 40 * period) / period), 1.0))
+    found = []
+    for way in (1.0, -1.0):
+        tame = Loop(Fopdt(0.1 * way, 400.0, 20.0), replace(old, kp=way * old.kp))
+        found.append(tuning.recommend.recommend(tame, "tuning", seen=seen).new)
+    assert found[0] is not None
+    assert (found[0].kp, found[0].ti_s) == (-found[1].kp, found[1].ti_s)
