@@ -22,7 +22,7 @@ from tuning.forecast import in_digits
 from tuning.frequency_response import integral_s, maximum_sensitivity, resonance_s
 from tuning.limit_cycle import Confirmed, Cycle, confirm
 from tuning.limits import LIMITS, METHOD, TuningLimits
-from tuning.ringing import Rung, error_ratio, from_ringing, process_of, sensitivity_at
+from tuning.ringing import ObservedRinging, error_ratio, from_ringing, process_of, sensitivity_at
 from tuning.rules import effective_delay, simc
 from tuning.search import (
     Bench,
@@ -99,7 +99,7 @@ def recommend(
     limits: TuningLimits = LIMITS,
     error: float | None = None,
     halfway: bool = False,
-    seen: Rung | None = None,
+    seen: ObservedRinging | None = None,
 ) -> Proposal:
     """The proposal for one loop: identified process and valve with the present controller.
 
@@ -127,7 +127,7 @@ def _tight(
     loop: Loop,
     others: Sequence[Loop],
     cases: _Cases | None,
-    seen: Rung,
+    seen: ObservedRinging,
     limits: TuningLimits,
     halfway: bool,
 ) -> Proposal:
@@ -156,13 +156,13 @@ def _tight(
     return Proposal(Action.RETUNE, why, new, ms_before=now, ms=ms)
 
 
-def _is_allowed(old: Pid, new: Pid, seen: Rung, limits: TuningLimits) -> bool:
+def _is_allowed(old: Pid, new: Pid, seen: ObservedRinging, limits: TuningLimits) -> bool:
     """Whether new settings calm the observed ringing, within the price by the recorded error's spectrum."""
     calm = sensitivity_at(old, new, seen.period_s) <= limits.step_ms
     return calm and error_ratio(old, new, seen) <= limits.tight_price
 
 
-def _first_step(old: Pid, now: float, seen: Rung, limits: TuningLimits) -> Proposal:
+def _first_step(old: Pid, now: float, seen: ObservedRinging, limits: TuningLimits) -> Proposal:
     """The calmest step from the observed ringing alone whose error is within the price, of equally calm ones that of
     least error; with a higher gain only where no other is; none where there is none."""
     tried = _steps(old, seen)
@@ -190,7 +190,7 @@ class _Step:
     error: float
 
 
-def _steps(old: Pid, seen: Rung) -> list[_Step]:
+def _steps(old: Pid, seen: ObservedRinging) -> list[_Step]:
     """The steps from the ringing alone that leave the process that rings so calm enough."""
     process, made = process_of(old, seen.period_s), []
     for share in SHARES_KEPT:
@@ -202,10 +202,10 @@ def _steps(old: Pid, seen: Rung) -> list[_Step]:
     return made
 
 
-def _alone(loop: Loop) -> Rung:
+def _alone(loop: Loop) -> ObservedRinging:
     """The ringing of a loop of which nothing but the model is known."""
     period_s = resonance_s(loop)
-    return Rung(period_s, np.array([2.0 * math.pi / period_s]), np.ones(1))
+    return ObservedRinging(period_s, np.array([2.0 * math.pi / period_s]), np.ones(1))
 
 
 @dataclass(frozen=True, slots=True)

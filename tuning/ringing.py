@@ -19,13 +19,14 @@ from tuning.frequency_response import controller_response, integral_s, loop_resp
 PER_INTEGRAL = 1.2
 """Period of the ringing over the integral time of a PI controller (Ziegler, Nichols 1942)."""
 TIMES, RAISED = 9, 2.0
-"""Integral times that are tried, and how far the gain may rise; ours: it doubles where Ti was far too short."""
+"""Integral times that are tried, and factor by which the gain may rise at most [-]; of a level Kp
+and Ti doubled together double the damping, and leave Ti/Kp, with which the error under a slow load goes, as it is."""
 BINS = 300
 """Bins of the error's spectrum, of equal ratio; ours: over five decades they are 4 % wide."""
 
 
 @dataclass(frozen=True, slots=True)
-class Rung:
+class ObservedRinging:
     """What was seen of a ringing loop: its period [s], and the power of its error [% PV squared, to a factor] at some
     frequencies omega [rad/s], shape (m,) each."""
 
@@ -34,14 +35,14 @@ class Rung:
     power: Floats
 
 
-def rung(period_s: float, error: Spectrum) -> Rung:
+def observed_ringing(period_s: float, error: Spectrum) -> ObservedRinging:
     """What the spectrum of the error shows of a loop that rings at a period [s]."""
     power = tapered_power(error)[1:]
     omega = 2.0 * math.pi / error.duration_s * np.arange(1, power.size + 1)
     bins = (BINS * np.log(omega / omega[0]) / max(math.log(omega[-1] / omega[0]), 1e-9)).astype(np.int64)
     in_bins, weighted = (np.asarray(np.bincount(bins, x), np.float64) for x in (power, power * omega))
     full = in_bins > 0.0
-    return Rung(period_s, weighted[full] / in_bins[full], in_bins[full])
+    return ObservedRinging(period_s, weighted[full] / in_bins[full], in_bins[full])
 
 
 def at_period(controller: Pid, period_s: float) -> complex:
@@ -55,8 +56,8 @@ def sensitivity_at(old: Pid, new: Pid, period_s: float) -> float:
 
 
 def process_of(old: Pid, period_s: float) -> Integrator:
-    """The integrator with dead time that rings at a period [s] with these settings: more sluggish at high frequencies
-    than a lag through the same point, and cautious so."""
+    """The integrator with dead time that rings at a period [s] with these settings: above
+    that frequency its phase falls further than that of a lag with dead time through the same point."""
     there, ringing = at_period(old, period_s), 2.0 * math.pi / period_s
     way = math.copysign(1.0, old.kp)  # of a controller that acts the other way the process does, too
     dead_time_s = max(0.5 * math.pi + float(np.angle(way * there)), 0.0) / ringing
@@ -76,7 +77,7 @@ def from_ringing(old: Pid, period_s: float, share: float) -> list[Pid]:
     return [replace(new, kp=old.kp * k) for new, k in zip(made, kept, strict=True) if k <= RAISED]
 
 
-def error_ratio(old: Pid, new: Pid, seen: Rung) -> float:
+def error_ratio(old: Pid, new: Pid, seen: ObservedRinging) -> float:
     """Error of new settings over the present one [-], by the spectrum of the recorded error.
 
     The error is the load or the set point times 1/(1 + L), so that each of its frequencies changes by

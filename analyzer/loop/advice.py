@@ -282,7 +282,7 @@ def _for_tuning(verdict: Verdict, loop: Loop, period_s: float | None, config: Co
     load = load_of(fit, loop.controller)
     error = recorded_error(fit, loop.controller)
     thin = too_thin(fit.window.row_s, loop.controller, config) is not None
-    seen = verdict.rests_on.rung
+    seen = verdict.rests_on.observed
     found = recommend(slow, verdict.cause, others, load, config.tuning, error, thin, seen)
     return Proposed(found, loop, load, others) if found.ms is not None else Proposed(found)
 

@@ -96,9 +96,11 @@ class Verdict:
 
 
 TEMPER_NAT = 50.0
-"""Gain in log likelihood [nat] by which the doubt in a model's verdict falls to a third; ours: benchmarks/world."""
+"""Gain in log likelihood [nat] by which the doubt in a model's verdict falls to a third; a judgement: the chances
+that it gives are not calibrated."""
 LEAST_AGREED = 0.25
-"""Chance of a cause by the other signs [-] from which they do not contradict the model that names it; ours."""
+"""Chance of a cause by the other signs [-] from which they do not contradict the model that names it; ours: on
+benchmarks/world, seeds 115 to 118, the one wrong cause had .17, the right ones that were undecided .30 and more."""
 NO_CAUSE = Verdict(Cause.NONE, dict.fromkeys(CAUSES, 0.0), Fault.NONE)
 
 
@@ -383,9 +385,8 @@ def with_worn_valve(verdict: Verdict, period_s: float, limits: CauseLimits) -> V
     m = verdict.measured
     if m is None or verdict.cause is Cause.VALVE or m.window.position is not None:
         return verdict
-    if (
-        verdict.cause is Cause.TUNING and m.evidence <= 0.0
-    ):  # ringing is no line: both ways of looking must see it
+    # ringing is no line: both ways of looking must see the play
+    if verdict.cause is Cause.TUNING and m.evidence <= 0.0:
         return verdict
     found = beside_line(m.linear, m.play, period_s)
     if not is_worn_beside(found, m, limits):

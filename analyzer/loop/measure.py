@@ -37,7 +37,7 @@ from identification.signals.spectrum import (
 )
 from identification.simulation.valve import IDEAL
 from tuning.frequency_response import is_stable, loop_response
-from tuning.ringing import Rung, rung
+from tuning.ringing import ObservedRinging, observed_ringing
 
 HARMONICS = (2, 3)
 """Harmonics of a cycle that a valve's model must explain: beyond the third few samples a cycle are left."""
@@ -57,8 +57,8 @@ class Measured:
     the size is kept; wave_left [-], harmonics of PV's cycle that the better valve leaves, over its fundamental;
     steady [-], of a calm loop, how the stretches between moves of the stem agree on the better valve: their mean gain
     over its standard error, and asked, what it gains while PV is due to answer moves of the set point [nat]; ringing,
-    whether the loop itself makes the cycle, None without settings; rung, the spectrum of its error, None without a
-    cycle; scale_s, the period or another time scale of the loop [s].
+    whether the loop itself makes the cycle, None without settings; observed, the spectrum of its error, None without
+    a cycle; scale_s, the period or another time scale of the loop [s].
     """
 
     linear: Fit
@@ -83,7 +83,7 @@ class Measured:
     steady: float = 0.0
     asked: float = 0.0
     ringing: Ringing | None = None
-    rung: Rung | None = None
+    observed: ObservedRinging | None = None
     scale_s: float = 60.0
 
     @property
@@ -185,7 +185,7 @@ def _of_a_cycle(m: Measured, best: Fit, linear: Fit, law: Pid | None, error: Spe
         return found
     return replace(
         found,
-        rung=rung(scale, error),
+        observed=observed_ringing(scale, error),
         harmonic=locked_harmonic(error, scale),
         trials=trials(best, linear, scale),
         kurtosis=size_kurtosis(error, error.duration_s / scale),

@@ -140,12 +140,9 @@ def _loop_row(
     prepared = None
     try:
         prepared = prepare(spec, part, config.quality)
-        known |= {"pv_lo": prepared.scale.low, "pv_hi": prepared.scale.low + prepared.scale.span}
-        known["travel_of"] = "OP" if prepared.record.position is None else "stem"
-        known["straight_pct"] = 100.0 * prepared.compressed_share
-        known |= standing(prepared, controller_of(spec, prepared), spec.type, config)
-        earlier = earlier_settings(stated, changes, prepared)
-        taught, present = learned(spec, part, prepared, config, closed=False), controller_of(spec, prepared)
+        earlier, present = earlier_settings(stated, changes, prepared), controller_of(spec, prepared)
+        known |= _of_trends(prepared) | standing(prepared, present, spec.type, config)
+        taught = learned(spec, part, prepared, config, closed=False)
         try:
             found, advice = assess_loop(spec, prepared, config, advising, earlier, held)
         except LacksError as error:
@@ -171,6 +168,14 @@ def _loop_row(
     kept.compared += drawn
     kept.moves += filter(None, [moves_of(prepared.record)])
     kept.found.append(found)
+
+
+def _of_trends(prepared: Prepared) -> dict[str, Cell]:
+    """What a row says of its trends, whatever they show."""
+    low, span = prepared.scale.low, prepared.scale.span
+    travel_of = "OP" if prepared.record.position is None else "stem"
+    straight_pct = 100.0 * prepared.compressed_share
+    return {"pv_lo": low, "pv_hi": low + span, "travel_of": travel_of, "straight_pct": straight_pct}
 
 
 def _typed_in(earlier: Sequence[Earlier], spec: LoopSpec, found: Assessment, zone: str) -> dict[str, Cell]:

@@ -273,27 +273,26 @@ def test_a_run_says_at_once_that_it_has_begun_and_what_takes_long(capsys, monkey
 
 
 def test_a_run_begins_with_a_line_before_it_reads(tmp_path):
-    """What is read stands on stderr before anything that takes long is imported, in under two seconds of work."""
+    """What is read stands on stderr before anything that takes long is imported, without a numerical package."""
     export, seen = tmp_path / "day.csv", tmp_path / "seen"
     export.write_text("timestamp,FIC1.PV\n")
     show = f"""
-import sys, time
+import sys
 from contextlib import contextmanager
 import analyzer.cli, analyzer.commands.run as run
 @contextmanager
 def watched(what):
-    heavy = sorted({{"numba", "pandas", "scipy"}} & set(sys.modules))
-    open({str(seen)!r}, "w").write(f"{{what}}|{{heavy}}|{{time.process_time()}}")
+    heavy = sorted({{"numba", "pandas", "scipy", "statsmodels", "matplotlib", "dask"}} & set(sys.modules))
+    open({str(seen)!r}, "w").write(f"{{what}}|{{heavy}}")
     yield
 run.watched = watched
 analyzer.cli.main()
 """
     told = [sys.executable, "-c", show, "run", str(export), "--store", str(tmp_path / "store")]
     subprocess.run(told, capture_output=True, check=False)
-    what, heavy, processor_s = seen.read_text().split("|")
+    what, heavy = seen.read_text().split("|")
     assert what == f"reading {export}"
     assert heavy == "[]"
-    assert float(processor_s) < 2.0
 
 
 @pytest.mark.slow

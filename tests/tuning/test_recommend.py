@@ -14,7 +14,7 @@ from tuning.forecast import assess, run, settled
 from tuning.frequency_response import integral_s, maximum_sensitivity, resonance_s
 from tuning.limit_cycle import confirm
 from tuning.limits import LIMITS
-from tuning.ringing import error_ratio, from_ringing, process_of, rung, sensitivity_at
+from tuning.ringing import error_ratio, from_ringing, observed_ringing, process_of, sensitivity_at
 from tuning.rules import backlash_rule, simc
 from tuning.search import allowed, rejection
 
@@ -346,7 +346,7 @@ def test_settings_that_ring_on_at_the_observed_period_are_not_proposed():
     believed = tuning.recommend.recommend(tame, "tuning").new
     assert maximum_sensitivity(Loop(true, believed)) > 5.0
     swing = np.sin(2 * np.pi * np.arange(0.0, 40 * period) / period)
-    seen = tuning.recommend.recommend(tame, "tuning", seen=rung(period, spectrum(swing, 1.0)))
+    seen = tuning.recommend.recommend(tame, "tuning", seen=observed_ringing(period, spectrum(swing, 1.0)))
     assert maximum_sensitivity(Loop(true, seen.new)) < 1.25 / (1 - 2 / 3)
     assert "rings at" in seen.reason
     assert seen.ms is None
@@ -361,7 +361,7 @@ def test_the_recorded_errors_spectrum_tells_what_a_step_costs(corner_s, gain):
     before = run(loop, walk).error[4000:]
     new = from_ringing(loop.controller, resonance_s(loop), 0.67)[-1]
     after = run(replace(loop, controller=new), walk).error[4000:]
-    told = error_ratio(loop.controller, new, rung(resonance_s(loop), spectrum(before, 1.0)))
+    told = error_ratio(loop.controller, new, observed_ringing(resonance_s(loop), spectrum(before, 1.0)))
     true = np.std(after) / np.std(before)
     assert 0.95 * true < told < 1.25 * true
 
@@ -369,7 +369,7 @@ def test_the_recorded_errors_spectrum_tells_what_a_step_costs(corner_s, gain):
 def test_a_first_step_is_a_mirror_under_the_other_sign():
     """A controller of the other action on a process of the other sign gets the same first step, mirrored."""
     old, period = ringing(Fopdt(1.5, 120.0, 9.0))
-    seen = rung(period, spectrum(np.sin(2 * np.pi * np.arange(0.0, 40 * period) / period), 1.0))
+    seen = observed_ringing(period, spectrum(np.sin(2 * np.pi * np.arange(0.0, 40 * period) / period), 1.0))
     found = []
     for way in (1.0, -1.0):
         tame = Loop(Fopdt(0.1 * way, 400.0, 20.0), replace(old, kp=way * old.kp))
