@@ -74,7 +74,7 @@ RETUNED = {Cause.VALVE: "retune worn", Cause.NONE: "retune sluggish", Cause.TUNI
 EXPECTED = {
     Cause.VALVE: "the cycle comes to rest, by simulation, though the valve stays as it is",
     Cause.NONE: "PV comes back to its set point several times sooner, and OP moves more",
-    Cause.TUNING: "the swing dies away within a few periods",
+    Cause.TUNING: "the swing is smaller, and dies away sooner after a disturbance",
 }
 """What new settings make of a loop of which no cycle is predicted, by the cause."""
 
