@@ -121,10 +121,10 @@ def needed(m: Measured, limits: CauseLimits, oscillating: bool) -> float:
 
 def _crossed(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
     """Whether OP goes far enough to move a stem behind a fault of the width found: over all of its range, tails too,
-    in a cycle; of a calm loop, whose tails are kicks of its set point, over its usual range."""
-    return m.play.valve.stickband <= limits.widest * float(np.ptp(m.window.op)) and (
-        oscillating or m.size <= 1.0
-    )
+    in a cycle; of a calm loop, whose tails are kicks of its set point, over its usual range. OP of a valve that
+    slips seldom stays within its stickband, so there the whole range counts too."""
+    whole = oscillating or fault_of(m, limits) is Fault.STICTION
+    return m.play.valve.stickband <= limits.widest * float(np.ptp(m.window.op)) and (whole or m.size <= 1.0)
 
 
 def speaks(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:

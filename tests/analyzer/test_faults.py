@@ -23,7 +23,7 @@ from click.testing import CliRunner, Result
 from test_batch import quiet, tables
 
 from analyzer.cli import main
-from analyzer.night import asked as asked_of_export
+from analyzer.night import opened
 from analyzer.store.lock import locked
 from analyzer.store.store import Store
 from identification.errors import InputError
@@ -344,7 +344,7 @@ def dies(asked: object, began: object) -> None:
 @linux
 def test_what_dies_over_an_export_is_told_in_one_line(export, tmp_path, monkeypatch):
     """Where the process that finds out about an export is ended, the run ends with exit 2 and one line."""
-    monkeypatch.setattr(asked_of_export, "find_out", dies)
+    monkeypatch.setattr(opened, "find_out", dies)
     told = ran(export, tmp_path / "store")
     assert told.exit_code == 2
     assert "reading it ended without a result (its worker process was ended by SIGKILL" in told.stderr
