@@ -189,12 +189,13 @@ def _moved(_: None, best: SlipPath, move: tuple[int, int, int], step: float) -> 
     return path, -path.worth
 
 
-def fit_irregular(play: Fit, noise: Floats, period_s: float, any_gain: bool = True) -> SlipPath | None:
+def fit_irregular(play: Fit, noise: Floats, period_s: float) -> SlipPath | None:
     """The most probable path of a sticking stem in a loop that cycles; None where none is as likely as the play.
 
     play : the best play, fitted in blocks, without a recorded stem; noise : shape (order,), a noise model that
-    takes no valve's side, under which the search begins; period_s : of the cycle [s]; any_gain : whether gains far
-    under the play's are tried too, where its own comes to nothing.
+    takes no valve's side, under which the search begins; period_s : of the cycle [s]. Gains far under the play's are
+    tried where its own comes to nothing. The search is repeated about the process and stickband that it found, for
+    a play in the place of a jump is too wide and too early.
     """
     if play.gain == 0.0:
         return None
@@ -203,10 +204,30 @@ def fit_irregular(play: Fit, noise: Floats, period_s: float, any_gain: bool = Tr
     bands, half = play.valve.stickband, rest // (window.factor * window.steps) // 2
     usual: Gains = {(w, s): play.gain for w in SLIPS.widths for s in SLIPS.jumps}
     best = _likeliest(play, noise, rest, usual)
-    if best is None and any_gain:
+    if best is None:
         smaller = {(w, s): _gain(play, w * bands, s, half) for w, s in usual}
         best = _likeliest(play, noise, rest, smaller)
-    return None if best is None else _settled(best)
+    if best is None:
+        return None
+    best = _settled(best)
+    for _ in range(SLIPS.repeated):
+        near = near_path(play, best)
+        near = replace(near, valve=sticking(near.valve.stickband, 0.0))
+        again = _likeliest(near, noise, rest, dict.fromkeys(usual, near.gain))
+        again = None if again is None else _settled(again)
+        if again is None or again.worth < best.worth + SLIPS.worth:
+            break
+        best = again
+    return best
+
+
+def near_path(play: Fit, path: SlipPath) -> Fit:
+    """A fit to the play's window with a path's process and mean friction: a start for one that slips alike."""
+    found = path.fit
+    t, dead, gain = found.time_constant_s, found.dead_time_s, found.gain
+    share = min(found.valve.slip_jump / max(found.valve.stickband, 1e-9), 1.0)
+    valve = sticking(found.valve.stickband, share)
+    return replace(play, gain=gain, time_constant_s=t, dead_time_s=dead, base=found.base, valve=valve)
 
 
 def _likeliest(play: Fit, noise: Floats, rest: int, gains: Gains) -> SlipPath | None:
