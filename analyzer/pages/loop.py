@@ -248,8 +248,10 @@ def _of_settings(found: parts.Page | None) -> parts.Section | None:
 def _indices(row: Row) -> parts.Section | None:
     """The literature's indices, what each publication concludes from its own, and what is concluded here."""
     told, width = words.texts("field_indices"), row["backlash_pct"] or row["stickband_pct"]
+    fault = row["valve_fault"] or row["cause"] or "not assessed"
     ours = {
-        "valve": row["valve_fault"] or row["cause"] or "not assessed",
+        "valve": fault,
+        "linear": fault,
         "width": "–" if width is None else f"{number(width)} %",
         "cycle": f"{row['oscillating_pct'] or 0.0:.0f} % of the time",
         "slow": row["action"] or "–",
