@@ -48,7 +48,7 @@ SOURCES = {
 """Indices of a valve, with their limits."""
 MEASURES = {
     "hagglund": "Hägglund 1995, Control Eng. Practice 3, 1543–1551: more than 10 load disturbances within 50 Ti",
-    "idle": "Hägglund 1999, Control Eng. Practice 7, 1505–1511: above .5, ours",
+    "idle": "Hägglund 1999, Control Eng. Practice 7, 1505–1511: above .25, ours",
     "ellipse": "Choudhury, Shah, Thornhill, Shook 2006, Control Eng. Practice 14, 1395–1412",
     "harris": "Harris 1989, Can. J. Chem. Eng. 67, 856–861",
 }

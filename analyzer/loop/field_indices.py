@@ -6,8 +6,6 @@ import json
 import math
 from collections.abc import Mapping
 
-import numpy as np
-
 from analyzer.config import Config
 from analyzer.loop.oscillation import Oscillations, counting
 from analyzer.loop.quality import Prepared
@@ -80,9 +78,4 @@ def _idle(record: LoopRecord, controller: Pid) -> of.Values | None:
     """The idle index on means over a part of the integral time."""
     width = max(int(controller.ti_s / IDLE_PARTS / record.dt_s), 1)
     op, pv, sp = (_averaged(x, width) for x in (record.op, record.pv, record.sp))
-    if op.size < 2:
-        return None
-    moved = np.abs(np.diff(sp)) > 1e-9
-    reach = round(2 * IDLE_PARTS)
-    steady = np.convolve(moved, np.ones(2 * reach + 1))[reach : reach + moved.size] < 0.5
-    return of.idle_index(op, pv, steady, math.copysign(1.0, controller.kp))
+    return of.idle_index(op, pv, sp, math.copysign(1.0, controller.kp)) if op.size > 1 else None

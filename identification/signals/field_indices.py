@@ -14,7 +14,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.special import chdtri
 
-from identification.record import Floats, Mask
+from identification.record import Floats
 from identification.signals.spectrum import band_signal, spectrum
 
 Values = tuple[float, ...]
@@ -36,7 +36,7 @@ PUBLISHED: Mapping[str, Published] = {
     "kano": Published((0.25,)),
     "choudhury": Published((0.001, 0.01)),
     "hagglund": Published((10.0,)),
-    "idle": Published((0.5,), (0.0,)),
+    "idle": Published((0.25,), (0.0,)),
 }
 """Limits by index, as published: Horch for phases of 60 and 30 degrees from an even correlation; Yamashita's 1/4 is
 what two unrelated signals have; Choudhury, Shah, Thornhill, Shook 2006. Kano and Hägglund 1999 give none but the ends
@@ -59,9 +59,9 @@ ROUNDING = 1e-9
 DISTURBED_PCT, SUPERVISED = 1.0, 50.0
 """Amplitude of the oscillation from which a half-cycle is a load disturbance [% of span], and integral times in which
 they are counted (Hägglund 1995)."""
-IDLE_STEP, IDLE_STEPS = 0.3, 20
-"""Size of a step in standard deviations of all from which its sign is read, in place of the paper's filter, and steps
-that both signals need; ours."""
+IDLE_STEP, IDLE_STEPS, AFTER_MOVE = 0.1, 10, 10
+"""Size of a step in standard deviations of all from which its sign is read, steps that both signals need, and steps
+about a move of the set point that do not count; ours. A load has moved PV where the error is above its deviation."""
 
 
 def concluded(name: str, values: Sequence[float] | None) -> bool | None:
@@ -274,16 +274,19 @@ def load_disturbances(error: Floats, dt_s: float, ti_s: float) -> Values | None:
     return (most,)
 
 
-def idle_index(op: Floats, pv: Floats, steady: Mask, way: float) -> Values | None:
-    """Time in which OP and PV go the same way less that in which they go against each other, over both: near 1 of
-    sluggish control, -1 where OP comes back as fast as PV does.
+def idle_index(op: Floats, pv: Floats, sp: Floats, way: float) -> Values | None:
+    """Time in which OP and PV go the same way less that in which they go against each other, over both, while a load
+    has moved PV: near 1 of sluggish control, about 0 and less of any other.
 
-    Sampled a few times in the loop's own time; steady, shape (n - 1,), the steps at which the set point rests; way,
-    the sign of the process gain (Hägglund 1999, Control Engineering Practice 7).
+    Sampled a few times in the loop's own time; steps soon after a move of the set point are left out; way, the sign
+    of the process gain (Hägglund 1999, Control Engineering Practice 7).
     """
-    u, y = np.diff(op), np.diff(pv)
-    spreads = float(u.std()), float(y.std())
-    both = steady & (np.abs(u) > IDLE_STEP * spreads[0]) & (np.abs(y) > IDLE_STEP * spreads[1])
+    u, y, off = np.diff(op), np.diff(pv), 0.5 * np.abs(sp[1:] - pv[1:] + sp[:-1] - pv[:-1])
+    moved = np.convolve(np.abs(np.diff(sp)) > 1e-9, np.ones(2 * AFTER_MOVE + 1))[
+        AFTER_MOVE : AFTER_MOVE + u.size
+    ]
+    both = (np.abs(u) > IDLE_STEP * u.std()) & (np.abs(y) > IDLE_STEP * y.std())
+    both &= (off > float((sp - pv).std())) & (moved < 0.5)
     if both.sum() < IDLE_STEPS:
         return None
     return (float(np.sign(u[both] * y[both] * way).mean()),)

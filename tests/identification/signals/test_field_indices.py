@@ -186,10 +186,25 @@ def test_hagglund_counts_the_half_cycles_that_are_large_enough():
 def test_the_idle_index_is_one_where_both_go_one_way():
     """Signals that rise and fall together have 1, against each other -1, unrelated ones about 0; the sign of the
     process turns it, and where the set point never rests there is none."""
-    op, steady = np.cumsum(white(7, 500)), np.ones(499, dtype=bool)
-    assert idle_index(op, 2.0 * op + 3.0, steady, 1.0) == (1.0,)
-    assert idle_index(op, -op, steady, 1.0) == (-1.0,)
-    assert idle_index(op, -op, steady, -1.0) == (1.0,)
-    assert abs(idle_index(op, np.cumsum(white(8, 500)), steady, 1.0)[0]) < 0.2
-    assert idle_index(op, op, ~steady, 1.0) is None
-    assert idle_index(op, np.full(500, 50.0), steady, 1.0) is None
+    op, rest = np.cumsum(white(7, 500)), np.zeros(500)
+    assert idle_index(op, 2.0 * op + 3.0, rest, 1.0) == (1.0,)
+    assert idle_index(op, -op, rest, 1.0) == (-1.0,)
+    assert idle_index(op, -op, rest, -1.0) == (1.0,)
+    assert abs(idle_index(op, np.cumsum(white(8, 500)), rest, 1.0)[0]) < 0.2
+    assert idle_index(op, op, white(9, 500), 1.0) is None
+    assert idle_index(op, np.full(500, 50.0), rest, 1.0) is None
+
+
+@pytest.mark.parametrize(("gain", "ti", "sluggish"), [(0.2, 20.0, True), (4.0, 10.0, False)])
+def test_a_loop_that_recovers_slower_than_its_integral_time_is_sluggish(gain, ti, sluggish):
+    """OP moves by -gain (dPV + PV dt/Ti): while PV returns more slowly than Ti the integral wins and both go one way.
+    Behind a lag of 20 under steps of the load, gain .2 and Ti 20 return with a pole of 100, gain 4 and Ti 10 of 8."""
+    pv, integral, ops, pvs = 0.0, 0.0, [], []
+    for load in np.repeat(np.sign(white(10, 12)), 500):
+        integral -= gain * pv / ti
+        op = integral - gain * pv
+        pv += (op + load - pv) / 20.0
+        ops.append(op)
+        pvs.append(pv)
+    u, y = (np.array(x).reshape(-1, 4).mean(axis=1) for x in (ops, pvs))
+    assert concluded("idle", idle_index(u, y, 0.0 * y, 1.0)) is sluggish
