@@ -119,7 +119,7 @@ def refined(fit: Fit) -> Fit:
     for _ in range(FIT.refined_most):
         share = fit.valve.slip_jump / max(fit.valve.stickband, 1e-9)
         first, end, step = FIT.near_jumps
-        about = _grid(FIT.near_widths, (max(share + first, step), min(share + end, 1.0 + 0.5 * step), step))
+        about = _grid(FIT.near_widths, (max(share + first, step), min(share + end, 1.0 + 1e-9), step))
         found = pits(fit, (fit.valve.tolerance,), about, FIT.near_dead)
         best = max((fit, *found), key=lambda fit: fit.log_likelihood)
         gained, fit = best.log_likelihood - fit.log_likelihood, best
