@@ -260,5 +260,6 @@ def search(table: Bench) -> tuple[Candidate, ...]:
     best = min(coarse, key=lambda c: c.score).controller
     step = np.linspace(-1.0, 1.0, FINE)
     longer = np.maximum(best.ti_s * (times[1] / times[0]) ** step, times[0])
-    fine = pairs(loop, abs(best.kp) * (gains[1] / gains[0]) ** step, np.unique(longer))
+    near = np.clip(abs(best.kp) * (gains[1] / gains[0]) ** step, gains[0], gains[-1])
+    fine = pairs(loop, np.unique(near), np.unique(longer))
     return tuple(sorted(coarse + _kept(table, most, fine), key=lambda c: c.score))

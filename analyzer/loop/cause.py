@@ -424,7 +424,7 @@ def told_slip_by_slip(verdict: Verdict, period_s: float, limits: CauseLimits) ->
     window = m.play.window
     blocks = replace(m.play, window=replace(window.of_rows, fine=False))
     play = descend(blocks, free_width=True) if window.fine or window.steps > 1 else m.play
-    path = fit_irregular(play, generic_noise(), period_s)
+    path = fit_irregular(play, generic_noise(), period_s, verdict.fault is not Fault.STICTION)
     if path is None:
         return verdict
     jump = path_evidence(path, play)

@@ -189,13 +189,14 @@ def _moved(_: None, best: SlipPath, move: tuple[int, int, int], step: float) -> 
     return path, -path.worth
 
 
-def fit_irregular(play: Fit, noise: Floats, period_s: float) -> SlipPath | None:
+def fit_irregular(play: Fit, noise: Floats, period_s: float, any_gain: bool = True) -> SlipPath | None:
     """The most probable path of a sticking stem in a loop that cycles; None where none is as likely as the play.
 
     play : the best play, fitted in blocks, without a recorded stem; noise : shape (order,), a noise model that
-    takes no valve's side, under which the search begins; period_s : of the cycle [s]. Gains far under the play's are
-    tried where its own comes to nothing. The search is repeated about the process and stickband that it found, for
-    a play in the place of a jump is too wide and too early.
+    takes no valve's side, under which the search begins; period_s : of the cycle [s]; any_gain : whether gains far
+    under the play's are tried too, where its own comes to nothing: where another stick-slip is known already they lead
+    to narrower bands with longer dead times. The search is repeated about the process and stickband that it found,
+    for a play in the place of a jump is too wide and too early.
     """
     if play.gain == 0.0:
         return None
@@ -204,7 +205,7 @@ def fit_irregular(play: Fit, noise: Floats, period_s: float) -> SlipPath | None:
     bands, half = play.valve.stickband, rest // (window.factor * window.steps) // 2
     usual: Gains = {(w, s): play.gain for w in SLIPS.widths for s in SLIPS.jumps}
     best = _likeliest(play, noise, rest, usual)
-    if best is None:
+    if best is None and any_gain:
         smaller = {(w, s): _gain(play, w * bands, s, half) for w, s in usual}
         best = _likeliest(play, noise, rest, smaller)
     if best is None:
