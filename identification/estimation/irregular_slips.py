@@ -194,9 +194,9 @@ def fit_irregular(play: Fit, noise: Floats, period_s: float, any_gain: bool = Tr
 
     play : the best play, fitted in blocks, without a recorded stem; noise : shape (order,), a noise model that
     takes no valve's side, under which the search begins; period_s : of the cycle [s]; any_gain : whether gains far
-    under the play's are tried too, where its own comes to nothing: where another stick-slip is known already they lead
-    to narrower bands with longer dead times. The search is repeated about the process and stickband that it found,
-    for a play in the place of a jump is too wide and too early.
+    under the play's are tried too, where its own comes to nothing: where another stick-slip is known they lead to
+    narrower bands with longer dead times. The search is repeated about the process and stickband that it found, for a
+    play in the place of a jump is too wide and too early.
     """
     if play.gain == 0.0:
         return None
