@@ -429,9 +429,8 @@ def told_slip_by_slip(verdict: Verdict, period_s: float, limits: CauseLimits) ->
         return verdict
     jump = path_evidence(path, play)
     more = jump - max(m.jump, 0.0)
-    share = (
-        limits.jump_share if verdict.fault is Fault.BACKLASH else 0.0
-    )  # else the jump is known, or all but so
+    new = verdict.fault is Fault.BACKLASH  # of another fault a jump is known, or all but so
+    share = limits.jump_share if new else 0.0
     if more < max(limits.evidence_jump, share * (m.evidence + more)):
         return verdict
     told = _with_path(m, path, jump, more)

@@ -103,7 +103,8 @@ def better_linear(linear: Fit, play: Fit) -> Fit:
 def fit_stick_slip(play: Fit, period_s: float) -> Fit:
     """The best stick-slip (J > 0) followed by a lag, scanned whole and finely about the play.
 
-    play : the best play: its width is near the stickband, for OP tells both by its travel between slips; period_s :
+    play : the best play: its width is near the stickband, for OP tells both by its travel between slips, or up to
+    half as wide again, where the stem jumps by most of it: narrower bands have finalists of their own; period_s :
     scale of the search [s].
     """
     short = play.window.y.size < FIT.short
