@@ -1,0 +1,91 @@
+"""Whether the answer stays where the fault does: each loop as it is and in everyday variations that leave its fault
+alone: python -m benchmarks.world.pairs --seed 1 --each 8 --kinds backlash tight --ways "rows missing" "SP moves" """
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from dataclasses import replace
+from typing import Any
+
+from benchmarks.world.__main__ import right, told
+from benchmarks.world.draw import KINDS, Drawn, drawn, run
+from benchmarks.world.recorder import WAYS, Recording, recorded
+from proofs.common import command_line, table
+
+DAYS = ("another day", "SP moves", "PV filter")
+"""Variations of the day itself: another load; eight set point moves; a filter of 5 s on the PV that the controller
+sees, which loops.csv does not state."""
+SIZE, PERIOD = 0.2, 0.05
+"""Changes of size and period from which an answer counts as changed."""
+
+
+def varied(d: Drawn, way: str) -> Recording:
+    """One loop's day in one of WAYS or DAYS."""
+    if way == "another day":
+        return recorded(run(d, day=1), "plain", d.seed)
+    if way == "SP moves":
+        return recorded(run(replace(d, moves=8.0)), "plain", d.seed)
+    if way == "PV filter":
+        return recorded(run(d, settings=replace(d.controller, pv_filter_s=5.0)), "plain", d.seed)
+    return recorded(run(d), way, d.seed)
+
+
+def size(row: dict[str, Any]) -> float | None:
+    """Width of the fault [% of OP's span], None where none is stated."""
+    width = row["backlash_pct"] or row["stickband_pct"]
+    return None if width is None else float(width)
+
+
+def _off(a: float | None, b: float | None, most: float) -> bool:
+    return a is not None and b is not None and abs(b / a - 1.0) > most
+
+
+def changes(before: dict[str, Any], after: dict[str, Any]) -> list[str]:
+    """What of an answer changed: cause, fault, size, period, action."""
+    found = [name for name in ("cause", "valve_fault", "action") if before[name] != after[name]]
+    found += ["size"] if _off(size(before), size(after), SIZE) else []
+    return found + (["period"] if _off(before["period_s"], after["period_s"], PERIOD) else [])
+
+
+def _compared(d: Drawn, way: str, before: dict[str, Any], after: dict[str, Any], show: bool) -> list[str]:
+    """The changes of one loop, printed with --show."""
+    found = changes(before, after)
+    if show and (found or not right(d, after)):
+        names = ("cause", "valve_fault", "action", "period_s", "reason")
+        said = ["/".join(str(row[n]) for n in names) for row in (before, after)]
+        print(
+            f"{d.seed} {d.name} {way} {found} right {right(d, after)}: {said[0]} -> {said[1]}",
+            file=sys.stderr,
+        )
+    return found
+
+
+def main() -> None:
+    """Draw, vary, assess, compare."""
+    asked = command_line(
+        __doc__, seed=[1], each=8, ways=[*WAYS[1:], *DAYS], jobs=2, kinds=list(KINDS), show=False
+    )
+    counts: dict[str, Counter[str]] = {way: Counter() for way in ("plain", *asked.ways)}
+    for seed in asked.seed:
+        for kind in asked.kinds:
+            loops = drawn(seed, asked.each, (kind,))
+            plain = told(loops, {d.name: varied(d, "plain") for d in loops}, asked.jobs)
+            counts["plain"].update(right=sum(right(d, plain[d.name]) for d in loops))
+            for way in asked.ways:
+                rows = told(loops, {d.name: varied(d, way) for d in loops}, asked.jobs)
+                for d in loops:
+                    found = _compared(d, way, plain[d.name], rows[d.name], asked.show)
+                    counts[way].update(found, changed=int(bool(found)), right=int(right(d, rows[d.name])))
+    n = asked.each * len(asked.seed) * len(asked.kinds)
+    parts = ("right", "changed", "cause", "valve_fault", "size", "period", "action")
+    print(
+        table(
+            "recording|" + "|".join(parts),
+            [(f"{w} ({n})", *(c[p] for p in parts)) for w, c in counts.items()],
+        )
+    )
+
+
+if __name__ == "__main__":
+    main()
