@@ -230,7 +230,9 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
 def _too_thin(found: Assessment, controller: Pid | None, config: Config) -> Advice | None:
     """What sampling it takes, where the controller acts several times between two samples, unseen."""
     m = found.verdict.measured
-    thin = None if m is None or found.verdict.rings else too_thin(m.window.row_s, controller, config)
+    thin = (
+        None if m is None or found.verdict.told_between_rows else too_thin(m.window.row_s, controller, config)
+    )
     return None if thin is None else _or_repair(found.verdict, _lacking(thin))
 
 

@@ -13,11 +13,13 @@ import numpy as np
 
 from analyzer.config import AdviceLimits
 from analyzer.loop.identified import recorded_error
+from identification.controller.check import op_step
 from identification.estimation.window import Fit, Stems, stem_of
 from identification.models import Loop
-from identification.record import Floats, LoopRecord
+from identification.record import Floats
 from identification.signals.correlation import lag_sums
 from identification.simulation.closed_loop import scan_step
+from identification.simulation.valve import play
 from tuning.forecast import in_digits, loop_in_digits, run, settled
 
 NEARLY = 0.8
@@ -49,8 +51,12 @@ class Agreement:
 
 
 def agreement(loop: Loop, fit: Fit, load: Floats, period_s: float) -> Agreement:
-    """The loop with its present settings under a load on its scan [% PV], shape (n,), beside the record of a
-    fit, which cycles at a period [s]. Travel of both is that of their samples at the longer of both intervals."""
+    """The loop with its present settings under a load on its scan [% PV], shape (n,), beside the record of a fit,
+    which cycles at a period [s] where its error does not show one.
+
+    Travel of both is that of their samples at the longer of both intervals, OP rounded as recorded and moves within
+    a digit left out: at a coarse digit OP's noise is not in the record.
+    """
     sim, window = settled(run(loop_in_digits(loop), in_digits(load))), fit.window
     dt_s, scan_s = window.step_s, scan_step(loop)
     last = min(window.op.size, math.ceil(len(sim) * scan_s / dt_s))
@@ -59,11 +65,15 @@ def agreement(loop: Loop, fit: Fit, load: Floats, period_s: float) -> Agreement:
     if window.position is not None:
         stem = window.position
     every = max(round(dt_s / scan_s), 1)
-    recorded = [_travel(x[-last:], dt_s) for x in (window.op, stem)]
-    simulated = [_travel(x[::every], every * scan_s) for x in (sim.op, sim.stem)]
+    digit = op_step(window.op)
+    recorded = [_travel(x[-last:], dt_s) for x in (play(window.op, digit), stem)]
+    rounded = digit * np.round(sim.op[::every] / max(digit, 1e-9))
+    simulated = [_travel(x, every * scan_s) for x in (play(rounded, digit), sim.stem[::every])]
     op, moved = (s / max(r, 1e-9) for s, r in zip(simulated, recorded, strict=True))
     error = float(np.mean(np.abs(sim.error))) / max(recorded_error(fit, loop.controller), 1e-9)
-    return Agreement(period_of(sim) / period_s, error, op, moved)
+    sp = 0.0 if window.sp is None else window.sp
+    own_s = period_of(sp - window.y, window.dt_s) or period_s
+    return Agreement(period_of(sim.error, sim.dt_s) / own_s, error, op, moved)
 
 
 def _travel(x: Floats, dt_s: float) -> float:
@@ -71,11 +81,11 @@ def _travel(x: Floats, dt_s: float) -> float:
     return float(np.abs(np.diff(x)).sum()) / max((x.size - 1) * dt_s, 1e-9)
 
 
-def period_of(r: LoopRecord) -> float:
+def period_of(error: Floats, dt_s: float) -> float:
     """Period of the autocorrelation's first peak that is nearly its highest beyond its first zero [s], 0 where it has
-    none."""
-    x = r.error - r.error.mean()
-    if len(r) < 8 or not np.any(x):
+    none; error, shape (n,), every dt_s [s]."""
+    x = error - error.mean()
+    if x.size < 8 or not np.any(x):
         return 0.0
     sums = lag_sums(x, x.size // 2)
     below = np.flatnonzero(sums < 0)
@@ -87,4 +97,4 @@ def period_of(r: LoopRecord) -> float:
     first = int(np.argmax(rest >= NEARLY * rest.max()))
     back = np.flatnonzero(rest[first:] < 0.5 * rest[first])
     end = first + int(back[0]) if back.size else rest.size
-    return float((below[0] + first + int(np.argmax(rest[first:end]))) * r.dt_s)
+    return float((below[0] + first + int(np.argmax(rest[first:end]))) * dt_s)

@@ -231,7 +231,7 @@ def _judge_stretch(prepared: Prepared, stretch: Stretch, config: Config, kind: s
         seen = shown(part.record, stated, scale, config.settings)
     acting = seen.other or (None if stated is None else seen.beside) or stated
     found, verdict = judged_where(part, found, span, acting, config, kind)
-    thin = None if verdict.rings else too_thin(record.dt_s, acting, config)
+    thin = None if verdict.told_between_rows else too_thin(record.dt_s, acting, config)
     if _hours_in(part.record) < config.advice.least_h or thin is not None:
         verdict = as_hint(verdict, config.advice.hint_pct)
     return _Judged(part, found if whole else of_all, found, verdict, seen)

@@ -41,6 +41,7 @@ from analyzer.loop.ringing import Regularity, Ringing
 from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import refined
 from identification.estimation.beside_line import BesideLine, beside_line
+from identification.estimation.between_samples import scans_per_row
 from identification.estimation.gauss_newton import descend
 from identification.estimation.irregular_slips import SlipPath, fit_irregular, near_path, path_evidence
 from identification.estimation.noise import generic_noise
@@ -86,8 +87,11 @@ class Verdict:
         return m.stick_slip if self.fault is Fault.STICTION and m.stick_slip is not None else m.play
 
     @property
-    def rings(self) -> bool:
-        """Whether the identified loop makes the cycle: then the record, whatever its sampling, has told the loop."""
+    def told_between_rows(self) -> bool:
+        """Whether the loop is known whatever the sampling: its ringing makes the cycle, or the valve does, fitted
+        with what law and scan say of OP between the rows."""
+        if self.cause is Cause.VALVE and self.measured is not None:
+            return scans_per_row(self.measured.controller, self.fit.window.row_s) > 1
         return self.cause is Cause.TUNING and any(s.kind is SignKind.RINGING for s in self.signs)
 
     @property

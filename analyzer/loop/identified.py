@@ -25,6 +25,9 @@ from tuning.forecast import SEED
 from tuning.frequency_response import maximum_sensitivity
 from tuning.rules import simc
 
+COARSE = 2.0
+"""Digits of OP within which the median of its jumps is that of whole digits."""
+
 
 def is_known(fit: Fit, limits: AdviceLimits) -> bool:
     """Whether the time constant is well inside the window, so that it can be told from an integrator's."""
@@ -116,7 +119,8 @@ def scan_noise(window: Window, controller: Pid) -> float:
 
     Those of white noise have sqrt(6) times its deviation, behind a filter of PV that keeps a share a
     (1 - a) sqrt(2 (3 - a) / (1 + a)) times; OP's rounding is taken off. The median leaves steps aside (Rousseeuw,
-    Croux 1993).
+    Croux 1993); where it lies within a few digits of OP it is a digit's, and the mean square of all jumps as small is
+    taken (Sheppard 1898).
     """
     held = max(round(controller.scan_s / window.step_s), 1)  # OP stands still between two scans
     op = window.op[::held]
@@ -124,7 +128,10 @@ def scan_noise(window: Window, controller: Pid) -> float:
     if jumps.size == 0 or controller.kp == 0:
         return 0.0
     a = kept(controller.pv_filter_s, max(controller.scan_s, window.step_s))
-    seen = math.sqrt(max(robust_deviation(jumps) ** 2 - 0.5 * op_step(op) ** 2, 0.0))
+    spread, digit = robust_deviation(jumps), op_step(op)
+    if spread < COARSE * digit:
+        spread = math.sqrt(float(np.mean(jumps[jumps <= 2.0 * COARSE * digit] ** 2)))
+    seen = math.sqrt(max(spread**2 - 0.5 * digit**2, 0.0))
     return seen / ((1.0 - a) * math.sqrt(2.0 * (3.0 - a) / (1.0 + a)) * abs(controller.kp))
 
 

@@ -191,15 +191,16 @@ def test_one_hour_is_a_hint():
 
 @pytest.mark.parametrize(("every", "action"), [(15, "repair valve"), (5, "retune")])
 def test_a_sample_for_each_half_of_ti_gives_no_settings(every, action):
-    """At 15 s a sample a loop with Ti 30 s gets no settings but what they would need, and its worn valve is stroked
-    all the same, for that needs none; at 5 s it gets some."""
+    """At 15 s a sample a loop with Ti 30 s, whose scan is not stated, gets no settings but what they would need, and
+    its worn valve is stroked all the same, for that needs none; at 5 s it gets some."""
     t = simulate(PIPE, 24.0)
     thin = {
         f"L.{n.upper()}": series(START_S + np.arange(0.0, t.pv.size, every), getattr(t, n)[::every])
         for n in ROLES
     }
-    found = assess(prepare(spec("L"), thin, CONFIG.quality), PIPE.controller, CONFIG)
-    advice = settings(found, PIPE)
+    controller = replace(PIPE.controller, scan_s=float(every))
+    found = assess(prepare(spec("L"), thin, CONFIG.quality), controller, CONFIG)
+    advice = advise(found, spec(kp=PIPE.kp, ti=PIPE.ti), controller, 100.0, CONFIG)
     assert advice.action == action
     assert ("sample every 7.5 s" in advice.reason) == (action == "repair valve")
 

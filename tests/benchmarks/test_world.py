@@ -9,7 +9,7 @@ import pytest
 
 from analyzer.config import Config
 from analyzer.history.series import Series
-from analyzer.loop.advice import sought_for
+from analyzer.loop.advice import sought_for, withheld
 from analyzer.loop.agreement import agreement
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.decisions import SignKind
@@ -31,9 +31,11 @@ WORN = Drawn("B", "backlash", PROCESS, Controller(3.5, 40.0), Valve(BACKLASH, 3.
 HEALTHY = Drawn("H", "healthy", PROCESS, Controller(2.5, 150.0), Valve(), 25, 0.0, 0.0, 1.0, 2.0)
 
 
-def assessed(d: Drawn, way: str = "plain", hours: float = 8) -> tuple[Assessment, Pid]:
-    """What some hours of a loop come to, and its controller."""
-    r, spec = recorded(run(d, hours=hours), way, 1), spec_of(d)
+def assessed(
+    d: Drawn, way: str = "plain", hours: float = 8, scan_s: float | None = 1.0
+) -> tuple[Assessment, Pid]:
+    """What some hours of a loop come to, whose scan is stated or not, and its controller."""
+    r, spec = recorded(run(d, hours=hours), way, 1), replace(spec_of(d), scan_s=scan_s)
     stamp, good = START_S + r["stamp_s"], np.zeros(r["pv"].size, dtype=bool)
     found = {f"{d.name}.{role.upper()}": Series(stamp, r[role], good) for role in ("sp", "pv", "op")}
     made = prepare(spec, found, Config().quality)
@@ -74,6 +76,32 @@ def test_a_simulated_present_is_believed_only_where_it_agrees() -> None:
     name, ratio = agreement(wrong, fit, load, cycle.period_s).worst(limits) or ("", 0.0)
     assert "travel" in name
     assert ratio > 3.0
+
+
+def test_rounding_costs_no_settings() -> None:
+    """Rounded to a tenth of a percent OP flickers; without moves within a digit its simulated travel is the recorded
+    one, and the simulated present is believed as that of the record in full."""
+    found, pid = assessed(WORN, "rounded")
+    cycle, limits = counting(found.oscillations), Config().advice
+    assert cycle is not None
+    loop, fit, _ = sought_for(found.verdict, pid, limits)
+    made = agreement(loop, fit, load_of(fit, pid), cycle.period_s)
+    assert made.worst(limits) is None
+    assert made.op_travel == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_scan_that_is_stated_replaces_close_rows() -> None:
+    """Of a worn valve recorded in more than a quarter of the integral time the law, whose scan is stated, tells OP
+    between the rows, and settings are sought; without the scan it takes a sample in that quarter."""
+    fast = replace(WORN, controller=replace(WORN.controller, ti_s=36.0))
+    found, pid = assessed(fast, "every 10 s", HOURS)
+    spec = spec_of(fast)
+    assert found.verdict.cause == "valve"
+    assert withheld(found, spec, pid, 100.0, Config()) is None
+    blind, _ = assessed(fast, "every 10 s", HOURS, scan_s=None)
+    kept = withheld(blind, replace(spec, scan_s=None), replace(pid, scan_s=10.0), 100.0, Config())
+    assert kept is not None
+    assert "a sample every 9 s" in kept.reason
 
 
 def test_a_worn_valve_is_told_beside_a_load_that_makes_the_cycle() -> None:
