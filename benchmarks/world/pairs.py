@@ -41,16 +41,17 @@ def _off(a: float | None, b: float | None, most: float) -> bool:
     return a is not None and b is not None and abs(b / a - 1.0) > most
 
 
-def changes(before: dict[str, Any], after: dict[str, Any]) -> list[str]:
-    """What of an answer changed: cause, fault, size, period, action."""
+def changes(before: dict[str, Any], after: dict[str, Any], way: str) -> list[str]:
+    """What of an answer changed: cause, fault, size, action, and the period where the day is the same."""
     found = [name for name in ("cause", "valve_fault", "action") if before[name] != after[name]]
     found += ["size"] if _off(size(before), size(after), SIZE) else []
-    return found + (["period"] if _off(before["period_s"], after["period_s"], PERIOD) else [])
+    longer = way not in DAYS and _off(before["period_s"], after["period_s"], PERIOD)
+    return found + (["period"] if longer else [])
 
 
 def _compared(d: Drawn, way: str, before: dict[str, Any], after: dict[str, Any], show: bool) -> list[str]:
     """The changes of one loop, printed with --show."""
-    found = changes(before, after)
+    found = changes(before, after, way)
     if show and (found or not right(d, after)):
         names = ("cause", "valve_fault", "action", "period_s", "reason")
         said = ["/".join(str(row[n]) for n in names) for row in (before, after)]
