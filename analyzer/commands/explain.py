@@ -24,6 +24,7 @@ from analyzer.commands.options import (
     say,
     trying,
 )
+from analyzer.loop.decisions import decided_fault
 from identification.errors import NotAssessedError
 
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ def explain(
             brought = read_model(model, tag) if model is not None else None
             plant = guarded(asked)
             decision = decision_of(plant, tag, store)
-            case, others = asked_cases(asked, plant, tag, held_out)
+            case, others = asked_cases(asked, plant, tag, held_out, decided_fault(decision))
             found = explained(case, tell, brought, others)
     except NotAssessedError as error:
         data = with_night(abstained(tag, str(error)), decision)

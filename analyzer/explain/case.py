@@ -120,6 +120,15 @@ def verdict_on(spec: LoopSpec, prepared: Prepared, config: Config) -> Verdict:
     return said if counting(found) is not None or said.cause is Cause.VALVE else NO_CAUSE
 
 
+def as_decided(verdict: Verdict, fault: Fault | None) -> Verdict:
+    """A verdict on the loop by itself with the valve as the night decided, which knows the loops beside it and the
+    nights before."""
+    if verdict.cause is not Cause.VALVE or fault in (None, Fault.UNDECIDED):
+        return verdict
+    cleared = fault is Fault.NONE
+    return replace(verdict, cause=Cause.UNDECIDED if cleared else Cause.VALVE, fault=fault)
+
+
 def as_given(prepared: Prepared) -> Prepared:
     """A loop that shares a valve with what a select gave it, whoever that was; half a split range without the time in
     which the other half moves PV."""
@@ -149,8 +158,10 @@ def case(
     series: dict[str, Series],
     config: Config,
     most: int | None = EXPLAIN.whole_samples,
+    fault: Fault | None = None,
 ) -> Case:
-    """Prepare one loop; of a recording of more than `most` samples the most telling stretch, None for all.
+    """Prepare one loop; of a recording of more than `most` samples the most telling stretch, None for all; fault,
+    what the night says of its valve, None where none was assessed.
 
     Raises
     ------
@@ -178,7 +189,7 @@ def case(
         raise NotAssessedError(f"{spec.loop}: {lacks}")
     stamps = raw.stamp_s[~raw.bad]
     stamps = stamps[(stamps >= r.start_s - r.dt_s) & (stamps <= r.start_s + r.duration_s)]
-    verdict = verdict_on(spec, whole, config)
+    verdict = as_decided(verdict_on(spec, whole, config), fault)
     others = ops_beside(spec, specs, series, prepared, config)
     subject = subject_of(spec, prepared, stamps, verdict, others, config)
     factor = coarser_by(subject) if is_experiment(subject) else 1
@@ -305,17 +316,17 @@ def whole(asked: Asked, tag: str) -> tuple[Case, Series]:
 
 
 def asked_cases(
-    asked: Asked, plant: Plant, tag: str, held_out: Sequence[Path]
+    asked: Asked, plant: Plant, tag: str, held_out: Sequence[Path], fault: Fault | None = None
 ) -> tuple[Case, dict[str, Case]]:
     """The case to be explained, and those held out by name: parts under other settings, and other exports; plant,
-    what is asked, opened."""
+    what is asked, opened; fault as in `case`."""
     spec, specs, series = loop_trends(plant, tag)
     judged = parts(spec, series, asked.changes, asked.zone)
     kept: list[tuple[Part, Case]] = []
     for part in judged:
         with nullcontext() if len(judged) == 1 else suppress(NotAssessedError):  # OP stands still in it
             most = None if kept else EXPLAIN.whole_samples
-            kept.append((part, case(part.spec, specs, part.series, asked.config, most)))
+            kept.append((part, case(part.spec, specs, part.series, asked.config, most, fault)))
     if not kept:
         raise NotAssessedError(f"{tag}: needs OP and PV that move in one part of its settings, has none")
     first = kept[0][1]

@@ -14,7 +14,7 @@ from typing import Any
 from analyzer.columns import EXPLAINED
 from analyzer.config import Config
 from analyzer.history.export import Export
-from analyzer.loop.decisions import Action, Cause, Status, counts
+from analyzer.loop.decisions import Action, Cause, Fault, Status, counts, decided_fault
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.nights import Night, Plant, cut
 from analyzer.night.workers import Died, executor
@@ -25,20 +25,25 @@ from identification.errors import TriageError
 TABLE = "explained"
 QUIET = (Cause.NONE, Action.NONE, "", None)
 """Causes and actions that are none."""
-ASKED = ["loop", "status", "oscillating_pct", "oscillation_significance", "cause", "action", "source_loop"]
-"""Columns that say whether a loop is worth an explanation, and whose loop leads it."""
+ASKED = [
+    *("loop", "status", "oscillating_pct", "oscillation_significance", "cause", "valve_fault", "action"),
+    "source_loop",
+]
+"""Columns that say whether a loop is worth an explanation, what its valve has, and whose loop leads it."""
 Row = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """One loop of a night to be explained, with the loop that leads it where one is known."""
+    """One loop of a night to be explained, with the loop that leads it where one is known, and what the night says of
+    its valve."""
 
     export: Export
     spec: LoopSpec
     source: LoopSpec | None
     night: Night
     config: Config
+    fault: Fault | None = None
 
 
 def flagged(row: Mapping[str, Any]) -> bool:
@@ -73,7 +78,7 @@ def _answer_and_page(q: Question) -> tuple[dict[str, Any], str]:
     tags = list(dict.fromkeys([*q.spec.tags, *with_source]))
     series = {tag: cut(s, q.night) for tag, s in q.export.read(tags).items()}
     specs = (q.spec,) if q.source is None else (q.spec, q.source)
-    found = explained(case(q.spec, specs, series, q.config), lambda name: None)
+    found = explained(case(q.spec, specs, series, q.config, fault=q.fault), lambda name: None)
     return found.data, dumps(explanation_page(found, q.night.zone))
 
 
@@ -88,7 +93,14 @@ def questions(plant: Plant, rows: Sequence[Mapping[str, Any]], night: Night) -> 
     by_name, config = {s.loop: s for s in plant.specs}, plant.config
     chosen = sorted((r for r in rows if flagged(r)), key=lambda r: -(r["oscillation_significance"] or 0.0))
     return [
-        Question(plant.export, by_name[r["loop"]], by_name.get(r["source_loop"] or ""), night, config)
+        Question(
+            plant.export,
+            by_name[r["loop"]],
+            by_name.get(r["source_loop"] or ""),
+            night,
+            config,
+            decided_fault(r),
+        )
         for r in chosen
         if r["loop"] in by_name
     ]

@@ -189,6 +189,12 @@ def counts(oscillating_pct: float | None) -> bool:
     return oscillating_pct is not None and oscillating_pct >= COUNTS_PCT
 
 
+def decided_fault(row: Mapping[str, object] | None) -> Fault | None:
+    """What a night's row says of the valve; None where there is no row, or the loop was not assessed."""
+    told = None if row is None or row["status"] != Status.OK else row.get("valve_fault")
+    return None if told is None else Fault(str(told))
+
+
 @dataclass(frozen=True, slots=True)
 class Sign:
     """One sign: which cause it points to, how strongly (0 to 1), what it shows, and the figures and loops that say

@@ -186,15 +186,15 @@ def with_cycles(x: Round, seen: SeenInCycles, candidates: list[Candidate]) -> li
 def shown_by_cycles(s: Recording, candidates: Sequence[Candidate]) -> Candidate | None:
     """The best play or stick-slip, where the loop's cycles show a faulty valve; None where they do not.
 
-    What shows a jump is believed: a slip now and then late hides it from one constant friction. A play is not, where
-    a stem that sticks leaves less.
+    The kind that the night tells is kept: it asks each stretch by itself, and weighs what one friction over hours
+    does not, as a slip now and then late.
     """
     if s.cycles is None:
         return None
     rubs = [c for c in candidates if is_friction(c.name)]
-    if isinstance(s.cycles.valve, Stiction):
-        rubs = [*(c for c in rubs if about(c.name).friction is Friction.STICKS), *rubs]
-    return rubs[0] if rubs else None
+    sticks = isinstance(s.cycles.valve, Stiction)
+    alike = (c for c in rubs if (about(c.name).friction is Friction.STICKS) == sticks)
+    return next(iter([*alike, *rubs]), None)
 
 
 def proven(x: Round, candidates: list[Candidate]) -> Candidate | None:
