@@ -290,6 +290,9 @@ def _for_tuning(verdict: Verdict, loop: Loop, period_s: float | None, config: Co
 
 
 def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Config) -> Proposed:
+    told_nat, least_nat = verdict.rests_on.evidence, config.advice.valve_nat
+    if told_nat < least_nat:
+        return Proposed(Proposal(Action.UNDECIDED, SAID["hardly_told"].format(told_nat, least_nat)))
     sought, fit, others = sought_for(verdict, loop.controller, config.advice)
     rests = confirm(sought).cycle is None
     if rests and period_s is None:
