@@ -112,12 +112,16 @@ def seen_in_cycles(verdict: Verdict, limits: AdviceLimits) -> SeenInCycles | Non
     return SeenInCycles(fit.process, valve, shown.count, shown.agreeing, cycle_s, m.trials is not None, told)
 
 
-def verdict_on(spec: LoopSpec, prepared: Prepared, config: Config) -> Verdict:
-    """What a night would say of the whole recording: why it oscillates, or of which valve it rests."""
+def verdict_on(spec: LoopSpec, prepared: Prepared, config: Config) -> tuple[Verdict, float]:
+    """What a night would say of the whole recording: why it oscillates, or of which valve it rests; and the period of
+    its cycle [s], 0 where it has none."""
     seen, span = detect_where_it_cycles(prepared.record, config.oscillation)
     stated = controller(spec, prepared.scale.span)
     found, said = judged_where(prepared, seen, span, stated, config, spec.type)
-    return said if counting(found) is not None or said.cause is Cause.VALVE else NO_CAUSE
+    cycle = counting(found)
+    if cycle is None:
+        return said if said.cause is Cause.VALVE else NO_CAUSE, 0.0
+    return said, cycle.period_s
 
 
 def as_decided(verdict: Verdict, fault: Fault | None) -> Verdict:
@@ -189,9 +193,10 @@ def case(
         raise NotAssessedError(f"{spec.loop}: {lacks}")
     stamps = raw.stamp_s[~raw.bad]
     stamps = stamps[(stamps >= r.start_s - r.dt_s) & (stamps <= r.start_s + r.duration_s)]
-    verdict = as_decided(verdict_on(spec, whole, config), fault)
+    verdict, period_s = verdict_on(spec, whole, config)
+    verdict = as_decided(verdict, fault)
     others = ops_beside(spec, specs, series, prepared, config)
-    subject = subject_of(spec, prepared, stamps, verdict, others, config)
+    subject = subject_of(spec, prepared, stamps, (verdict, period_s), others, config)
     factor = coarser_by(subject) if is_experiment(subject) else 1
     if factor == 1:
         return Case(spec, prepared, subject, shortened, taught)
@@ -200,7 +205,7 @@ def case(
         f"Judged at one sample in {factor}, each {thin.record.dt_s:.3g} s: its time constant needs no more."
     )
     others = tuple(x[: len(thin.record) * factor : factor] for x in others)
-    subject = subject_of(spec, thin, stamps[::factor], verdict, others, config)
+    subject = subject_of(spec, thin, stamps[::factor], (verdict, period_s), others, config)
     return Case(spec, thin, subject, f"{shortened} {said}".strip(), taught)
 
 
@@ -220,12 +225,13 @@ def subject_of(
     spec: LoopSpec,
     prepared: Prepared,
     stamps: Floats,
-    verdict: Verdict,
+    night: tuple[Verdict, float],
     others: tuple[Floats, ...],
     config: Config,
 ) -> Recording:
-    """What is explained of a prepared record, beside what a night says of it and the OPs of its neighbours."""
-    r = prepared.record
+    """What is explained of a prepared record, beside what a night says of it, the period of its cycle [s] and the OPs
+    of its neighbours."""
+    r, (verdict, period_s) = prepared.record, night
     judged = float(r.usable.mean()) >= config.quality.usable_share  # else OP is mostly an operator's
     return Recording(
         r.sp if judged and not r.sp_estimated else None,
@@ -240,6 +246,7 @@ def subject_of(
         spec.type.strip().lower(),
         seen_in_cycles(verdict, config.advice),
         verdict.measured is not None and verdict.cause is not Cause.VALVE,
+        period_s,
         config.explain,
     )
 

@@ -74,19 +74,17 @@ def _verdict_blocks(e: Explained) -> tuple[Block | None, ...]:
     night = e.data.get("night")
     first = None if night is None else Text((decided(e.data),), "lead")
     beside = "" if night is None else words.beside_night(night, e.data["verdict"], e.data["block"])
-    said = tuple(filter(None, (beside, words.no_better(e.data), check(e.data))))
+    said = tuple(filter(None, (words.improvement(e.data), beside, words.no_better(e.data), check(e.data))))
     return first, Text((e.data["reason"],), "lead"), Text(said), brought, Tiles(tuple(_tiles(e)))
 
 
 def _tiles(e: Explained) -> list[tuple[str, str, str]]:
-    d, (plain, better) = e.data, e.found.proven.overall
+    d, (plain, _) = e.data, e.found.proven.overall
     seat = "where to look first" if d["verdict"] == "unexplained" else "where it sits"
     tiles = [(d["block"], seat, "")] if d["block"] != "none" else []
     if e.found.accepted and words.improves(d):
-        horizon = d["fit"]["horizon_s"]
-        over = f"within windows of {duration(horizon)}" if horizon else "over the recording"
-        both, less = f"{rms(plain.rmse)} → {rms(better.rmse)}", "better" if e.found.proven.falls else ""
-        tiles.append((both, f"rms misfit {over}, plain and improved", less))
+        both, where = " → ".join(map(rms, words.held_out(d))), "in its band, " if d["fit"]["in_band"] else ""
+        tiles.append((both, f"rms misfit on held-out data, {where}plain and improved", "better"))
     else:
         rest = ": load and noise" if d["verdict"] == "none" else ""
         tiles.append((rms(plain.rmse), f"rms misfit of the plain simulation{rest}", ""))

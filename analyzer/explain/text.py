@@ -25,10 +25,12 @@ def answer_lines(data: Mapping[str, Any]) -> list[str]:
     block = f" ({data['block']})" if data["block"] != "none" else ""
     night = data.get("night")
     out = [*wrap(decided(data), WIDTH), ""] if night else []
+    improvement = words.improvement(data) if fit else ""
     beside = words.beside_night(night, data["verdict"], data["block"]) if night and fit else ""
+    told = (data["reason"], improvement, beside, check(data))
     out += [
         head + block,
-        *(line for text in (data["reason"], beside, check(data)) for line in wrap(text, WIDTH)),
+        *(line for text in told for line in wrap(text, WIDTH)),
     ]
     out += _part("Parameters (90 % intervals)", _texts(words.parameters(data)), (2,))
     out += _part("Controller, as SP, PV and OP show it", _controller_rows(data), (1,))
@@ -37,13 +39,8 @@ def answer_lines(data: Mapping[str, Any]) -> list[str]:
     others = [(name, plain, "→", *rest) for name, plain, *rest in _texts(words.others(data))]
     held_out = _headed(("", "plain", "", "improved", "removed"), others)
     out += _part("On the recordings held out", held_out, (1, 3, 4))
-    removed = [
-        f"{first['name']} removes {share(first['held_out_share'])} of the held-out misfit's mean square."
-        for first in data["effects"][:1]
-        if first["held_out_share"] is not None and not words.no_better(data)
-    ]
     brought = fit.get("brought", {}).get("note", "")
-    for sentence in filter(None, (words.no_better(data), *remarks(fit), brought, *removed)):
+    for sentence in filter(None, (words.no_better(data), *remarks(fit), brought)):
         out += ["", *wrap(sentence, WIDTH)]
     out += _part("Where", _where_rows(data))
     moved = [(name, before, "→", after, unit) for name, before, after, _, unit in _texts(words.moved(data))]

@@ -93,17 +93,38 @@ def parameters(data: Data) -> Table:
     return Table("parameters", "Parameters", page_columns("effects_found"), rows)
 
 
+def held_out(data: Data) -> tuple[float, float]:
+    """Misfit [% PV] of the plain and the better model on held-out data, in the loop's own band where it is known."""
+    fit, banded = data["fit"], data["fit"].get("in_band")
+    plain, better = (banded[k] if banded else fit[k]["held_out"] for k in ("baseline", "explained"))
+    return plain["rmse"], better["rmse"]
+
+
 def improves(data: Data) -> bool:
     """Whether the model with what was found simulates held-out data better than the plain one."""
-    plain, better = (data["fit"].get(k, {}).get("held_out") for k in ("baseline", "explained"))
-    return bool(data["moved"]) and better["rmse"] < plain["rmse"]
+    if not data["moved"]:
+        return False
+    plain, better = held_out(data)
+    return better < plain
+
+
+def improvement(data: Data) -> str:
+    """What the model with what was found gains on held-out data, in the loop's own band where it is known; '' where
+    it gains nothing."""
+    if not improves(data):
+        return ""
+    plain, better = held_out(data)
+    removed, banded = share(1.0 - better**2 / max(plain**2, 1e-30)), data["fit"].get("in_band")
+    band = (number(banded["shortest_s"]), number_text(banded["longest_s"], "s")) if banded else ()
+    said = NOTES["in_band" if banded else "held_out"]
+    return str(said.format(*band, plain=rms(plain), better=rms(better), removed=removed))
 
 
 def no_better(data: Data) -> str:
     """That a model with what was found is no better on held-out data; '' where it is, or nothing was found."""
     if not data["moved"] or improves(data):
         return ""
-    plain, better = (rms(data["fit"][k]["held_out"]["rmse"]) for k in ("baseline", "explained"))
+    plain, better = map(rms, held_out(data))
     return str(NOTES["no_better"].format(name=data["effects"][0]["name"], plain=plain, better=better))
 
 

@@ -16,6 +16,7 @@ from identification.mismatch.catalogue.supply_variation import AT_REST
 from identification.mismatch.effect import Block, exact
 from identification.mismatch.explanation import Explanation, by_cycles, is_stack
 from identification.mismatch.outside import about
+from identification.mismatch.proof import HeldOut
 from identification.mismatch.recording import Recording
 from identification.mismatch.where import Located, located_in, where_of
 from identification.models import Estimate
@@ -160,7 +161,7 @@ def effects_of(found: Explanation, s: Recording) -> tuple[EffectFound, ...]:
         for row in found.best.model.added
     ]
     for first in physics[:1]:
-        share, told = found.proven.share, {} if found.cycles is None else dict(found.cycles.told)
+        share, told = found.proven.share_in_band, {} if found.cycles is None else dict(found.cycles.told)
         if told.keys() == {q.name for q in found.best.model.added[0].params}:
             first.parameters.update(told)
         held_out_share = share if share > 0.0 else None
@@ -218,19 +219,32 @@ def plain_loops(found: Explanation) -> dict[str, dict[str, float]]:
 
 
 def fit_of(found: Explanation, dt_s: float) -> dict[str, Any]:
-    """Misfit before and after, fitted and held out, the horizon that simulations run over [s], None: all, and what
-    effects gain on held-out data [nat] that innovations show and no smaller misfit, None of any other."""
+    """Misfit before and after, fitted and held out, and held out in the loop's own band, None where none is known.
+
+    horizon_s, over which simulations run, None: all; ahead_nat, what effects gain on held-out data that innovations
+    show and no smaller misfit, None of any other.
+    """
     proof = found.proven
-    ahead = found.accepted and proof.share <= 0.0 and proof.seen_ahead
+    ahead = found.accepted and proof.share_in_band <= 0.0 and proof.seen_ahead
     return {
         **{
             name: {"fitted": asdict(proof.fitted[i]), "held_out": asdict(proof.held[i])}
             for i, name in enumerate(("baseline", "explained"))
         },
+        "in_band": in_band_of(proof),
         "horizon_s": proof.window * dt_s if proof.window else None,
         "plain_loops": plain_loops(found),
         "ahead_nat": proof.gain if ahead else None,
     }
+
+
+def in_band_of(proof: HeldOut) -> dict[str, Any] | None:
+    """Misfits on held-out data in the loop's own band, and its shortest and longest period [s]."""
+    if proof.band is None or proof.banded is None:
+        return None
+    shortest, longest = proof.band
+    baseline, explained = map(asdict, proof.banded)
+    return {"shortest_s": shortest, "longest_s": longest, "baseline": baseline, "explained": explained}
 
 
 def constants_moved(found: Explanation) -> dict[str, tuple[float, float]]:

@@ -75,6 +75,7 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
         law=law,
         late_s=late * s.dt_s,
         cycles=s.cycles,
+        band=s.band,
     )
     if any(ends(x) is Ends.ALL for x in (recorder, controller)):
         return carried_over(found)
@@ -186,15 +187,16 @@ def with_cycles(x: Round, seen: SeenInCycles, candidates: list[Candidate]) -> li
 def shown_by_cycles(s: Recording, candidates: Sequence[Candidate]) -> Candidate | None:
     """The best play or stick-slip, where the loop's cycles show a faulty valve; None where they do not.
 
-    The kind that the night tells is kept: it asks each stretch by itself, and weighs what one friction over hours
-    does not, as a slip now and then late.
+    The kind that the night tells is kept, and its figures where there are some of that form: it asks each stretch by
+    itself, and weighs what one friction over hours does not, as a slip now and then late.
     """
     if s.cycles is None:
         return None
     rubs = [c for c in candidates if is_friction(c.name)]
     sticks = isinstance(s.cycles.valve, Stiction)
-    alike = (c for c in rubs if (about(c.name).friction is Friction.STICKS) == sticks)
-    return next(iter([*alike, *rubs]), None)
+    alike = [c for c in rubs if (about(c.name).friction is Friction.STICKS) == sticks]
+    same = [c for c in alike if {q.name for q in c.row.params} == s.cycles.told.keys()]
+    return next(iter([*same, *alike, *rubs]), None)
 
 
 def proven(x: Round, candidates: list[Candidate]) -> Candidate | None:

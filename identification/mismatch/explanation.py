@@ -50,9 +50,9 @@ class Explanation:
     what is left and has no name, 0 where nothing is, and left_by : the way of the reference that foretells it
     (reference.py); proof : plain and best on held-out data; refuted : names of effects that explain the fitted part
     and not the rest; unproven : whether OP moved once, so that nothing is left to prove the effects on; cycles : the
-    faulty valve that the loop's cycles show; others : misfits on other recordings, where some were held out whole;
-    by_innovations : in an experiment, what innovations alone explain; outside : physics of no name that explains it
-    better than any that has one.
+    faulty valve that the loop's cycles show; band : the loop's own, as in Recording; others : misfits on other
+    recordings, where some were held out whole; by_innovations : in an experiment, what innovations alone explain;
+    outside : physics of no name that explains it better than any that has one.
     """
 
     p: Problem = field(repr=False)
@@ -70,6 +70,7 @@ class Explanation:
     refuted: tuple[str, ...] = ()
     unproven: bool = False
     cycles: SeenInCycles | None = None
+    band: tuple[float, float] | None = None
     others: tuple[OnOther, ...] = ()
     outside: Candidate | None = None
     by_innovations: Explanation | None = field(default=None, repr=False)
@@ -149,13 +150,13 @@ def carried_over(found: Explanation) -> Explanation:
     for count in range(len(names), 0, -1):
         kept = found if count == len(names) else first_effects(found, count)
         cycling = count == 1 and by_cycles(found)
-        proof = held_out(kept.p, kept.plain, kept.best, cycle if cycling else 0)
+        proof = held_out(kept.p, kept.plain, kept.best, cycle if cycling else 0, found.band)
         unjudged = is_one_move(found.p) or proof.is_blind
         unproven = not proof.carries and proof.falls and unjudged
         timed = proof.falls and all(EFFECTS[name].timed for name in names[:count])
         if proof.carries or unproven or cycling or timed:
             return replace(kept, proof=proof, refuted=names[count:], unproven=unproven)
-    proof = held_out(found.p, found.plain, found.plain)
+    proof = held_out(found.p, found.plain, found.plain, band=found.band)
     outside = None if names else found.outside
     return replace(found, best=found.plain, accepted=(), proof=proof, refuted=names, outside=outside)
 

@@ -21,7 +21,7 @@ from identification.mismatch.effect import Effect
 from identification.mismatch.friction import WEARS, simulated_anew
 from identification.mismatch.starts import Round, at_inlet, early_part, fitted_early
 from identification.record import Floats, Mask
-from identification.signals.filters import without_lines
+from identification.signals.filters import in_band, without_lines
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
 
@@ -151,7 +151,8 @@ class HeldOut:
     overall : misfit over the whole record of the models fitted to all of it, which is what pages draw, and drawn :
     their constants, shape (SIZE,) each; window : samples after which the simulations begin anew, 0 for one run over
     all; placed : whether the stem of a valve with friction is then placed anew too (friction.py); least_plain : least
-    held-out misfit of a plain loop by either criterion [% PV].
+    held-out misfit of a plain loop by either criterion [% PV]; band : shortest and longest period [s] of the loop's
+    own band, and banded : held-out misfits there, None where no band is known.
     """
 
     gain: float
@@ -162,6 +163,8 @@ class HeldOut:
     window: int = 0
     placed: bool = False
     least_plain: float = np.inf
+    band: tuple[float, float] | None = None
+    banded: tuple[Misfit, Misfit] | None = None
     limits: ExplainLimits = LIMITS
 
     @property
@@ -200,6 +203,12 @@ class HeldOut:
         before, after = (m.rmse**2 for m in self.held)
         return 1.0 - after / max(before, 1e-30)
 
+    @property
+    def share_in_band(self) -> float:
+        """The same in the loop's own band where one is known: beyond it the load drowns what a model says."""
+        before, after = (m.rmse**2 for m in self.banded or self.held)
+        return 1.0 - after / max(before, 1e-30)
+
 
 def course(p: Problem, c: Floats, window: int, placed: bool) -> Floats:
     """PV's deviation [% PV], shape (n,), as drawn and judged: anchored in windows, the stem placed anew or not."""
@@ -226,17 +235,29 @@ def pair_of(p: Problem, fits: tuple[Fitted, Fitted], judged: Mask) -> Pair:
 @dataclass(frozen=True, slots=True)
 class Criterion:
     """How simulations are drawn and judged: begun anew after `window` samples, 0 for never, the stem `placed` anew or
-    not."""
+    not; band : shortest and longest period [samples] of the loop's own band, None where none is known."""
 
     p: Problem
     window: int = 0
     placed: bool = False
+    band: tuple[float, float] | None = None
+
+    def free(self, c: Floats) -> Floats:
+        """PV as constants, shape (SIZE,), simulate it."""
+        return simulated_anew(self.p, c, self.window) if self.placed else simulate(self.p.inputs, c)
 
     def misfit(self, c: Floats, part: slice = slice(None)) -> Misfit:
         """What constants, shape (SIZE,), leave of a part of PV."""
-        p = self.p
-        free = simulated_anew(p, c, self.window) if self.placed else simulate(p.inputs, c)
-        return misfit(p.y, free, self.window, part)
+        return misfit(self.p.y, self.free(c), self.window, part)
+
+    def banded(
+        self, models: Iterable[Floats], band: tuple[float, float], first: slice, rest: slice
+    ) -> Misfit:
+        """What models' constants, those that leave least of the first part in a band, leave of the rest there."""
+        y = self.p.y
+        left = min((in_band(y - self.free(c), *band) for c in models), key=lambda x: float(np.std(x[first])))
+        rmse, moves = (float(np.std(x[rest])) for x in (left, in_band(y, *band)))
+        return Misfit(rmse, 100.0 * (1.0 - rmse / max(moves, 1e-12)))
 
     def least(self, models: Iterable[Floats], part: slice = slice(None)) -> Floats:
         """Of models' constants those that leave least of a part."""
@@ -267,6 +288,7 @@ class Criterion:
         plains, betters = self.candidates(early)
         chosen = self.least(plains, first), self.least(betters, first)
         drawn_plain, drawn_better = (self.least(models) for models in self.candidates(final))
+        band, dt_s = self.band, self.p.inputs.dt_s
         return HeldOut(
             won,
             (self.misfit(chosen[0], first), self.misfit(chosen[1], first)),
@@ -276,30 +298,34 @@ class Criterion:
             self.window,
             self.placed,
             min(self.misfit(c, rest).rmse for c in plains),
+            band and (band[0] * dt_s, band[1] * dt_s),
+            band and (self.banded(plains, band, first, rest), self.banded(betters, band, first, rest)),
             self.p.limits,
         )
 
 
-def held_out(p: Problem, worse: Fitted, better: Fitted, cycle: int = 0) -> HeldOut:
+def held_out(
+    p: Problem, worse: Fitted, better: Fitted, cycle: int = 0, band: tuple[float, float] | None = None
+) -> HeldOut:
     """Both models fitted anew to the first part of the record and compared on the rest: over the whole of it, and
     where load drowns the difference there, over windows of some time constants of the plain loop; a plain loop beside
     itself over the whole alone.
 
     cycle : samples of a cycle of a loop whose cycles show a valve with friction, 0 for any other; they are compared
-    over such windows too, the stem placed anew in each.
+    over such windows too, the stem placed anew in each; band : as in Criterion.
     """
     first = fitted_early(p, worse)
     fits = first, first if better is worse else fitted_early(p, better)
     _, cut = early_part(p)
     early = pair_of(p, fits, p.usable & (np.arange(p.y.size) < cut))
     told = early, pair_of(p, (worse, better), p.usable), held_out_gain(p, fits)
-    whole = Criterion(p).compared(*told)
+    whole = Criterion(p, band=band).compared(*told)
     if whole.carries or better is worse:
         return whole
     c, limits = early.plain.c, p.limits.proof
     memory = limits.window_times * float(c[Slot.T] + c[Slot.L]) / p.inputs.dt_s
-    windowed = Criterion(p, max(int(memory), limits.window_samples)).compared(*told)
+    windowed = Criterion(p, max(int(memory), limits.window_samples), False, band).compared(*told)
     if cycle:
-        anew = Criterion(p, cycle, True).compared(*told)
+        anew = Criterion(p, cycle, True, band).compared(*told)
         return windowed if windowed.carries and windowed.share > anew.share else anew
     return windowed if windowed.carries else whole

@@ -42,7 +42,8 @@ class Recording:
     dt_s [s]; stamp_s : stamps as logged [s]; stated : the controller as the plant states it; ranged : whether PV's
     range is stated; neighbours : OPs of other loops on the same clock, each shape (n,);
     kind : the loop's type as stated, lower case; cycles : the faulty valve that its cycles show, None where they show
-    none; free_valve : whether it cycles and its cycles convict no valve; limits : what decides about it.
+    none; free_valve : whether it cycles and its cycles convict no valve; period_s : of its cycle [s], 0 where it has
+    none; limits : what decides about it.
     """
 
     sp: Floats | None
@@ -57,6 +58,7 @@ class Recording:
     kind: str = ""
     cycles: SeenInCycles | None = None
     free_valve: bool = False
+    period_s: float = 0.0
     limits: ExplainLimits = LIMITS
 
     @property
@@ -66,7 +68,21 @@ class Recording:
         scans = self.dt_s / limits.typical_scan_s if self.stated is None else self.stated.scans
         return scans < limits.thinned
 
+    @property
+    def band(self) -> tuple[float, float] | None:
+        """Shortest and longest period [samples] in which a model of the loop speaks and not its slow load: an eighth
+        of its cycle and two of them, without a cycle all up to four integral times; None where neither is known."""
+        if self.period_s > 0.0:
+            cycle = self.period_s / self.dt_s
+            return cycle / FINEST, CYCLES * cycle
+        if self.stated is None or not 0.0 < self.stated.ti < self.pv.size / INTEGRALS:
+            return None
+        return 2.0, INTEGRALS * self.stated.ti
 
+
+FINEST, CYCLES, INTEGRALS = 8.0, 2.0, 4.0
+"""The loop's band: harmonics of a cycle up to the eighth, its second subharmonic, integral times; ours: play and
+stick-slip show in the first seven harmonics, a load below half of the cycle's frequency."""
 STEP = "step_pct"
 """Name of the number that says in which steps a finding leaves PV [% PV]."""
 

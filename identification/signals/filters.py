@@ -1,4 +1,4 @@
-"""Filters over whole trends: first order, a notch about one period, straight lines taken out."""
+"""Filters over whole trends: a notch about one period, a band of periods, straight lines taken out."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
 
 from identification.record import Floats
 
@@ -20,6 +21,15 @@ def notch(x: Floats, period: float, width: float) -> Floats:
     radius = math.exp(-0.5 * w * width)
     level = (1 - 2 * radius * math.cos(w) + radius**2) / (2 - 2 * math.cos(w))
     return _second_order(np.ascontiguousarray(x), math.cos(w), radius, level)
+
+
+def in_band(x: Floats, shortest: float, longest: float) -> Floats:
+    """The signal, shape (n,), within a band of periods [samples], both ways through a second-order Butterworth
+    filter, so that nothing is late; all that is faster than `longest` where the shortest is about two samples."""
+    fast = 2.0 / shortest if shortest > 2.0 else 1.0
+    slow = min(2.0 / longest, 0.9 * fast)
+    cut, kind = (slow, "highpass") if fast >= 0.95 else ([slow, fast], "bandpass")
+    return np.asarray(sosfiltfilt(butter(2, cut, kind, output="sos"), x - x.mean()), dtype=np.float64)
 
 
 @njit(cache=True)

@@ -53,6 +53,9 @@ def test_the_effect_is_of_the_nights_kind(valve: Backlash | Stiction, taken: str
     seen = SeenInCycles(Fopdt(1.0, 10.0, 1.0), valve, 10, 0.9, 100.0)
     x = np.zeros(4)
     s = Recording(None, x, x, x == 0.0, 1.0, x, cycles=seen)
-    order: list[Any] = [SimpleNamespace(name=name) for name in ("positioner", "stiction", "backlash")]
+    row = SimpleNamespace(params=())
+    order: list[Any] = [
+        SimpleNamespace(name=name, row=row) for name in ("positioner", "stiction", "backlash")
+    ]
     for candidates in (order, order[::-1]):
         assert shown_by_cycles(s, candidates).name == taken  # type: ignore[union-attr]
