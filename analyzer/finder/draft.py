@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from analyzer.finder.clock import Sampled, sampled
-from analyzer.finder.pairs import FoundPair, found_pairs, known_pair
+from analyzer.finder.pair import FoundPair, known_pair
+from analyzer.finder.pairs import found_pairs
 from analyzer.history.export import Export
 from analyzer.limits import FINDER
 from analyzer.loops.spec import COLUMNS as STATED_COLUMNS

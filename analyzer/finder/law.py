@@ -40,6 +40,11 @@ class Moves:
         value, integral = value - value.mean(axis=0), integral - integral.mean(axis=0)
         return cls(value, integral, innovations(value))
 
+    def at(self, rows: NDArray[np.int64]) -> Moves:
+        """Some of the moves, of which those have innovations that are late enough."""
+        late = rows[rows >= FINDER.past]
+        return Moves(self.value[late], self.integral[late], self.innovation[late - FINDER.past])
+
     def of_tags(self, count: int) -> Moves:
         """The first tags alone."""
         return Moves(self.value[:, :count], self.integral[:, :count], self.innovation[:, :count])
@@ -63,16 +68,17 @@ def shared_noise(causes: Moves, effects: Moves) -> Matrix:
     return (_unit(causes.innovation).T @ _unit(effects.innovation)) ** 2
 
 
-def direction(moves: Moves, pv: int, op: int) -> float:
-    """How much more the pair looks like a controller from `pv` to `op` than from `op` to `pv`, in standard errors.
+def direction(moves: Moves, pv: int, op: int, rows: NDArray[np.int64]) -> float:
+    """How much more some rows of the moves look like a controller from `pv` to `op` than from `op` to `pv`, in
+    standard errors.
 
     Of a controller moves and integral act the same way. The other way round they do not: what OP owes to the noise
     of PV has the sign of the controller, what PV owes to OP that of the process, and feedback has both opposite.
     """
 
     def agreeing(cause: int, effect: int) -> float:
-        columns = moves.value[:, cause], moves.integral[:, cause], moves.integral[:, effect]
-        slope, error = fitted(moves.value[:, effect], *columns)
+        columns = moves.value[rows, cause], moves.integral[rows, cause], moves.integral[rows, effect]
+        slope, error = fitted(moves.value[rows, effect], *columns)
         return float(slope[1] / error[1] * np.sign(slope[0]))
 
     return agreeing(pv, op) - agreeing(op, pv)
@@ -91,7 +97,7 @@ def fitted(wanted: Matrix, *columns: Matrix) -> tuple[Matrix, Matrix]:
 def blocks(values: Matrix, width: int) -> Matrix:
     """Averages of neighbouring samples, shape (blocks, tags)."""
     whole = len(values) // width * width
-    return np.asarray(values[:whole].reshape(-1, width, values.shape[1]).mean(axis=1))
+    return np.asarray(values[:whole].reshape(whole // width, width, values.shape[1]).mean(axis=1))
 
 
 def _unit(columns: Matrix) -> Matrix:
