@@ -62,6 +62,17 @@ def free_moves(op: Matrix, width: int) -> np.ndarray:
     return np.flatnonzero(within[1:] & within[:-1])
 
 
+def alike(values: Matrix) -> NDArray[np.bool_]:
+    """Which tags stand at the same level and move the same way, shape (tags, tags): a stem where its output stands,
+    two sensors, a PV that keeps up with its SP; none is the PV of the other."""
+    x, moves = values - values.mean(axis=0), np.diff(values, axis=0)
+    spread, mean = x.std(axis=0), values.mean(axis=0)
+    cross = x.T @ x / len(x)
+    away = spread[:, None] ** 2 + spread**2 - 2.0 * cross + (mean[:, None] - mean) ** 2
+    near = away <= (FINDER.position * np.minimum.outer(spread, spread)) ** 2
+    return np.asarray(near & (moves.T @ moves > 0.0))
+
+
 def at_no_limit(held: Matrix, width: int) -> NDArray[np.int64]:
     """Moves between blocks of which neither has a tag at a limit, of those of `held` that rest at limits at all."""
     free = [free_moves(x, width) for x in held.T if limited(x)]

@@ -85,7 +85,8 @@ def _pair(
     may = [True, *(len(cause) > 1 or width >= FINDER.longest for width in scores.widths[1:])]
     asked = asked_of(scores.widths)
     w = int(np.argmax(np.where(may, _enough(law * np.sqrt(noise), noise, asked), 0.0)))
-    others = np.flatnonzero(~np.isin(bag.live, [k for k in (pv, sp, tag, *slaves) if k is not None]))
+    one = np.array(bag.live)[scores.alike[[j, bag.live.index(pv)]].any(axis=0)]
+    others = np.flatnonzero(~np.isin(bag.live, [k for k in (pv, sp, tag, *slaves, *one) if k is not None]))
     rivals = scores.weight(w, others, j)
     told = int(np.argmax(law >= min(FINDER.law_told, law.max())))
     return FoundPair(
