@@ -24,6 +24,19 @@ def nearness(values: Matrix, tags: Sequence[int], set_points: Sequence[int]) -> 
     return near + tracked(x, s)
 
 
+def deviation_of_mean(error: Matrix) -> Matrix:
+    """Standard errors of the means of tags that drift, shape (n, tags), from averages over long blocks."""
+    slow = blocks(error, max(len(error) // FINDER.drift_blocks, 1))
+    return np.asarray(slow.std(axis=0) / np.sqrt(len(slow)))
+
+
+def by_chance(x: Matrix, set_points: Matrix) -> Matrix:
+    """What of the nearness of the mean of a tag to set points, shape (n, set points), is chance: a distance below its
+    standard error shows no more than that."""
+    away, error = np.abs(x.mean() - set_points.mean(axis=0)), deviation_of_mean(x[:, None] - set_points)
+    return closeness(away, x.std()) - closeness(np.maximum(away, error), x.std())
+
+
 def closeness(away: Matrix, spread: Matrix | float) -> Matrix:
     """Log of a spread over a distance, 0 where that is the larger."""
     return np.asarray(-np.log(np.clip(away / np.maximum(spread, TINY), FINDER.nearest, 1.0)))

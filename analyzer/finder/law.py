@@ -34,11 +34,17 @@ class Moves:
     @classmethod
     def of(cls, values: Matrix, width: int) -> Moves:
         """From values, shape (n, tags), in blocks of `width` samples."""
+        plain = cls.plain(values, width)
+        return cls(plain.value, plain.integral, innovations(plain.value))
+
+    @classmethod
+    def plain(cls, values: Matrix, width: int) -> Moves:
+        """Without innovations, which take longest."""
         centred = values - values.mean(axis=0)
         running = np.cumsum(centred, axis=0) - centred / 2
         value, integral = (np.diff(blocks(x, width), axis=0) for x in (centred, running))
         value, integral = value - value.mean(axis=0), integral - integral.mean(axis=0)
-        return cls(value, integral, innovations(value))
+        return cls(value, integral, np.empty((0, value.shape[1])))
 
     def at(self, rows: NDArray[np.int64]) -> Moves:
         """Some of the moves, of which those have innovations that are late enough."""

@@ -26,14 +26,15 @@ class FoundPair:
     """A loop that the data show; places of tags in the bag.
 
     law : share of OP's moves that the law explains, 0 to 1, in blocks of `width` samples; noise : share of the
-    innovations of OP and PV that is one; asked : weight from which a pair counts at this width; runner_up : weight of
-    the next best tag; towards : how much more the law holds from PV to OP than back; freer : how much more OP drifts
-    and rests at limits; nearer : how much nearer SP is to PV than to OP; own : how near a set point of no other pair
-    lies to OP, 1 where far; resolved : whether neighbouring averages are alike; acts : whether SP moves OP as PV
-    does; answers : whether OP, and no other tag, moves at once with SP; told : share that the law explains in blocks
-    of `told_width`, the shortest in which it holds; kp : gain, in units of OP per unit of PV, negative where OP rises
-    with PV; ti_samples : integral time, inf where none acts, None where two ways to it disagree: noise of PV between
-    its samples hides it from the one, not from the other, which asks the samples beside.
+    innovations of OP and PV that is one; asked : weight from which a pair counts at this width; runner_up : weight
+    of the next best tag; towards : how much more the law holds from PV to OP than back; freer : how much more OP
+    drifts and rests at limits; nearer : how much nearer SP is to PV than to OP; own : how near a set point of no
+    other pair lies to OP, 1 where far; resolved : whether neighbouring averages are alike; acts : whether SP moves
+    OP as PV does; answers : whether OP, and no other tag, moves at once with SP; other : most that another tag
+    explains of OP with an SP that moves; told : share that the law explains in blocks of `told_width`, the shortest
+    in which it holds; kp : gain, in units of OP per unit of PV, negative where OP rises with PV; ti_samples :
+    integral time, inf where none acts, None where two ways to it disagree: noise of PV between its samples hides it
+    from the one, not from the other, which asks the samples beside.
     """
 
     pv: int
@@ -51,6 +52,7 @@ class FoundPair:
     resolved: bool = True
     acts: bool = False
     answers: bool = False
+    other: float = 0.0
     told: float = 0.0
     told_width: int = 1
     kp: float = 0.0
@@ -63,7 +65,7 @@ class FoundPair:
 
     @property
     def sure_pct(self) -> float:
-        """How sure the pair is [%], by the weakest of its signs: the weight, the runner-up, which of both is OP;
+        """How sure the pair is [%], by the weakest of its signs: the weight, the runners-up, which of both is OP;
         and an OP that rises with PV, where nothing tells which is which, may be the PV of a follower."""
         less = FINDER.acting if self.acts else 1.0
         law = (
@@ -74,6 +76,7 @@ class FoundPair:
         )
         signs = (
             *(() if self.answers else law),
+            self.law / max(FINDER.second * self.other, TINY),
             (self.towards + self.freer + self.nearer) / FINDER.turned,
             self.own / FINDER.own if self.weight < FINDER.plain else np.inf,
         )

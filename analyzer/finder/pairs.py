@@ -11,8 +11,16 @@ from numpy.typing import NDArray
 
 from analyzer.finder.bag import Bag
 from analyzer.finder.choice import one_to_one, preferred
-from analyzer.finder.held import closeness, law_of, limited, nearness, resting_level
-from analyzer.finder.law import Matrix, widths
+from analyzer.finder.held import (
+    alike,
+    by_chance,
+    closeness,
+    law_of,
+    limited,
+    nearness,
+    resting_level,
+)
+from analyzer.finder.law import Matrix, Moves, explained, widths
 from analyzer.finder.pair import FoundPair, with_settings
 from analyzer.finder.scores import Scores, scored
 from analyzer.finder.way import acts, freer, pv_and_sp, resolved, towards
@@ -137,7 +145,24 @@ def _with_set_points(bag: Bag, pairs: Sequence[FoundPair]) -> list[FoundPair]:
     claimed = {k for i, k in held.items() if near[i, :, k].max() > -np.log(FINDER.claimed)}
     loose = [k for k in range(len(free)) if k not in claimed]
     out = [_with_set_point(bag, p, near[i], held.get(i), free, loose) for i, p in enumerate(pairs)]
+    out = [replace(p, other=_other_pv(bag, p, out)) for p in out]
     return sorted((with_settings(bag, p) for p in out), key=lambda p: -p.weight)
+
+
+def _other_pv(bag: Bag, pair: FoundPair, pairs: Sequence[FoundPair]) -> float:
+    """The most that the law explains of OP by any other tag with a set point that moves, in blocks of the pair's
+    width: a tag that only follows SP is held there too. What stands where PV or OP does, or follows OP, is none."""
+    if pair.sp is None or pair.sp in bag.still:
+        return 0.0
+    slaves = {p.pv for p in pairs if p.sp is not None and bag.same[p.sp] == bag.same[pair.op]}
+    tags = [k for k in bag.live if k not in {pair.pv, pair.op, bag.same[pair.sp], *slaves}]
+    error = bag.values[:, tags] - bag.values[:, [pair.sp]]
+    op = Moves.plain(bag.values[:, [pair.op]], pair.width)
+    law = explained(Moves.plain(error, pair.width), op)[:, 0]
+    for k in np.argsort(-law):
+        if not alike(bag.values[:, [pair.pv, pair.op, tags[k]]])[2, :2].any():
+            return float(law[k])
+    return 0.0
 
 
 def _near_both(bag: Bag, pair: FoundPair, free: Sequence[int], known: Matrix) -> Matrix:
@@ -148,6 +173,7 @@ def _near_both(bag: Bag, pair: FoundPair, free: Sequence[int], known: Matrix) ->
         x = bag.values[:, tag]
         rest, error = resting_level(x, bag.values[:, other], pair.told_width)
         by_law = closeness(np.maximum(np.abs(level - rest), error), x.std())
+        near[at] -= by_chance(x, bag.values[:, free])
         near[at, still] = np.maximum(near[at], by_law)[still]
         if free:
             best = int(np.argmax(near[at]))
@@ -171,6 +197,7 @@ def _with_set_point(
     else:
         pv, op = (0.0, 0.0) if k is None else near[:, k]
     most = FINDER.certain * (1 if pair.sp is None and (k is None or free[k] in bag.still) else 2)
+    pv, op = max(pv, 0.0), max(op, 0.0)  # that SP is far from one tag does not bring it near the other
     turned = _turned(replace(pair, nearer=float(np.clip(pv - op, -most, most))))
     at_pv, at_op = near if turned.pv == pair.pv else near[::-1]
     if pair.sp is None and k is not None and at_pv[k] > 0.0:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from analyzer.finder.held import answers, nearness, resting_level
+from analyzer.finder.held import answers, deviation_of_mean, nearness, resting_level
+from analyzer.finder.pair import FoundPair
 from analyzer.finder.pairs import found_pairs
 from analyzer.limits import FINDER
 from tests.analyzer.finder.test_finder_pairs import pi_loop, strangers
@@ -65,3 +68,21 @@ def test_a_tag_that_repeats_a_set_point_does_not_answer_it() -> None:
     """The output of a master in another unit is its slave's set point, and no output of the slave."""
     op = np.cumsum(np.random.default_rng(5).normal(size=3000))
     assert answers(np.column_stack([0.5 * op + 3.0, op]), (0,), (1,))[0, 0] < FINDER.answers
+
+
+def test_op_that_answers_is_no_proof_of_pv() -> None:
+    """A pair whose OP answers the set point is not sure where another tag explains far more of OP with that SP."""
+    answering = FoundPair(0, 1, 2, 0.4, 0.6, 1, 0.04, 0.0, freer=4.0, answers=True, other=0.4)
+    assert answering.sure_pct >= FINDER.sure_pct
+    assert replace(answering, other=0.99).sure_pct < FINDER.sure_pct
+
+
+def test_a_mean_that_drifts_is_known_to_its_standard_error() -> None:
+    """The standard error of the mean of a first-order process is the theory's, within a third."""
+    rng = np.random.default_rng(6)
+    n, a = 20000, 0.95
+    x = np.empty(n)
+    x[0] = 0.0
+    for k in range(1, n):
+        x[k] = a * x[k - 1] + rng.normal()
+    assert deviation_of_mean(x[:, None])[0] == pytest.approx(1.0 / (1.0 - a) / np.sqrt(n), rel=1 / 3)
