@@ -36,12 +36,14 @@ COLUMNS = ["loop", "cause", "oscillating_pct"]
 Told = Mapping[str, bool]
 
 
-def asked(folder: Path, out: Path) -> dict[str, dict[str, object]]:
+def asked(
+    folder: Path, out: Path, columns: list[str] = COLUMNS, jobs: int = 2
+) -> dict[str, dict[str, object]]:
     """The night's rows of a folder of recordings, by loop."""
-    order = ["triage", "run", folder, "--loops", folder / "loops.csv", "--store", out, "--jobs", "2"]
+    order = ["triage", "run", folder, "--loops", folder / "loops.csv", "--store", out, "--jobs", jobs]
     subprocess.run([str(part) for part in order], check=True, capture_output=True)
     store = Store(out)
-    return {r["loop"]: r for name in store.nights() for r in store.rows("nights", name, COLUMNS)}
+    return {r["loop"]: r for name in store.nights() for r in store.rows("nights", name, columns)}
 
 
 def trends(folder: Path, loop: str) -> tuple[Floats, Floats | None]:

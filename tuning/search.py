@@ -235,19 +235,13 @@ def _kept(table: Bench, most: Rejection, settings: list[Pid]) -> list[Candidate]
 
 
 def _grid(loop: Loop, most: Rejection, limits: TuningLimits) -> tuple[Floats, Floats]:
-    """Gains [% OP / % PV] and integral times [s] of the coarse grid.
-
-    With play before a lag no integral time is shorter than the time constant (the source study's Eq. 6), where load
-    rejection lets it be as long: else the lag is as good as an integrator.
-    """
+    """Gains [% OP / % PV] and integral times [s] of the coarse grid. With play before a lag the best is often at the
+    time constant (the source study's Eq. 6), but not always: the simulation decides."""
     nominal, now = simc(loop.process, scan_s=scan_step(loop)), loop.controller
     high = min(limits.gain_up * abs(now.kp), 2.0 * abs(nominal.kp))
     down = limits.gain_down_play if is_play(loop.valve) else limits.gain_down_stick
     low = min(limits.gain_down * abs(now.kp), down * abs(nominal.kp))
     shortest = 0.5 * min(integral_s(now), nominal.ti_s)
-    lag = loop.process.time_constant_s if isinstance(loop.process, Fopdt) else math.inf
-    if is_play(loop.valve) and lag <= most.integral * high:
-        shortest = lag
     longest = max(most.integral * high, 2.0 * shortest)
     return np.geomspace(low, high, GAINS), np.geomspace(shortest, longest, TIMES)
 
@@ -266,5 +260,6 @@ def search(table: Bench) -> tuple[Candidate, ...]:
     best = min(coarse, key=lambda c: c.score).controller
     step = np.linspace(-1.0, 1.0, FINE)
     longer = np.maximum(best.ti_s * (times[1] / times[0]) ** step, times[0])
-    fine = pairs(loop, abs(best.kp) * (gains[1] / gains[0]) ** step, np.unique(longer))
+    near = np.clip(abs(best.kp) * (gains[1] / gains[0]) ** step, gains[0], gains[-1])
+    fine = pairs(loop, np.unique(near), np.unique(longer))
     return tuple(sorted(coarse + _kept(table, most, fine), key=lambda c: c.score))

@@ -63,7 +63,7 @@ class LoopNight:
     has one by all nights, and worn_alone by this one; cycle_s, period of a cycle that the valve makes [s], 0 for
     none; frequency [Hz] and level [dB of % PV per line], shape (b,), of the error without what the set point
     explains; duration_s; error [% PV], its recorded average; op_travel [%/h]; moves [1/h] and their size [% PV] of
-    the set point; from_outside, whether a load's cycle was told.
+    the set point; from_outside, whether a load's cycle was found; cycles, whether the loop cycles at all.
     """
 
     constants: tuple[Floats, Floats] | None
@@ -81,6 +81,7 @@ class LoopNight:
     moves: float
     size: float
     from_outside: bool
+    cycles: bool
 
     @property
     def noise_db(self) -> float:
@@ -142,6 +143,7 @@ def night_of(row: Mapping[str, Any]) -> LoopNight | None:
         moves / hours if moves else (1.0 / hours if travel else 0.0),
         travel / moves if moves else travel,
         row["cause"] == Cause.LOAD and counts(row["oscillating_pct"]),
+        row["period_s"] is not None and counts(row["oscillating_pct"]),
     )
 
 
@@ -213,8 +215,10 @@ class Weeks:
 
     @property
     def cured(self) -> bool:
-        """Whether a valve at fault shows its fault in few nights after, and did in most before."""
-        was, is_now = (sum(n.worn_alone for n in side) / len(side) for side in (self.before, self.after))
+        """Whether a valve at fault shows its fault in few nights after, and did in most before; a loop that still
+        cycles hides the fault."""
+        was = sum(n.worn_alone for n in self.before) / len(self.before)
+        is_now = sum(n.worn_alone or n.cycles for n in self.after) / len(self.after)
         return any(n.at_fault for n in self.before) and was > 0.5 and is_now <= 0.5 * was
 
 

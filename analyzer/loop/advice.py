@@ -298,7 +298,8 @@ def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Con
     if period_s is not None and load.size >= config.tuning.least_steps:
         apart = agreement(sought, fit, load, period_s).worst(config.advice)
         if apart is not None:
-            return Proposed(Proposal(Action.UNDECIDED, SAID["disagrees"].format(*apart)))
+            differs = SAID["off_by"].format(*apart) if apart[1] > 0.0 else SAID["no_cycle"]
+            return Proposed(Proposal(Action.UNDECIDED, SAID["disagrees"].format(differs)))
     return Proposed(recommend(sought, verdict.cause, others, load, config.tuning), sought, load, others)
 
 

@@ -63,7 +63,7 @@ def agreement(loop: Loop, fit: Fit, load: Floats, period_s: float) -> Agreement:
     simulated = [_travel(x[::every], every * scan_s) for x in (sim.op, sim.stem)]
     op, moved = (s / max(r, 1e-9) for s, r in zip(simulated, recorded, strict=True))
     error = float(np.mean(np.abs(sim.error))) / max(recorded_error(fit, loop.controller), 1e-9)
-    return Agreement(_period_s(sim) / period_s, error, op, moved)
+    return Agreement(period_of(sim) / period_s, error, op, moved)
 
 
 def _travel(x: Floats, dt_s: float) -> float:
@@ -71,7 +71,7 @@ def _travel(x: Floats, dt_s: float) -> float:
     return float(np.abs(np.diff(x)).sum()) / max((x.size - 1) * dt_s, 1e-9)
 
 
-def _period_s(r: LoopRecord) -> float:
+def period_of(r: LoopRecord) -> float:
     """Period of the autocorrelation's first peak that is nearly its highest beyond its first zero [s], 0 where it has
     none."""
     x = r.error - r.error.mean()
@@ -82,6 +82,8 @@ def _period_s(r: LoopRecord) -> float:
     if not below.size:
         return 0.0
     rest = sums[below[0] :]
+    if rest.max() <= 0.0:
+        return 0.0
     first = int(np.argmax(rest >= NEARLY * rest.max()))
     back = np.flatnonzero(rest[first:] < 0.5 * rest[first])
     end = first + int(back[0]) if back.size else rest.size

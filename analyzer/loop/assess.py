@@ -26,7 +26,7 @@ from analyzer.loop.cause import (
     with_worn_valve,
 )
 from analyzer.loop.cycling_span import Span, detect_where_it_cycles
-from analyzer.loop.decisions import COUNTS_PCT, Cause, Lack, LacksError, Need, Needs
+from analyzer.loop.decisions import Cause, Lack, LacksError, Need, Needs
 from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
 from analyzer.loop.judged_stretch import Earlier, Shown, Stretch, as_recorded, judged_stretch, shown
 from analyzer.loop.measure import Measured, measure, ringing_period, time_scale
@@ -155,10 +155,9 @@ def _rung(
     """What oscillates and why in a loop whose identified model rings at a period [s]; None where the error
     does not."""
     near = detect(prepared.record, config.oscillation.nearly(), whole=True)
-    if near.first is None or not same_period(near.first.period_s, period_s, config.cause):
+    first = counting(near)
+    if first is None or not same_period(first.period_s, period_s, config.cause):
         return None
-    lasting = max(near.first.oscillating_pct, COUNTS_PCT)  # its damping is that of all hours, its size is not
-    near = replace(near, found=(replace(near.first, oscillating_pct=lasting), *near.found[1:]))
     told = cause_of(prepared, near, controller, config, kind)
     return (near, told) if told.cause is Cause.TUNING else None
 

@@ -39,9 +39,10 @@ from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
 from analyzer.loop.ringing import Regularity, Ringing
 from identification.errors import NotAssessedError
+from identification.estimation.backlash_stiction import refined
 from identification.estimation.beside_line import BesideLine, beside_line
 from identification.estimation.gauss_newton import descend
-from identification.estimation.irregular_slips import SlipPath, fit_irregular, path_evidence
+from identification.estimation.irregular_slips import SlipPath, fit_irregular, near_path, path_evidence
 from identification.estimation.noise import generic_noise
 from identification.estimation.smooth_load import as_fit
 from identification.estimation.window import Fit
@@ -407,10 +408,10 @@ def told_slip_by_slip(verdict: Verdict, period_s: float, limits: CauseLimits) ->
     """The verdict on a loop that cycles, its valve's fault named anew where slips that scatter explain PV better.
 
     The cause stays: what is asked is how the valve fails that PV and OP convict already. Where its stem is told slip
-    by slip, the window has it as if it had been recorded. Settings are sought on the verdict before: sought on this
-    one, whose stem takes up part of what the load did, they left 7 of 24 sticking loops of proofs/retuning.py
-    (seeds 21, 22, 81, 82) with no smaller error, one with a larger by 47 %. Sought on the verdict before, they left
-    none of 14 (81, 82). The cycle has a period of period_s [s].
+    by slip, the window has it as if it had been recorded. Settings are sought with one friction for all slips, found
+    about the path's: sought on this verdict, whose stem takes up part of what the load did, they left 7 of 24
+    sticking loops of proofs/retuning.py (seeds 21, 22, 81, 82) with no smaller error, one with a larger by 47 %. The
+    cycle has a period of period_s [s].
     """
     m = verdict.measured
     if (
@@ -428,16 +429,25 @@ def told_slip_by_slip(verdict: Verdict, period_s: float, limits: CauseLimits) ->
         return verdict
     jump = path_evidence(path, play)
     more = jump - max(m.jump, 0.0)
-    if more < max(limits.evidence_jump, limits.jump_share * (m.evidence + more)):
+    new = verdict.fault is Fault.BACKLASH  # of another fault a jump is known, or all but so
+    share = limits.jump_share if new else 0.0
+    if more < max(limits.evidence_jump, share * (m.evidence + more)):
         return verdict
     told = _with_path(m, path, jump, more)
-    return replace(verdict, measured=told, fault=fault_of(told, limits), steady=verdict)
+    fault = fault_of(told, limits)
+    law = _finely(refined(near_path(play, path)), m)
+    best = max((x for x in (m.stick_slip, law) if x is not None), key=lambda fit: fit.log_likelihood)
+    steady = replace(verdict, measured=replace(m, stick_slip=best), fault=fault)
+    return replace(verdict, measured=told, fault=fault, steady=steady)
+
+
+def _finely(fit: Fit, m: Measured) -> Fit:
+    """A fit in blocks followed to its end at the resolution of what was measured."""
+    return descend(replace(fit, window=replace(fit.window, fine=True))) if m.window.fine else fit
 
 
 def _with_path(m: Measured, path: SlipPath, jump: float, more: float) -> Measured:
     """What was measured, with the path's stem and the friction and process behind it."""
-    fit = path.fit
-    if m.window.fine:
-        fit = descend(replace(fit, window=replace(fit.window, fine=True)))
+    fit = _finely(path.fit, m)
     linear, play = (replace(x, window=fit.window) for x in (m.linear, m.play))
     return replace(m, linear=linear, play=play, stick_slip=fit, jump=jump, evidence=m.evidence + more)

@@ -9,6 +9,7 @@ import numpy as np
 from analyzer.config import AdviceLimits
 from analyzer.limits import LOOP
 from analyzer.loop.measure import Measured
+from identification.controller.check import op_step
 from identification.estimation.between_samples import without_noise
 from identification.estimation.descent import NINETY, half_width, reaching
 from identification.estimation.gauss_newton import covariance, disturbance
@@ -17,6 +18,7 @@ from identification.limits import INTERVALS
 from identification.models import Estimate, Fopdt, Integrator, Loop, Pid, Process
 from identification.record import Floats
 from identification.signals.robust import robust_deviation
+from identification.simulation.pi import kept
 from identification.simulation.valve import StemLaw
 from tuning.describing import scaled_valve
 from tuning.forecast import SEED
@@ -112,13 +114,18 @@ def recorded_error(fit: Fit, controller: Pid) -> float:
 def scan_noise(window: Window, controller: Pid) -> float:
     """Standard deviation of PV's noise from sample to sample [% PV], read from OP's second differences.
 
-    Those of white noise have sqrt(6) times its deviation; the median leaves steps aside (Rousseeuw, Croux 1993).
+    Those of white noise have sqrt(6) times its deviation, behind a filter of PV that keeps a share a
+    (1 - a) sqrt(2 (3 - a) / (1 + a)) times; OP's rounding is taken off. The median leaves steps aside (Rousseeuw,
+    Croux 1993).
     """
     held = max(round(controller.scan_s / window.step_s), 1)  # OP stands still between two scans
-    jumps = np.abs(np.diff(window.op[::held], 2))
+    op = window.op[::held]
+    jumps = np.abs(np.diff(op, 2))
     if jumps.size == 0 or controller.kp == 0:
         return 0.0
-    return robust_deviation(jumps) / math.sqrt(6.0) / abs(controller.kp)
+    a = kept(controller.pv_filter_s, max(controller.scan_s, window.step_s))
+    seen = math.sqrt(max(robust_deviation(jumps) ** 2 - 0.5 * op_step(op) ** 2, 0.0))
+    return seen / ((1.0 - a) * math.sqrt(2.0 * (3.0 - a) / (1.0 + a)) * abs(controller.kp))
 
 
 def uncertain(fit: Fit, loop: Loop, samples: int = 6) -> tuple[Loop, ...]:

@@ -87,10 +87,10 @@ def tune(
     kept: Advice | None,
     decided: tuple[Action, Pid | None] | None = None,
 ) -> Tuning:
-    """Propose settings for one assessed loop whose stated ones are `controller` [%, s]; `kept`, why none are to be
-    proposed (advice.withheld); decided, action and settings of all nights, which stand. Raises NotAssessedError where
-    the loop's trends give no model."""
-    verdict = found.verdict
+    """Propose settings for one assessed loop whose stated ones are `controller` [%, s], with what the record shows of
+    it beside; `kept`, why none are to be proposed (advice.withheld); decided, action and settings of all nights,
+    which stand. Raises NotAssessedError where the loop's trends give no model."""
+    verdict, controller = found.verdict, found.shown or controller
     first = found.oscillations.first
     period = first.period_s if first else None
     model, fit, others = sought_for(verdict, controller, config.advice)
@@ -99,7 +99,9 @@ def tune(
     else:
         proposal = propose(verdict, controller, period, config).proposal
     if decided is not None:
-        proposal = _as_decided(proposal, *decided)
+        action, typed = decided
+        own = typed and replace(controller, kp=typed.kp, ti_s=typed.ti_s, td_s=typed.td_s)
+        proposal = _as_decided(proposal, action, own)
     load = load_of(fit, controller)
     new = proposal.new
     is_long = load.size >= config.tuning.least_steps

@@ -25,6 +25,7 @@ from analyzer.loop.conclusion import Lost, concluded
 from analyzer.loop.decisions import Cell, Finding, Lack, LacksError, Need, Needs, Status
 from analyzer.loop.experiments import learned
 from analyzer.loop.experiments_row import by_experiment, with_experiment
+from analyzer.loop.field_indices import field_indices
 from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
 from analyzer.loop.oscillation import counting
 from analyzer.loop.page_trends import thinned, turn_events
@@ -43,6 +44,7 @@ from analyzer.store.store import Store
 from analyzer.store.table import naming, rows_table, write_table
 from analyzer.words import units as words
 from identification.errors import NotAssessedError, TriageError
+from identification.models import Pid
 from reports.page_file import dumps
 from tuning.recommend import WITHOUT_SETTINGS
 
@@ -153,7 +155,7 @@ def _loop_row(
             return
         known |= _typed_in(earlier, spec, found, night.zone)
         known["turns"] = turn_events(prepared, found) if advising else None
-        known["witness"] = witness(found.verdict, counting(found.oscillations) is not None, prepared, config)
+        known |= _signs_kept(prepared, found, found.settings or present, spec.type, config)
         told = concluded(found, advice, spec, night.name, config.advice, **known)
         if taught is not None:
             told = with_experiment(told, taught, spec, present)
@@ -176,6 +178,17 @@ def _of_trends(prepared: Prepared) -> dict[str, Cell]:
     travel_of = "OP" if prepared.record.position is None else "stem"
     straight_pct = 100.0 * prepared.compressed_share
     return {"pv_lo": low, "pv_hi": low + span, "travel_of": travel_of, "straight_pct": straight_pct}
+
+
+def _signs_kept(
+    prepared: Prepared, found: Assessment, controller: Pid | None, kind: str, config: Config
+) -> dict[str, Cell]:
+    """What the night witnesses of the valve, and the indices of the literature."""
+    cycles = found.oscillations
+    return {
+        "witness": witness(found.verdict, counting(cycles) is not None, prepared, config),
+        "field_indices": field_indices(prepared, cycles, controller, kind, config),
+    }
 
 
 def _typed_in(earlier: Sequence[Earlier], spec: LoopSpec, found: Assessment, zone: str) -> dict[str, Cell]:

@@ -25,8 +25,11 @@ from analyzer.plantwide.wave import Wave, waves_of
 from analyzer.store.store import Store
 from identification.errors import InputError, NotAssessedError
 
-OF_ORDER = ("lack", "night", "lanes", "expected_period_s", "expected_pv_amplitude_pct")
-"""What an order rests on beside the columns of a list."""
+OF_ORDER = (
+    *("lack", "night", "lanes", "expected_period_s", "expected_pv_amplitude_pct"),
+    *("field_indices", "harris_index"),
+)
+"""What an order, and the indices of the literature, rest on beside the columns of a list."""
 COLUMNS = tuple(dict.fromkeys((*names((*RANKING, *LISTED, *BELIEVED)), *OF_ORDER)))
 TIES = ("master", "ratio_of", "split_of", "override_with")
 """Columns of loops.csv that tie a loop to another one."""

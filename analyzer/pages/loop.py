@@ -22,6 +22,7 @@ from analyzer.pages.experiments import experiments_section
 from analyzer.pages.reading import BESIDE, Thinned
 from analyzer.pages.words import Row, duration, keys, known_figures, lead, number, page_table, stamp, titled
 from analyzer.words.belief import wear_text
+from analyzer.words.decision import indices
 from analyzer.words.orders import order
 from analyzer.words.reason import in_short
 from analyzer.words.units import row_settings
@@ -81,6 +82,7 @@ def loop_page(
         _moves(row),
         _limit_cycle(row),
         _of_settings(settings),
+        _indices(row),
         parts.Section("Figures of the night, for experts", (_figures(row),), closed=True),
         nights_section(rows),
     )
@@ -241,6 +243,29 @@ def _of_settings(found: parts.Page | None) -> parts.Section | None:
         return None
     first = found.sections[0]
     return parts.section(first.title, *(b for b in first.blocks if isinstance(b, parts.Text | parts.Plot)))
+
+
+def _indices(row: Row) -> parts.Section | None:
+    """The literature's indices, what each publication concludes from its own, and what is concluded here."""
+    told, width = words.texts("field_indices"), row["backlash_pct"] or row["stickband_pct"]
+    fault = row["valve_fault"] or row["cause"] or "not assessed"
+    ours = {
+        "valve": fault,
+        "linear": fault,
+        "width": "–" if width is None else f"{number(width)} %",
+        "cycle": f"{row['oscillating_pct'] or 0.0:.0f} % of the time",
+        "slow": row["action"] or "–",
+        "variance": "–",
+    }
+    rows = []
+    for found in indices(row):
+        index = told[found["index"]]
+        sees = told["sees"][index["of"]]
+        concludes = sees if isinstance(sees, str) else sees[str(found["finds"]).lower()]
+        rows.append((index["name"], ", ".join(map(number, found["values"])), concludes, ours[index["of"]]))
+    if not rows:
+        return None
+    return parts.Section("Indices of the literature", (page_table("indices", rows),), closed=True)
 
 
 def _figures(row: Row) -> parts.Facts:

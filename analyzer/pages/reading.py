@@ -114,9 +114,13 @@ def _figures(
     kinds = {"loop": pa.string(), "night": pa.string(), **dict.fromkeys(names, pa.float64())}
     alike = [t.cast(pa.schema([(n, kinds[n]) for n in t.column_names])) for t in tables]
     joined = pa.concat_tables(alike, promote_options="default")
-    held = {n: joined.column(n).to_numpy(zero_copy_only=False) for n in ("loop", *names)}
-    tags = held.pop("loop")
-    return {str(tag): {n: x[tags == tag] for n, x in held.items()} for tag in dict.fromkeys(tags)}
+    held = {n: joined.column(n).to_numpy(zero_copy_only=False) for n in names}
+    tags = joined.column("loop").combine_chunks().dictionary_encode()
+    code, out = tags.indices.to_numpy(), {}
+    for k, tag in enumerate(tags.dictionary.to_pylist()):
+        own = np.flatnonzero(code == k)
+        out[str(tag)] = {n: x[own] for n, x in held.items()}
+    return out
 
 
 def _read_loops(path: Path, columns: Sequence[str] | None, loops: Collection[str]) -> pa.Table:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,6 +10,7 @@ from analyzer.columns import Row
 from analyzer.loop.decisions import Action, Cause, Due, Fault
 from analyzer.words.orders import order
 from analyzer.words.units import number
+from identification.signals.field_indices import PUBLISHED, concluded
 
 TOLD = (
     *(
@@ -24,12 +26,27 @@ TOLD = (
     *("lanes", "source_loop", "action", "due", "kp", "ti", "kp_new", "ti_new", "reason", "advice"),
 )
 """Columns of a decision that commands tell, as the contract of the ranking names them."""
+INDICES = ("harris", "hagglund", "horch", "idle", "kano", "choudhury", "yamashita", "ellipse", "he")
+"""The literature's indices in the order of publication."""
 ABOVE_ACTION = (Cause.VALVE, Cause.TUNING, Cause.LOAD)
 
 
 def as_data(row: Row) -> Row:
-    """A decision as plain data, with what to do in words."""
-    return {name: row[name] for name in TOLD} | {"do": _do(row)}
+    """A decision as plain data, with what to do in words and the indices of the literature beside it."""
+    return {name: row[name] for name in TOLD} | {"do": _do(row), "field_indices": indices(row)}
+
+
+def indices(row: Row) -> list[dict[str, Any]]:
+    """The literature's indices of a row, in the order of publication: name, values, and whether the index finds what
+    it looks for, None where it is undecided or its publication draws no line."""
+    found = json.loads(row["field_indices"] or "{}")
+    if row["harris_index"] is not None:
+        found["harris"] = [row["harris_index"]]
+    known = ((name, found[name]) for name in INDICES if name in found)
+    return [
+        {"index": name, "values": x, "finds": concluded(name, x) if name in PUBLISHED else None}
+        for name, x in known
+    ]
 
 
 def decided(data: Mapping[str, Any]) -> str:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -66,13 +67,15 @@ def spec_of(d: Drawn) -> LoopSpec:
     return LoopSpec(d.name, pv_lo=0.0, pv_hi=100.0, kp=c.kp, ti=c.ti_s, scan_s=c.scan_s, **tags)
 
 
-def told(loops: list[Drawn], records: dict[str, Recording], jobs: int) -> dict[str, dict[str, Any]]:
+def told(
+    loops: list[Drawn], records: dict[str, Recording], jobs: int, columns: Sequence[str] = COLUMNS
+) -> dict[str, dict[str, Any]]:
     """Rows of the night by loop."""
     with tempfile.TemporaryDirectory() as folder:
         files = export(Path(folder), records)
         store = Store(Path(folder) / "store")
         batch.run(Plant(open_export(files), tuple(map(spec_of, loops)), Config()), store, jobs)
-        return {r["loop"]: r for r in store.own_rows("nights", store.nights()[-1], COLUMNS)}
+        return {r["loop"]: r for r in store.own_rows("nights", store.nights()[-1], columns)}
 
 
 def right(d: Drawn, row: dict[str, Any]) -> bool:

@@ -103,13 +103,36 @@ def better_linear(linear: Fit, play: Fit) -> Fit:
 def fit_stick_slip(play: Fit, period_s: float) -> Fit:
     """The best stick-slip (J > 0) followed by a lag, scanned whole and finely about the play.
 
-    play : the best play: its width is near the stickband, for OP tells both by its travel between slips; period_s :
+    play : the best play: its width is near the stickband, for OP tells both by its travel between slips, or up to
+    half as wide again, where the stem jumps by most of it: narrower bands have finalists of their own; period_s :
     scale of the search [s].
     """
     short = play.window.y.size < FIT.short
     begun = _chosen(play, _coarse(play), period_s, FIT.followed_short if short else FIT.followed)
-    fits = [_likeliest(begun), *pits(play, (RESTS, HALTS, SLIDES))]
-    return max(fits, key=lambda fit: fit.log_likelihood)
+    narrow, laws = _grid(FIT.narrow_widths, FIT.fine_jumps), (RESTS, HALTS, SLIDES)
+    fits = [_likeliest(begun), *pits(play, laws), *pits(play, laws, narrow)]
+    return refined(max(fits, key=lambda fit: fit.log_likelihood))
+
+
+def refined(fit: Fit) -> Fit:
+    """The likeliest stick-slip about one that was found: pits of stickband and jump are about 1 % wide, so that a
+    scan about the play, whose time constant and dead time are others, lands beside the deepest."""
+    for _ in range(FIT.refined_most):
+        share = fit.valve.slip_jump / max(fit.valve.stickband, 1e-9)
+        first, end, step = FIT.near_jumps
+        about = _grid(FIT.near_widths, (max(share + first, step), min(share + end, 1.0 + 1e-9), step))
+        found = pits(fit, (fit.valve.tolerance,), about, FIT.near_dead)
+        best = max((fit, *found), key=lambda fit: fit.log_likelihood)
+        gained, fit = best.log_likelihood - fit.log_likelihood, best
+        if gained < FIT.refined_worth:
+            break
+    return fit
+
+
+def _grid(widths: tuple[float, ...], jumps: tuple[float, ...]) -> Floats:
+    """Stickbands in widths of a valve's and slip jumps as a share of them, shape (m, 2), of two ranges, each first,
+    end (not tried) and step."""
+    return np.array(list(product(np.arange(*widths), np.arange(*jumps))))
 
 
 def _coarse(play: Fit) -> list[StemLaw]:
@@ -125,15 +148,21 @@ def _coarse(play: Fit) -> list[StemLaw]:
     ]
 
 
-def pits(play: Fit, tolerances: tuple[float, ...]) -> list[Fit]:
-    """The likeliest stick-slips about a play, of the best few of each behaviour at the bottom of their pits.
+def pits(
+    play: Fit, tolerances: tuple[float, ...], grid: Floats | None = None, later: tuple[float, ...] = FIT.later
+) -> list[Fit]:
+    """The likeliest stick-slips about a play, or another stick-slip, of the best few of each behaviour at the bottom
+    of their pits.
 
-    A slip more or less changes the stem until the next one, so likelihood has many narrow pits in S and J.
+    A slip more or less changes the stem until the next one, so likelihood has many narrow pits in S and J. grid :
+    shape (m, 2), stickbands in widths of the play and slip jumps as a share of them; later : dead times beyond the
+    play's [blocks].
     """
     window = play.window
-    widths = play.valve.stickband * np.arange(*FIT.fine_widths)
-    pairs = np.array(list(product(widths, np.arange(*FIT.fine_jumps))))
-    t, deads = play.time_constant_s, play.dead_time_s + np.array(FIT.later) * window.dt_s
+    pairs = np.array([play.valve.stickband, 1.0]) * (
+        _grid(FIT.fine_widths, FIT.fine_jumps) if grid is None else grid
+    )
+    t, deads = play.time_constant_s, np.maximum(play.dead_time_s + np.array(later) * window.dt_s, 0.0)
     out, pv, begins = [], white_pv(window, generic_noise()), [(t, float(dead)) for dead in deads]
     for tolerance in tolerances:
         left = _scan(pv, pairs, tolerance, t, deads)

@@ -194,7 +194,9 @@ def fit_irregular(play: Fit, noise: Floats, period_s: float, any_gain: bool = Tr
 
     play : the best play, fitted in blocks, without a recorded stem; noise : shape (order,), a noise model that
     takes no valve's side, under which the search begins; period_s : of the cycle [s]; any_gain : whether gains far
-    under the play's are tried too, where its own comes to nothing.
+    under the play's are tried too, where its own comes to nothing: where another stick-slip is known they lead to
+    narrower bands with longer dead times. The search is repeated about the process and stickband that it found, for a
+    play in the place of a jump is too wide and too early.
     """
     if play.gain == 0.0:
         return None
@@ -206,7 +208,27 @@ def fit_irregular(play: Fit, noise: Floats, period_s: float, any_gain: bool = Tr
     if best is None and any_gain:
         smaller = {(w, s): _gain(play, w * bands, s, half) for w, s in usual}
         best = _likeliest(play, noise, rest, smaller)
-    return None if best is None else _settled(best)
+    if best is None:
+        return None
+    best = _settled(best)
+    for _ in range(SLIPS.repeated):
+        near = near_path(play, best)
+        near = replace(near, valve=sticking(near.valve.stickband, 0.0))
+        again = _likeliest(near, noise, rest, dict.fromkeys(usual, near.gain))
+        again = None if again is None else _settled(again)
+        if again is None or again.worth < best.worth + SLIPS.worth:
+            break
+        best = again
+    return best
+
+
+def near_path(play: Fit, path: SlipPath) -> Fit:
+    """A fit to the play's window with a path's process and mean friction: a start for one that slips alike."""
+    found = path.fit
+    t, dead, gain = found.time_constant_s, found.dead_time_s, found.gain
+    share = min(found.valve.slip_jump / max(found.valve.stickband, 1e-9), 1.0)
+    valve = sticking(found.valve.stickband, share)
+    return replace(play, gain=gain, time_constant_s=t, dead_time_s=dead, base=found.base, valve=valve)
 
 
 def _likeliest(play: Fit, noise: Floats, rest: int, gains: Gains) -> SlipPath | None:

@@ -20,6 +20,7 @@ from analyzer.loop.oscillation import Oscillations
 from analyzer.loop.quality import prepare
 from analyzer.loop.witness import witness
 from analyzer.store.rows import night_row
+from identification.estimation.window import Window
 from identification.models import Backlash, Fopdt, Integrator, Pid
 from proofs.plant import CONFIG, START_S, Sketch, prepared, series, simulate, spec
 from tuning.frequency_response import maximum_sensitivity
@@ -114,6 +115,25 @@ def test_load_keeps_the_noise_of_a_scan(tank):
     assert np.isfinite(load).all()
     jumps = np.median(np.abs(np.diff(load, 2))) * 1.4826 / math.sqrt(6)
     assert jumps == pytest.approx(TANK.noise, rel=0.3)
+
+
+@pytest.mark.parametrize(
+    ("filter_s", "rounding"), [(0.0, 0.0), (5.0, 0.0), (20.0, 0.0), (20.0, 0.001), (0.0, 0.05)]
+)
+def test_noise_is_read_behind_a_filter_of_pv(filter_s: float, rounding: float) -> None:
+    """White noise of PV is read from OP within a tenth, whatever filter the controller has before it, and OP's
+    rounding is no noise."""
+    rng, n, size = np.random.default_rng(1), 20_000, 0.1
+    noise, seen, last = size * rng.standard_normal(n), np.empty(n), 0.0
+    for k in range(n):
+        last += (noise[k] - last) / (1.0 + filter_s)
+        seen[k] = last
+    op = 50.0 - 3.0 * seen + np.sin(2 * np.pi * np.arange(n) / 900.0)
+    op = np.round(op / rounding) * rounding if rounding else op
+    window = Window(50.0 + noise, op, np.ones(n, dtype=bool), 1.0)
+    assert scan_noise(window, Pid(3.0, 100.0, scan_s=1.0, pv_filter_s=filter_s)) == pytest.approx(
+        size, rel=0.1
+    )
 
 
 def test_mirror_image_gets_mirrored_settings(pipe):

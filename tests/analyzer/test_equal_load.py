@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from analyzer.comparison.before_after import Change, Grade, Reference, Span, grade, parts_of, reference
-from analyzer.comparison.equal_load import FIGURES, NO_PART, EqualLoad, Part
+from analyzer.comparison.equal_load import FIGURES, NO_PART, EqualLoad, LoopNight, Part, Weeks
 from analyzer.history.export import open_export
 from analyzer.loop.assessments import travel_of
 from analyzer.loops.changes import TuningChange
@@ -19,6 +19,7 @@ from analyzer.night import batch
 from analyzer.night.nights import Plant
 from analyzer.pages.before_after import ChangeCase, _evidence, change_cases, changes_page, outcome
 from analyzer.store.store import Store
+from identification.models import Pid
 from proofs.before_after_plant import LOADS, changed, truth
 from proofs.plant import CONFIG, START_S, Sketch, Trends, simulate, spec, write_export
 from reports.markdown import render
@@ -206,3 +207,19 @@ def test_reports_are_written_as_text(cases: dict[str, ChangeCase], tmp_path: Pat
     text = render(changes_page(list(cases.values()), [], "test"))
     assert "Due to the change %" in text
     assert "Due to load and set point %" in text
+
+
+def night(worn: bool, cycles: bool) -> LoopNight:
+    """A night of a loop whose valve has shown play, or not, and which cycles, or not."""
+    flat = np.zeros(8)
+    return LoopNight(
+        None, 1.0, 2.0, 0.0, True, worn, 0.0, flat, flat, 86400.0, 0.1, 10.0, 0.0, 0.0, False, cycles
+    )
+
+
+@pytest.mark.parametrize(("cycles", "cured"), [(False, True), (True, False)])
+def test_a_repair_is_seen_where_the_cycle_ended(cycles: bool, cured: bool) -> None:
+    """A play that is no longer seen is repaired where the loop came to rest; a cycle from outside, in which it
+    cannot be seen, proves no repair."""
+    before, after = (night(True, True),) * 7, (night(False, cycles),) * 7
+    assert Weeks(before, after, Pid(1.0, 60.0), Pid(1.0, 60.0)).cured is cured

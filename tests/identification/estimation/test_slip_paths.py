@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from identification.estimation.backlash_stiction import fit_linear, fit_play
+from identification.estimation.backlash_stiction import fit_linear, fit_play, fit_stick_slip
 from identification.estimation.irregular_slips import fit_irregular
 from identification.estimation.noise import generic_noise
 from identification.estimation.slip_beam import (
@@ -193,10 +193,33 @@ def test_a_square_pv_of_a_fast_flow_is_no_play(seed):
     window = Window(pv, op, np.ones(pv.size, dtype=bool), 10.0)
     play = fit_play(fit_linear(window, 300.0), 300.0)
     assert play.gain > 3.0 * 1.1
-    if seed == 1:
-        assert fit_irregular(play, generic_noise(), 300.0, any_gain=False) is None
     path = fit_irregular(play, generic_noise(), 300.0)
     assert path is not None
     assert path.worth > play.log_likelihood + 1000.0
     assert path.fit.gain == pytest.approx(1.1, rel=0.25)
     assert path.fit.valve.stickband == pytest.approx(6.0, rel=0.15)
+
+
+def test_a_jump_of_nearly_the_stickband_is_recovered():
+    """A stem that jumps by .9 of its stickband has it within 5 % and the gain within a fifth, though a play in its
+    place is two fifths wider and has a gain half as high again."""
+    rng = np.random.default_rng(4)
+    static, kinetic, kp, ti, n = 5.16, 0.27, 2.6, 10.0, 7200
+    stem, x, total, load, pipe, pv, op = 50.0, 2.0, 50.0, 0.0, [50.0] * 4, np.empty(n), np.empty(n)
+    for k in range(n):
+        load += -load / 400.0 + 0.03 * rng.standard_normal()
+        pv[k] = round(50.0 + x + 0.03 * rng.standard_normal(), 3)
+        total += kp * (50.0 - pv[k]) / ti
+        op[k] = round(total + kp * (50.0 - pv[k]), 3)
+        if abs(op[k] - stem) > static:
+            stem = op[k] - math.copysign(kinetic, op[k] - stem)
+        pipe.append(stem)
+        x += (1.0 - math.exp(-1.0 / 57.0)) * (1.4 * (pipe.pop(0) + load - 50.0) - x)
+    pv, op = pv[1800:], np.ascontiguousarray(op[1800:])  # the cycle has built up
+    window = Window(pv, op, np.ones(pv.size, dtype=bool), 1.0)
+    play = fit_play(fit_linear(window, 92.0), 92.0)
+    assert play.valve.stickband > 1.4 * (static + kinetic)
+    assert play.gain > 1.5 * 1.4
+    found = fit_stick_slip(play, 92.0)
+    assert found.valve.stickband == pytest.approx(static + kinetic, rel=0.05)
+    assert found.gain == pytest.approx(1.4, rel=0.2)
