@@ -42,6 +42,21 @@ def closeness(away: Matrix, spread: Matrix | float) -> Matrix:
     return np.asarray(-np.log(np.clip(away / np.maximum(spread, TINY), FINDER.nearest, 1.0)))
 
 
+def apart(x: Matrix, level: Matrix, near: Matrix) -> float:
+    """How much nearer a tag is to the nearest set point than to the next one at another level, natural log: the
+    distance of levels that have nothing to do with the tag exceeds this with odds exp(-this).
+
+    x : shape (n,); level, near : mean of each set point and its nearness, shape (set points,).
+    """
+    best = int(np.argmax(near))
+    others = level != level[best]
+    if near[best] <= 0.0 or not others.any():
+        return max(float(near[best]), 0.0)
+    beyond = np.abs(level[others] - x.mean()).min() / x.std()
+    more = near[best] - max(float(near[others].max()), 0.0)
+    return float(more + np.log(np.clip(beyond, 1.0, 1.0 / FINDER.nearest)))
+
+
 def tracked(x: Matrix, s: Matrix) -> Matrix:
     """Log of the slow moves of tags over those of their errors, shape (tags, set points); 0 where SP stands still."""
     width = max(len(x) // FINDER.slow_blocks, 1)

@@ -13,6 +13,7 @@ from analyzer.finder.bag import Bag
 from analyzer.finder.choice import one_to_one, preferred
 from analyzer.finder.held import (
     alike,
+    apart,
     by_chance,
     closeness,
     law_of,
@@ -168,7 +169,7 @@ def _other_pv(bag: Bag, pair: FoundPair, pairs: Sequence[FoundPair]) -> float:
 def _near_both(bag: Bag, pair: FoundPair, free: Sequence[int], known: Matrix) -> Matrix:
     """What speaks for each free set point as that of PV, and as that of OP, shape (2, set points): what is `known` of
     both by their means and slow moves, or the level at which the law has the other rest."""
-    near, level, still = known.copy(), bag.values[0, free], np.isin(free, bag.still)
+    near, level, still = known.copy(), bag.values[:, free].mean(axis=0), np.isin(free, bag.still)
     for at, (tag, other) in enumerate(((pair.pv, pair.op), (pair.op, pair.pv))):
         x = bag.values[:, tag]
         rest, error = resting_level(x, bag.values[:, other], pair.told_width)
@@ -176,8 +177,7 @@ def _near_both(bag: Bag, pair: FoundPair, free: Sequence[int], known: Matrix) ->
         near[at] -= by_chance(x, bag.values[:, free])
         near[at, still] = np.maximum(near[at], by_law)[still]
         if free:
-            best = int(np.argmax(near[at]))
-            near[at, best] += near[at, best] - near[at][level != level[best]].max(initial=0.0)
+            near[at, np.argmax(near[at])] += apart(x, level, near[at])
     return near
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analyzer.finder.held import answers, deviation_of_mean, nearness, resting_level
+from analyzer.finder.held import answers, apart, closeness, deviation_of_mean, nearness, resting_level
 from analyzer.finder.pair import FoundPair
 from analyzer.finder.pairs import found_pairs
 from analyzer.limits import FINDER
@@ -86,3 +86,33 @@ def test_a_mean_that_drifts_is_known_to_its_standard_error() -> None:
     for k in range(1, n):
         x[k] = a * x[k - 1] + rng.normal()
     assert deviation_of_mean(x[:, None])[0] == pytest.approx(1.0 / (1.0 - a) / np.sqrt(n), rel=1 / 3)
+
+
+@pytest.mark.parametrize(("spread", "exact"), [(0.5, False), (5.0, True), (50.0, False)])
+def test_a_set_point_of_chance_stands_apart_as_seldom_as_theory_says(spread: float, exact: bool) -> None:
+    """Of levels laid at random one in e^k is nearer by a factor e^k than the next; no more whatever the spread."""
+    rng = np.random.default_rng(7)
+    x = 50.0 + spread * np.resize([-1.0, 1.0], 1000)
+    found = []
+    for level in rng.uniform(0.0, 100.0, (6000, 40)):
+        near = closeness(np.abs(level - x.mean()), x.std())
+        found.append(apart(x, level, near))
+    share = (np.array(found)[:, None] > (1.0, 2.0, 3.0)).mean(axis=0)
+    assert (share < 1.15 * np.exp([-1.0, -2.0, -3.0])).all()
+    assert not exact or share == pytest.approx(np.exp([-1.0, -2.0, -3.0]), rel=0.15)
+
+
+def test_a_set_point_as_near_as_others_does_not_stand_apart() -> None:
+    """A wide OP in whose midst set points lie at like distances is held at none of them, though it is near all."""
+    x = np.linspace(0.0, 100.0, 101)
+    level = np.array([51.0, 49.0, 49.0])
+    near = closeness(np.abs(level - x.mean()), x.std())
+    assert apart(x, level, near) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_lone_set_point_near_a_quiet_pv_stands_apart_by_the_distance_of_the_next() -> None:
+    """The next set point counts by its distance where it lies far outside the spread of PV too."""
+    x = 36.24 + 0.04 * np.resize([-1.0, 1.0], 1000)
+    level = np.array([36.25, 37.24, 30.0])
+    near = closeness(np.abs(level - x.mean()), x.std())
+    assert apart(x, level, near) == pytest.approx(np.log(100.0), rel=1e-6)
