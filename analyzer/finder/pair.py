@@ -71,17 +71,22 @@ class FoundPair:
         law = (
             self.weight / (self.asked * less),
             self.noise / (FINDER.least_noise * (less if self.resolved else FINDER.acting)),
-            FINDER.second * np.log1p(-min(self.weight, 1.0 - TINY)) / np.log1p(-max(self.runner_up, TINY)),
+            FINDER.second * _over(self.weight, self.runner_up),
             np.inf if self.kp >= 0.0 or self.towards >= 1.0 else FINDER.direct,
         )
         signs = (
             *(() if self.answers else law),
-            self.law / max(FINDER.second * self.other, TINY),
+            _over(self.law, self.other),
             (self.towards + self.freer + self.nearer) / FINDER.turned,
             self.own / FINDER.own if self.weight < FINDER.plain else np.inf,
         )
         odds = FINDER.sure_pct / (100.0 - FINDER.sure_pct) * max(min(signs), 0.0) ** 2
         return float(min(100.0 * odds / (1.0 + odds), FINDER.surest_pct))
+
+
+def _over(share: float, other: float) -> float:
+    """How much more one share explains than another, by the logs of what either leaves."""
+    return float(np.log1p(-min(share, 1.0 - TINY)) / np.log1p(-min(max(other, TINY), 1.0 - TINY)))
 
 
 def known_pair(values: Matrix) -> FoundPair:

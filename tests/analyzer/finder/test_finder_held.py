@@ -71,10 +71,17 @@ def test_a_tag_that_repeats_a_set_point_does_not_answer_it() -> None:
 
 
 def test_op_that_answers_is_no_proof_of_pv() -> None:
-    """A pair whose OP answers the set point is not sure where another tag explains far more of OP with that SP."""
-    answering = FoundPair(0, 1, 2, 0.4, 0.6, 1, 0.04, 0.0, freer=4.0, answers=True, other=0.4)
+    """A pair whose OP answers the set point is not sure where another tag explains more of OP with that SP."""
+    answering = FoundPair(0, 1, 2, 0.4, 0.6, 1, 0.04, 0.0, freer=4.0, answers=True, other=0.39)
     assert answering.sure_pct >= FINDER.sure_pct
-    assert replace(answering, other=0.99).sure_pct < FINDER.sure_pct
+    assert replace(answering, other=0.42).sure_pct < FINDER.sure_pct
+
+
+def test_a_sensor_that_follows_pv_is_not_taken_for_it() -> None:
+    """A pair of which the law leaves a sixth is not sure where another tag with its SP leaves a three-hundredth."""
+    follower = FoundPair(0, 1, 2, 0.82, 0.4, 4, 0.5, 0.04, towards=2.0, nearer=1.0, other=0.997)
+    assert follower.sure_pct < FINDER.sure_pct
+    assert replace(follower, other=0.5).sure_pct >= FINDER.sure_pct
 
 
 def test_a_mean_that_drifts_is_known_to_its_standard_error() -> None:
