@@ -28,13 +28,12 @@ class FoundPair:
     law : share of OP's moves that the law explains, 0 to 1, in blocks of `width` samples; noise : share of the
     innovations of OP and PV that is one; asked : weight from which a pair counts at this width; runner_up : weight
     of the next best tag; towards : how much more the law holds from PV to OP than back; freer : how much more OP
-    drifts and rests at limits; nearer : how much nearer SP is to PV than to OP; own : how near a set point of no
-    other pair lies to OP, 1 where far; resolved : whether neighbouring averages are alike; acts : whether SP moves
-    OP as PV does; answers : whether OP, and no other tag, moves at once with SP; other : most that another tag
-    explains of OP with an SP that moves; told : share that the law explains in blocks of `told_width`, the shortest
-    in which it holds; kp : gain, in units of OP per unit of PV, negative where OP rises with PV; ti_samples :
-    integral time, inf where none acts, None where two ways to it disagree: noise of PV between its samples hides it
-    from the one, not from the other, which asks the samples beside.
+    drifts and rests at limits; nearer : how much nearer SP is to PV than to OP; resolved : whether neighbouring
+    averages are alike; acts : whether SP moves OP as PV does; answers : whether OP, and no other tag, moves at once
+    with SP; other : most that another tag explains of OP with an SP that moves; told : share that the law explains
+    in blocks of `told_width`, the shortest in which it holds; kp : gain, in units of OP per unit of PV, negative
+    where OP rises with PV; ti_samples : integral time, inf where none acts, None where two ways to it disagree:
+    noise of PV between its samples hides it from the one, not from the other, which asks the samples beside.
     """
 
     pv: int
@@ -48,7 +47,6 @@ class FoundPair:
     towards: float = 0.0
     freer: float = 0.0
     nearer: float = 0.0
-    own: float = 1.0
     resolved: bool = True
     acts: bool = False
     answers: bool = False
@@ -71,22 +69,16 @@ class FoundPair:
         law = (
             self.weight / (self.asked * less),
             self.noise / (FINDER.least_noise * (less if self.resolved else FINDER.acting)),
-            FINDER.second * _over(self.weight, self.runner_up),
+            FINDER.second * np.log1p(-min(self.weight, 1.0 - TINY)) / np.log1p(-max(self.runner_up, TINY)),
             np.inf if self.kp >= 0.0 or self.towards >= 1.0 else FINDER.direct,
         )
         signs = (
             *(() if self.answers else law),
-            _over(self.law, self.other),
+            self.law / max(FINDER.other * self.other, TINY),
             (self.towards + self.freer + self.nearer) / FINDER.turned,
-            self.own / FINDER.own if self.weight < FINDER.plain else np.inf,
         )
         odds = FINDER.sure_pct / (100.0 - FINDER.sure_pct) * max(min(signs), 0.0) ** 2
         return float(min(100.0 * odds / (1.0 + odds), FINDER.surest_pct))
-
-
-def _over(share: float, other: float) -> float:
-    """How much more one share explains than another, by the logs of what either leaves."""
-    return float(np.log1p(-min(share, 1.0 - TINY)) / np.log1p(-min(max(other, TINY), 1.0 - TINY)))
 
 
 def known_pair(values: Matrix) -> FoundPair:

@@ -143,9 +143,7 @@ def _with_set_points(bag: Bag, pairs: Sequence[FoundPair]) -> list[FoundPair]:
     gain = np.array([min(pairs[i].weight / pairs[i].asked, 1.0) * _gain(pairs[i], near[i]) for i in alone])
     rows, columns = linear_sum_assignment(gain.reshape(len(alone), len(free)), maximize=True)
     held = {alone[i]: int(k) for i, k in zip(rows, columns, strict=True)}
-    claimed = {k for i, k in held.items() if near[i, :, k].max() > -np.log(FINDER.claimed)}
-    loose = [k for k in range(len(free)) if k not in claimed]
-    out = [_with_set_point(bag, p, near[i], held.get(i), free, loose) for i, p in enumerate(pairs)]
+    out = [_with_set_point(bag, p, near[i], held.get(i), free) for i, p in enumerate(pairs)]
     out = [replace(p, other=_other_pv(bag, p, out)) for p in out]
     return sorted((with_settings(bag, p) for p in out), key=lambda p: -p.weight)
 
@@ -187,11 +185,8 @@ def _gain(pair: FoundPair, near: Matrix) -> Matrix:
     return np.asarray(np.maximum(near[0] + way, near[1] - way) - abs(way))
 
 
-def _with_set_point(
-    bag: Bag, pair: FoundPair, near: Matrix, k: int | None, free: Sequence[int], loose: list[int]
-) -> FoundPair:
-    """A pair with the set point at place `k` of the free ones, `near` PV and OP by so much; the `loose` ones are no
-    pair's."""
+def _with_set_point(bag: Bag, pair: FoundPair, near: Matrix, k: int | None, free: Sequence[int]) -> FoundPair:
+    """A pair with the set point at place `k` of the free ones, `near` PV and OP by so much."""
     if pair.sp is not None:
         pv, op = nearness(bag.values, (pair.pv, pair.op), [pair.sp])[:, 0]
     else:
@@ -199,13 +194,11 @@ def _with_set_point(
     most = FINDER.certain * (1 if pair.sp is None and (k is None or free[k] in bag.still) else 2)
     pv, op = max(pv, 0.0), max(op, 0.0)  # that SP is far from one tag does not bring it near the other
     turned = _turned(replace(pair, nearer=float(np.clip(pv - op, -most, most))))
-    at_pv, at_op = near if turned.pv == pair.pv else near[::-1]
-    if pair.sp is None and k is not None and at_pv[k] > 0.0:
+    if pair.sp is None and k is not None and near[int(turned.pv != pair.pv), k] > 0.0:
         turned = replace(turned, sp=free[k], freer=turned.freer if free[k] in bag.still else 0.0)
-    own = float(np.exp(-at_op[loose].max(initial=0.0)))
     if turned.sp is not None and turned.sp not in bag.still:
-        turned = _of_error(bag, turned, turned.sp)
-    return replace(turned, own=own)
+        return _of_error(bag, turned, turned.sp)
+    return turned
 
 
 def _of_error(bag: Bag, pair: FoundPair, sp: int) -> FoundPair:
