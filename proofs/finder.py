@@ -20,7 +20,8 @@ import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 
-from analyzer.finder.pairs import FoundPair, found_pairs
+from analyzer.finder.pair import FoundPair
+from analyzer.finder.pairs import found_pairs
 from analyzer.limits import FINDER
 from analyzer.loops.spec import LoopSpec, read_loops
 from analyzer.loops.tags import controller

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,17 +15,20 @@ from analyzer.limits import FINDER
 
 @dataclass(frozen=True, slots=True)
 class Sampled:
-    """Tags on one clock: names, values without gaps, shape (n, tags), and the time between samples [s]."""
+    """Tags on one clock: names, values without gaps, shape (n, tags), the time between samples [s], and text tags,
+    each text as the number of its place among the tag's own."""
 
     tags: tuple[str, ...]
     values: NDArray[np.float64]
     dt_s: float
+    texts: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     def of(self, tags: Sequence[str]) -> Sampled:
         """Some of the tags, as far as they are held, in the order asked for."""
         place = {tag: k for k, tag in enumerate(self.tags)}
         known = [tag for tag in tags if tag in place]
-        return Sampled(tuple(known), self.values[:, [place[tag] for tag in known]], self.dt_s)
+        texts = {tag: self.texts[tag] for tag in tags if tag in self.texts}
+        return Sampled(tuple(known), self.values[:, [place[tag] for tag in known]], self.dt_s, texts)
 
 
 def sampled(
@@ -34,15 +37,16 @@ def sampled(
     span: tuple[float, float],
     told: Callable[[int, int], None] = lambda done, total: None,
 ) -> Sampled:
-    """Values of tags that hold numbers, over the last day of a span [s since 1970-01-01 UTC].
+    """Values of tags that hold numbers, and texts, over the last day of a span [s since 1970-01-01 UTC].
 
-    Held from each good sample to the next; a tag without numbers, or of which most are bad, is left out. Raises
+    Held from each good sample to the next; a tag of which most is bad is left out. Raises
     InputError where the export cannot be read.
     """
     first, last = export.span()
     last = min(last, span[1])
     first = max(first, span[0], last - FINDER.longest_s)
     clock: NDArray[np.float64] | None = None
+    texts: dict[str, NDArray[np.float64]] = {}
     names: list[str] = []
     columns: list[NDArray[np.float64]] = []
     for k in range(0, len(tags), FINDER.at_once):
@@ -51,13 +55,15 @@ def sampled(
             clock = _clock(list(read.values()), first, last, len(tags))
         for tag, series in read.items():
             held = _held(series, clock)
-            if held is not None:
+            if held is not None and series.text is not None:
+                texts[tag] = held
+            elif held is not None:
                 names.append(tag)
                 columns.append(held)
         told(min(k + FINDER.at_once, len(tags)), len(tags))
     if clock is None or not columns:
         return Sampled((), np.empty((0, 0)), 1.0)
-    return Sampled(tuple(names), np.column_stack(columns), float(clock[1] - clock[0]))
+    return Sampled(tuple(names), np.column_stack(columns), float(clock[1] - clock[0]), texts)
 
 
 def _clock(read: Sequence[Series], first: float, last: float, tags: int) -> NDArray[np.float64]:
@@ -74,8 +80,11 @@ def _clock(read: Sequence[Series], first: float, last: float, tags: int) -> NDAr
 
 def _held(series: Series, clock: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """A tag's last good value at each time of a clock; None where it has few."""
-    good = ~series.bad & np.isfinite(series.value)
-    if good.sum() < 2 or good.sum() < FINDER.good_share * len(series.value):
+    value = series.value
+    if series.text is not None:
+        value = np.unique(series.text.astype(str), return_inverse=True)[1].astype(float)
+    good = ~series.bad & np.isfinite(value)
+    if good.sum() < 2 or good.sum() < FINDER.good_share * len(value):
         return None
     at = np.searchsorted(series.stamp_s[good], clock + 1e-6, side="right") - 1
-    return np.asarray(series.value[good][np.maximum(at, 0)])
+    return np.asarray(value[good][np.maximum(at, 0)])

@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from analyzer.finder.beside import may_be_mode, modes, positions
 from analyzer.finder.clock import Sampled, sampled
-from analyzer.finder.pairs import FoundPair, found_pairs, known_pair
+from analyzer.finder.pair import FoundPair, known_pair
+from analyzer.finder.pairs import found_pairs
 from analyzer.history.export import Export
 from analyzer.limits import FINDER
 from analyzer.loops.spec import COLUMNS as STATED_COLUMNS
@@ -144,17 +146,30 @@ def found_told(rows: Sequence[Row]) -> tuple[str, ...]:
 
 
 def by_data(held: Sampled) -> list[Row]:
-    """Loops that the data of tags show."""
+    """Loops that the data of tags show, with the position and the mode of those that are sure."""
     pairs = found_pairs(held.values)
-    outputs = {
-        held.values[:, p.op].tobytes(): _name(held.tags[p.pv], held.tags[p.op])
-        for p in pairs
-        if p.sure_pct >= FINDER.sure_pct
-    }
-    return [_row(held, pair, outputs) for pair in pairs]
+    sure = [p for p in pairs if p.sure_pct >= FINDER.sure_pct]
+    outputs = {held.values[:, p.op].tobytes(): _name(held.tags[p.pv], held.tags[p.op]) for p in sure}
+    beside = _beside(held, sure)
+    return [_row(held, pair, outputs, beside.get(pair.op, {}) if pair in sure else {}) for pair in pairs]
 
 
-def _row(held: Sampled, pair: FoundPair, outputs: dict[bytes, str]) -> Row:
+def _beside(held: Sampled, sure: Sequence[FoundPair]) -> dict[int, dict[str, str]]:
+    """Tags of position and mode of the loops that are sure, by the place of OP."""
+    own = {k for p in sure for k in (p.pv, p.op, p.sp)}
+    others = [k for k in range(len(held.tags)) if k not in own]
+    found: dict[int, dict[str, str]] = {p.op: {} for p in sure}
+    for op, k in positions(held.values, list(found), others).items():
+        found[op]["position"] = held.tags[k]
+    candidates = {held.tags[k]: held.values[:, k] for k in others} | dict(held.texts)
+    names = [name for name, tag in candidates.items() if may_be_mode(tag)]
+    moves = {op: held.values[:, op] for op in found}
+    for op, k in modes(moves, [candidates[name] for name in names]).items():
+        found[op]["mode"] = names[k]
+    return found
+
+
+def _row(held: Sampled, pair: FoundPair, outputs: dict[bytes, str], beside: dict[str, str]) -> Row:
     name = _name(held.tags[pair.pv], held.tags[pair.op])
     master = "" if pair.sp is None else outputs.get(held.values[:, pair.sp].tobytes(), "")
     spec = LoopSpec(
@@ -164,10 +179,15 @@ def _row(held: Sampled, pair: FoundPair, outputs: dict[bytes, str]) -> Row:
         sp=None if pair.sp is None else held.tags[pair.sp],
         pv=held.tags[pair.pv],
         op=held.tags[pair.op],
+        position=beside.get("position"),
+        mode=beside.get("mode"),
     )
     says = f"{_law(held, pair)}; {100 * pair.noise:.0f} % of their noise is one; next best tag "
     says += f"{100 * pair.runner_up / max(pair.weight, 1e-9):.0f} % as like"
     says += "" if pair.sp is None else f"; {spec.sp} is where PV is held"
+    says += f"; {spec.op} moves at once when {spec.sp} does" if pair.answers else ""
+    says += f"; {spec.position} stands where {spec.op} does" if spec.position else ""
+    says += f"; {spec.op} stands still in one value of {spec.mode} alone" if spec.mode else ""
     return Row(replace(spec, **_shown(held, pair)), "data", pair.sure_pct, says)
 
 

@@ -34,11 +34,22 @@ class Moves:
     @classmethod
     def of(cls, values: Matrix, width: int) -> Moves:
         """From values, shape (n, tags), in blocks of `width` samples."""
+        plain = cls.plain(values, width)
+        return cls(plain.value, plain.integral, innovations(plain.value))
+
+    @classmethod
+    def plain(cls, values: Matrix, width: int) -> Moves:
+        """Without innovations, which take longest."""
         centred = values - values.mean(axis=0)
         running = np.cumsum(centred, axis=0) - centred / 2
         value, integral = (np.diff(blocks(x, width), axis=0) for x in (centred, running))
         value, integral = value - value.mean(axis=0), integral - integral.mean(axis=0)
-        return cls(value, integral, innovations(value))
+        return cls(value, integral, np.empty((0, value.shape[1])))
+
+    def at(self, rows: NDArray[np.int64]) -> Moves:
+        """Some of the moves, of which those have innovations that are late enough."""
+        late = rows[rows >= FINDER.past]
+        return Moves(self.value[late], self.integral[late], self.innovation[late - FINDER.past])
 
     def of_tags(self, count: int) -> Moves:
         """The first tags alone."""
@@ -63,16 +74,17 @@ def shared_noise(causes: Moves, effects: Moves) -> Matrix:
     return (_unit(causes.innovation).T @ _unit(effects.innovation)) ** 2
 
 
-def direction(moves: Moves, pv: int, op: int) -> float:
-    """How much more the pair looks like a controller from `pv` to `op` than from `op` to `pv`, in standard errors.
+def direction(moves: Moves, pv: int, op: int, rows: NDArray[np.int64]) -> float:
+    """How much more some rows of the moves look like a controller from `pv` to `op` than from `op` to `pv`, in
+    standard errors.
 
     Of a controller moves and integral act the same way. The other way round they do not: what OP owes to the noise
     of PV has the sign of the controller, what PV owes to OP that of the process, and feedback has both opposite.
     """
 
     def agreeing(cause: int, effect: int) -> float:
-        columns = moves.value[:, cause], moves.integral[:, cause], moves.integral[:, effect]
-        slope, error = fitted(moves.value[:, effect], *columns)
+        columns = moves.value[rows, cause], moves.integral[rows, cause], moves.integral[rows, effect]
+        slope, error = fitted(moves.value[rows, effect], *columns)
         return float(slope[1] / error[1] * np.sign(slope[0]))
 
     return agreeing(pv, op) - agreeing(op, pv)
@@ -91,7 +103,7 @@ def fitted(wanted: Matrix, *columns: Matrix) -> tuple[Matrix, Matrix]:
 def blocks(values: Matrix, width: int) -> Matrix:
     """Averages of neighbouring samples, shape (blocks, tags)."""
     whole = len(values) // width * width
-    return np.asarray(values[:whole].reshape(-1, width, values.shape[1]).mean(axis=1))
+    return np.asarray(values[:whole].reshape(whole // width, width, values.shape[1]).mean(axis=1))
 
 
 def _unit(columns: Matrix) -> Matrix:

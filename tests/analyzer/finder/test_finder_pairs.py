@@ -12,6 +12,7 @@ from analyzer.finder.pairs import found_pairs
 from analyzer.limits import FINDER
 from analyzer.loops.spec import read_loops
 from analyzer.loops.tags import controller
+from benchmarks.world.draw import drawn, run
 
 SAMPLE = Path(__file__).parents[3] / "sample_data"
 DT_S = 10.0
@@ -120,3 +121,12 @@ def test_too_little_finds_nothing() -> None:
     """One tag, or a hundred samples, are no loop and no error."""
     assert found_pairs(strangers(3000, 1, 1)) == []
     assert found_pairs(strangers(100, 8, 1)) == []
+
+
+def test_loops_sampled_far_slower_than_they_act_are_not_turned_round() -> None:
+    """At a sample a minute the law of a load's loops holds both ways by chance: none is sure of the wrong way."""
+    trends = {(seed, d.name): run(d) for seed in (533, 523) for d in drawn(seed, 4, ("load",))}
+    values = np.column_stack([getattr(t, role)[::60] for t in trends.values() for role in ("sp", "pv", "op")])
+    sure = [p for p in found_pairs(np.round(values, 3)) if p.sure_pct >= FINDER.sure_pct]
+    assert sure
+    assert {(p.pv % 3, p.op % 3) for p in sure} == {(1, 2)}

@@ -1,0 +1,97 @@
+"""A bag of tags: which may be PV, OP or SP, which is held at which set point, and which answers it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analyzer.finder.held import answers, nearness, tracked
+from analyzer.finder.law import Matrix, blocks
+from analyzer.limits import FINDER
+
+Cause = tuple[int, ...]
+"""A tag that may be PV, or PV and SP whose difference is the error."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bag:
+    """What is asked of a bag of tags on one clock: values, shape (n, tags), and which of them move how.
+
+    live : tags that move often enough to be PV or OP; still : tags that never do; same : first of the tags that hold
+    what another holds too, by tag.
+    """
+
+    values: Matrix
+    live: tuple[int, ...]
+    still: tuple[int, ...]
+    moving: tuple[int, ...]
+    same: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, values: Matrix) -> Bag:
+        """From values without gaps."""
+        moved = (np.diff(values, axis=0) != 0).sum(axis=0)
+        first: dict[bytes, int] = {}
+        same = np.array([first.setdefault(values[:, k].tobytes(), k) for k in range(values.shape[1])])
+        own = same == np.arange(len(same))
+        least = max(FINDER.least_moves, FINDER.live_share * len(values))
+        live, moving = np.flatnonzero(own & (moved >= least)), np.flatnonzero(own & (moved > 0))
+        return cls(values, tuple(live), tuple(np.flatnonzero(moved == 0)), tuple(moving), same)
+
+    def twice(self, tag: int) -> bool:
+        """Whether another tag holds the same: the output of a master and the set point of its slave."""
+        return bool((self.same == tag).sum() > 1)
+
+
+def errors(bag: Bag) -> set[Cause]:
+    """Pairs of tags that may be PV and SP, for one follows the other about its level."""
+    if not bag.live or not bag.moving:
+        return set()
+    width = max(len(bag.values) // FINDER.slow_blocks, 1)
+    moving = np.array(bag.moving)
+    slow = blocks(bag.values[:, moving], width)
+    mean, spread = slow.mean(axis=0), np.maximum(slow.std(axis=0), 1e-9)
+    unit, twice = (slow - mean) / spread, np.array([bag.twice(k) for k in moving])
+    found: set[Cause] = set()
+    for i in np.flatnonzero(np.isin(moving, bag.live)):
+        alike = unit.T @ unit[:, i] / len(unit)
+        away = np.abs(mean - mean[i]) / np.maximum(spread, spread[i])
+        may = (alike > FINDER.follows) | twice
+        near = np.flatnonzero(may & (away < FINDER.about) & (np.arange(len(mean)) != i))
+        for k in near[np.argsort(-alike[near])][: FINDER.set_points if len(bag.live) < FINDER.many else 1]:
+            pair = int(moving[i]), int(moving[k])
+            found.add(pair if pair[1] not in bag.live else (min(pair), max(pair)))
+    return found
+
+
+def held_at(bag: Bag) -> set[Cause]:
+    """Tags with the set point at which each is plainly held, and no other tag is: one that moves but seldom, or what
+    another tag holds too, for that is a master's output."""
+    moving = [k for k in bag.moving if k not in bag.live or bag.twice(k)]
+    if len(bag.live) < 2 or not moving:
+        return set()
+    unlike = tracked(bag.values[:, bag.live], bag.values[:, moving]) < FINDER.unlike
+    never = np.equal.outer(bag.live, moving) | (unlike & ~np.array([bag.twice(k) for k in moving]))
+    near = np.where(never, 0.0, nearness(bag.values, bag.live, moving))
+    best, (second, first) = np.argmax(near, axis=0), np.sort(near, axis=0)[-2:]
+    plain = (first >= FINDER.held) & (first - second >= FINDER.held_alone)
+    return {(bag.live[best[k]], moving[k]) for k in np.flatnonzero(plain)}
+
+
+def answering(bag: Bag, held: set[Cause]) -> dict[Cause, int]:
+    """The tag that moves at once with a set point at which another one is held, where no other tag does so: OP."""
+    pairs = sorted(held)
+    others = [k for k in bag.live if k not in {pv for pv, _ in pairs}]
+    if not pairs or len(others) < 2:
+        return {}
+    size = answers(bag.values, others, [sp for _, sp in pairs])
+    found = {}
+    while size.max() >= FINDER.answers:
+        i, k = np.unravel_index(np.argmax(size), size.shape)
+        most, size[i, k] = size[i, k], 0.0
+        if FINDER.answers_alone * max(size[i].max(), size[:, k].max()) <= most:
+            found[pairs[k]] = others[i]
+        size[i] = size[:, k] = 0.0
+    return found

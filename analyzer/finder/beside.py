@@ -1,0 +1,72 @@
+"""Tags beside a loop: the position of its valve, and the mode of its controller; none where more than one may be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analyzer.finder.law import TINY, Matrix
+from analyzer.limits import FINDER
+
+
+def positions(values: Matrix, outputs: Sequence[int], others: Sequence[int]) -> dict[int, int]:
+    """The tag that stands where an output is, but for play, in the output's own unit: by output, places of tags in
+    values, shape (n, tags)."""
+    op, x = values[:, list(outputs)], values[:, list(others)]
+    spread = np.maximum(op.std(axis=0)[:, None], TINY)
+    power = (op**2).mean(axis=0)[:, None] + (x**2).mean(axis=0) - 2.0 * op.T @ x / len(values)
+    away = np.sqrt(np.maximum(power, 0.0)) / spread
+    away[:, x.std(axis=0) < TINY] = np.inf
+    found = _alone(away, FINDER.position, lambda i, k: (outputs[i], others[k]))
+    return {i: k for i, k in found.items() if _at_once(values[:, i], values[:, k])}
+
+
+def _at_once(op: NDArray[np.float64], x: NDArray[np.float64]) -> bool:
+    """Whether a tag is nearest to what an output was a few samples before at most: a process lags more."""
+    lags = range(min(FINDER.position_lags, len(op) // 2))
+    away = [float(np.mean((x[k:] - op[: len(op) - k]) ** 2)) for k in lags]
+    return bool(np.argmin(away) <= FINDER.position_late)
+
+
+def modes(outputs: Mapping[int, NDArray[np.float64]], tags: Sequence[NDArray[np.float64]]) -> dict[int, int]:
+    """The tag in one value of which, and only then, an output stands still: by output, the place of the tag."""
+    keys = list(outputs)
+    off = np.array([[_disagreement(outputs[key], tag) for tag in tags] for key in keys])
+    return _alone(off.reshape(len(keys), len(tags)), FINDER.mode, lambda i, k: (keys[i], k))
+
+
+def may_be_mode(tag: NDArray[np.float64]) -> bool:
+    """Whether a tag takes few values and changes them now and then."""
+    changes = int((np.diff(tag) != 0).sum())
+    seldom = FINDER.mode_changes <= changes <= FINDER.live_share * len(tag)
+    return seldom and len(np.unique(tag)) <= FINDER.mode_values
+
+
+def _alone(away: Matrix, most: float, named: Callable[[int, int], tuple[int, int]]) -> dict[int, int]:
+    """Rows and columns that are near one another, and neither to any other."""
+    found = []
+    for i, k in np.argwhere(away <= most):
+        next_best = min(
+            np.delete(away[i], k).min(initial=np.inf), np.delete(away[:, k], i).min(initial=np.inf)
+        )
+        if next_best >= max(FINDER.beside_alone * float(away[i, k]), most):
+            found.append(named(int(i), int(k)))
+    return dict(found)
+
+
+def _disagreement(op: NDArray[np.float64], tag: NDArray[np.float64]) -> float:
+    """Share of the samples in which an output moves in manual or stands in automatic, of the value of a tag in which
+    it stands most; inf where the output hardly moves in the others, or the tag changes all the time."""
+    values = np.unique(tag)
+    moved = np.concatenate([[False], np.diff(op) != 0])
+    shares = [float(moved[tag == value].mean()) for value in values]
+    manual = tag == values[int(np.argmin(shares))]
+    usual = float(moved[~manual].mean())
+    if usual < FINDER.mode_moves:
+        return np.inf
+    reach = int(np.ceil(FINDER.mode_reach / usual))
+    stands = np.convolve(moved, np.ones(2 * reach + 1), "same") == 0
+    beside = np.convolve(np.concatenate([[False], np.diff(tag) != 0]), np.ones(4 * reach + 1), "same") > 0
+    return float(np.mean((stands != manual)[~beside])) if not beside.all() else np.inf

@@ -1,0 +1,79 @@
+"""Which pairs are chosen of a bag: with its set point where PV has one, and one-to-one."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analyzer.finder.bag import Bag, Cause, answering
+from analyzer.finder.scores import Scores
+from analyzer.finder.way import pv_and_sp
+from analyzer.limits import FINDER
+
+
+def preferred(bag: Bag, scores: Scores) -> tuple[NDArray[np.float32], set[int], dict[Cause, int]]:
+    """Weights of causes and tags, shape (causes, tags), and the set points: one beside PV comes first where the law
+    is better for it than by either alone, and then is neither PV nor OP itself."""
+    weight = np.max([scores.weight(w) for w in range(len(scores.widths))], axis=0)
+    alone = {cause[0]: c for c, cause in enumerate(scores.causes) if len(cause) == 1}
+    held, set_points = _by_law(scores, weight.max(axis=1)), set[int]()
+    answer = answering(bag, held)
+    for c, cause in enumerate(scores.causes):
+        if cause in held:
+            _keep(bag, weight, alone, (c, cause), answer.get(cause))
+            set_points |= set() if bag.twice(cause[1]) else {cause[1]}
+        elif len(cause) > 1:
+            each = np.max([scores.law[:, alone[k]] for k in cause], axis=0)
+            own = scores.weight(slice(None), c)
+            near = own >= FINDER.likely * own.max(axis=0)
+            better = ((1 - scores.law[:, c] < FINDER.better * (1 - each)) & near).any(axis=0)
+            either = weight[[alone[k] for k in cause]].max(axis=0)
+            weight[c] = np.where(better, np.maximum(weight[c], either), 0.0)
+            j = int(np.argmax(weight[c]))
+            sp = pv_and_sp(bag, scores, cause, bag.live[j])[1]
+            if not bag.twice(sp) and weight[c, j] > FINDER.likely:
+                set_points.add(sp)
+    single = [c for c, cause in enumerate(scores.causes) if len(cause) == 1]
+    weight[[c for c in single if scores.causes[c][0] in set_points or c >= len(bag.live)]] = 0.0
+    weight[:, np.isin(bag.live, list(set_points))] = 0.0
+    return weight, set_points, answer
+
+
+def _keep(
+    bag: Bag, weight: NDArray[np.float32], alone: dict[int, int], held: tuple[int, Cause], op: int | None
+) -> None:
+    """In weights, let PV stand with the set point at which it is held alone, a place and its tags, and with no tag
+    but the OP that answers, where one does."""
+    c, (pv, _) = held
+    weight[c] = np.maximum(weight[c], weight[alone[pv]])
+    weight[alone[pv]] = weight[:, bag.live.index(pv)] = 0.0
+    if op is not None:
+        j = bag.live.index(op)
+        linked = max(float(weight[c, j]), FINDER.linked)
+        weight[c] = weight[:, j] = weight[alone[op]] = 0.0
+        weight[c, j] = linked
+
+
+def _by_law(scores: Scores, most: NDArray[np.float32]) -> set[Cause]:
+    """What is held, where no other tag explains more with that set point; most : weight of each cause."""
+    own = dict(zip(scores.causes, most, strict=True))
+
+    def other(held: Cause) -> float:
+        rivals = (cause for cause in own if len(cause) > 1 and held[1] in cause and held[0] not in cause)
+        return max((float(own[cause]) for cause in rivals), default=0.0)
+
+    return {cause for cause in scores.held if other(cause) < max(FINDER.likely, float(own[cause]))}
+
+
+def one_to_one(bag: Bag, scores: Scores, weight: NDArray[np.float32]) -> list[tuple[int, int]]:
+    """Causes and tags, each tag in one pair at most: the likest first. A set point stands for itself no more."""
+    taken: set[int] = set()
+    chosen = []
+    likely = np.flatnonzero(weight >= FINDER.least_weight)
+    for at in likely[np.argsort(-weight.ravel()[likely])]:
+        c, j = divmod(int(at), weight.shape[1])
+        cause, tag = scores.causes[c], bag.live[j]
+        if taken.isdisjoint((*cause, tag)):
+            chosen.append((c, j))
+            taken |= {tag, *cause[:1], *(k for k in cause if not bag.twice(k))}
+    return chosen

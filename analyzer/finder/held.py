@@ -1,0 +1,144 @@
+"""Where tags are held: which set point is a tag's, and which of two tags that belong together is OP.
+
+A controller with an integral holds PV at SP: the mean of PV, and the level of PV at which OP rests, lie at SP, and
+the slow moves of PV are those of SP. OP follows the load instead: it drifts, and ends at its limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analyzer.finder.law import TINY, Matrix, Moves, blocks, explained, fitted, shared_noise
+from analyzer.limits import FINDER
+
+
+def nearness(values: Matrix, tags: Sequence[int], set_points: Sequence[int]) -> Matrix:
+    """How much speaks for each set point as that of each tag, shape (tags, set points), natural log: the spread of
+    the tag over the distance of the means, and the slow moves of the tag over those of its error."""
+    x, s = values[:, list(tags)], values[:, list(set_points)]
+    near = closeness(np.abs(x.mean(axis=0)[:, None] - s.mean(axis=0)), x.std(axis=0)[:, None])
+    return near + tracked(x, s)
+
+
+def deviation_of_mean(error: Matrix) -> Matrix:
+    """Standard errors of the means of tags that drift, shape (n, tags), from averages over long blocks."""
+    slow = blocks(error, max(len(error) // FINDER.drift_blocks, 1))
+    return np.asarray(slow.std(axis=0) / np.sqrt(len(slow)))
+
+
+def by_chance(x: Matrix, set_points: Matrix) -> Matrix:
+    """What of the nearness of the mean of a tag to set points, shape (n, set points), is chance: a distance below its
+    standard error shows no more than that."""
+    away, error = np.abs(x.mean() - set_points.mean(axis=0)), deviation_of_mean(x[:, None] - set_points)
+    return closeness(away, x.std()) - closeness(np.maximum(away, error), x.std())
+
+
+def closeness(away: Matrix, spread: Matrix | float) -> Matrix:
+    """Log of a spread over a distance, 0 where that is the larger."""
+    return np.asarray(-np.log(np.clip(away / np.maximum(spread, TINY), FINDER.nearest, 1.0)))
+
+
+def apart(x: Matrix, level: Matrix, near: Matrix) -> float:
+    """How much nearer a tag is to the nearest set point than to the next one at another level, natural log: the
+    distance of levels that have nothing to do with the tag exceeds this with odds exp(-this).
+
+    x : shape (n,); level, near : mean of each set point and its nearness, shape (set points,).
+    """
+    best = int(np.argmax(near))
+    others = level != level[best]
+    if near[best] <= 0.0 or not others.any():
+        return max(float(near[best]), 0.0)
+    beyond = np.abs(level[others] - x.mean()).min() / x.std()
+    more = near[best] - max(float(near[others].max()), 0.0)
+    return float(more + np.log(np.clip(beyond, 1.0, 1.0 / FINDER.nearest)))
+
+
+def tracked(x: Matrix, s: Matrix) -> Matrix:
+    """Log of the slow moves of tags over those of their errors, shape (tags, set points); 0 where SP stands still."""
+    width = max(len(x) // FINDER.slow_blocks, 1)
+    x, s = (blocks(v, width) for v in (x, s))
+    x, s = x - x.mean(axis=0), s - s.mean(axis=0)
+    own, moved = (x**2).mean(axis=0)[:, None], (s**2).mean(axis=0)
+    left = own + moved - 2.0 * x.T @ s / len(x)
+    size = 0.5 * np.log(np.maximum(own, TINY) / np.maximum(left, TINY))
+    return np.asarray(np.clip(np.where(moved > TINY, size, 0.0), -FINDER.certain, FINDER.certain))
+
+
+def resting_level(pv: Matrix, op: Matrix, width: int) -> tuple[float, float]:
+    """Level of PV at which OP rests by the law, and its standard error, from rows at no limit of OP, shape (n,);
+    the error is inf where too few are left."""
+    x, rows = pv - pv.mean(), free_moves(op, width)
+    if len(rows) < FINDER.least_moves:
+        return 0.0, np.inf
+    columns = np.column_stack([x, np.cumsum(x) - x / 2, op])
+    moved, summed, wanted = np.diff(blocks(columns, width), axis=0)[rows].T
+    slope, error = fitted(wanted, moved, summed, np.ones(len(rows)))
+    rest = -slope[2] / (slope[1] or TINY)
+    off = np.hypot(error[2], rest * error[1]) / (abs(slope[1]) or TINY)
+    return float(pv.mean() + rest / width), float(off / width)
+
+
+def free_moves(op: Matrix, width: int) -> np.ndarray:
+    """Moves between blocks of which neither has OP at a limit; all where it rests there most of the time."""
+    margin = FINDER.at_limit * np.ptp(op)
+    limited = (op <= op.min() + margin) | (op >= op.max() - margin)
+    within = blocks(limited[:, None].astype(float), width)[:, 0] == 0.0
+    return np.flatnonzero(within[1:] & within[:-1])
+
+
+def alike(values: Matrix) -> NDArray[np.bool_]:
+    """Which tags stand at the same level and move the same way, shape (tags, tags): a stem where its output stands,
+    two sensors, a PV that keeps up with its SP; none is the PV of the other."""
+    x, moves = values - values.mean(axis=0), np.diff(values, axis=0)
+    spread, mean = x.std(axis=0), values.mean(axis=0)
+    cross = x.T @ x / len(x)
+    away = spread[:, None] ** 2 + spread**2 - 2.0 * cross + (mean[:, None] - mean) ** 2
+    near = away <= (FINDER.position * np.minimum.outer(spread, spread)) ** 2
+    return np.asarray(near & (moves.T @ moves > 0.0))
+
+
+def at_no_limit(held: Matrix, width: int) -> NDArray[np.int64]:
+    """Moves between blocks of which neither has a tag at a limit, of those of `held` that rest at limits at all."""
+    free = [free_moves(x, width) for x in held.T if limited(x)]
+    return reduce(np.intersect1d, free, np.arange(len(held) // width - 1))
+
+
+def law_of(held: Matrix, each: Sequence[int]) -> tuple[Matrix, Matrix]:
+    """Share that the law explains, either way, of PV and OP, and that of their innovations which is one, by width;
+    from moves at no limit, where there are enough."""
+    law, noise = np.empty(len(each)), np.empty(len(each))
+    for k, width in enumerate(each):
+        moves, rows = Moves.of(held, width), at_no_limit(held, width)
+        some = moves.at(rows) if FINDER.least_moves + FINDER.past <= len(rows) < len(moves.value) else moves
+        law[k] = max(explained(some, some)[0, 1], explained(some, some)[1, 0])
+        noise[k] = shared_noise(some, some)[0, 1]
+    return law, noise
+
+
+def slower(pv: Matrix, op: Matrix) -> float:
+    """Log of the slow share of OP's variance over that of PV's: feedback leaves PV none."""
+    share = []
+    for x in (op, pv):
+        width = max(len(x) // FINDER.drift_blocks, 1)
+        share.append(max(float(blocks(x[:, None], width).var() / max(x.var(), TINY)), TINY))
+    return float(np.log(share[0] / share[1]))
+
+
+def limited(x: Matrix) -> bool:
+    """Whether a tag rests at an extreme of its own though it moves freely: an output at its limit."""
+    at = max((x == x.min()).mean(), (x == x.max()).mean())
+    return bool(at > FINDER.limited_share and len(np.unique(x)) > FINDER.limited_values)
+
+
+def answers(values: Matrix, tags: Sequence[int], set_points: Sequence[int]) -> Matrix:
+    """How surely each tag moves with each set point in the same sample or the next, in standard errors, shape (tags,
+    set points); 0 where it only repeats it. The proportional part of a controller does so, and a process lags."""
+    x, s = (np.diff(values[:, list(of)], axis=0) for of in (tags, set_points))
+    length = np.outer(np.sqrt((x**2).sum(axis=0)), np.sqrt((s**2).sum(axis=0))) + TINY
+    now, later = x.T @ s / length, x[1:].T @ s[:-1] / length
+    alike = np.maximum(np.where(now**2 > FINDER.repeats, 0.0, np.abs(now)), np.abs(later))
+    return np.asarray(alike * np.sqrt(len(x) / (1.0 - np.minimum(alike**2, 1.0 - TINY))))

@@ -1,0 +1,116 @@
+"""A loop that the data show: its tags, what speaks for them, and its settings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analyzer.finder.bag import Bag
+from analyzer.finder.held import free_moves
+from analyzer.finder.law import (
+    TINY,
+    Matrix,
+    Moves,
+    blocks,
+    explained,
+    fitted,
+    shared_noise,
+    widths,
+)
+from analyzer.limits import FINDER
+
+
+@dataclass(frozen=True, slots=True)
+class FoundPair:
+    """A loop that the data show; places of tags in the bag.
+
+    law : share of OP's moves that the law explains, 0 to 1, in blocks of `width` samples; noise : share of the
+    innovations of OP and PV that is one; asked : weight from which a pair counts at this width; runner_up : weight
+    of the next best tag; towards : how much more the law holds from PV to OP than back; freer : how much more OP
+    drifts and rests at limits; nearer : how much nearer SP is to PV than to OP; resolved : whether neighbouring
+    averages are alike; acts : whether SP moves OP as PV does; answers : whether OP, and no other tag, moves at once
+    with SP; other : most that another tag explains of OP with an SP that moves; told : share that the law explains
+    in blocks of `told_width`, the shortest in which it holds; kp : gain, in units of OP per unit of PV, negative
+    where OP rises with PV; ti_samples : integral time, inf where none acts, None where two ways to it disagree:
+    noise of PV between its samples hides it from the one, not from the other, which asks the samples beside.
+    """
+
+    pv: int
+    op: int
+    sp: int | None
+    law: float
+    noise: float
+    width: int
+    asked: float
+    runner_up: float
+    towards: float = 0.0
+    freer: float = 0.0
+    nearer: float = 0.0
+    resolved: bool = True
+    acts: bool = False
+    answers: bool = False
+    other: float = 0.0
+    told: float = 0.0
+    told_width: int = 1
+    kp: float = 0.0
+    ti_samples: float | None = None
+
+    @property
+    def weight(self) -> float:
+        """How much like a controller's the pair is, 0 to 1."""
+        return float(self.law * np.sqrt(self.noise))
+
+    @property
+    def sure_pct(self) -> float:
+        """How sure the pair is [%], by the weakest of its signs: the weight, the runners-up, which of both is OP;
+        and an OP that rises with PV, where nothing tells which is which, may be the PV of a follower."""
+        less = FINDER.acting if self.acts else 1.0
+        law = (
+            self.weight / (self.asked * less),
+            self.noise / (FINDER.least_noise * (less if self.resolved else FINDER.acting)),
+            FINDER.second * np.log1p(-min(self.weight, 1.0 - TINY)) / np.log1p(-max(self.runner_up, TINY)),
+            np.inf if self.kp >= 0.0 or self.towards >= 1.0 else FINDER.direct,
+        )
+        signs = (
+            *(() if self.answers else law),
+            self.law / max(FINDER.other * self.other, TINY),
+            (self.towards + self.freer + self.nearer) / FINDER.turned,
+        )
+        odds = FINDER.sure_pct / (100.0 - FINDER.sure_pct) * max(min(signs), 0.0) ** 2
+        return float(min(100.0 * odds / (1.0 + odds), FINDER.surest_pct))
+
+
+def known_pair(values: Matrix) -> FoundPair:
+    """The law of a loop whose tags are known: PV, OP and, where there is one, SP, shape (n, 2) or (n, 3)."""
+    sp = 2 if values.shape[1] > 2 else None
+    error = values[:, 0] - (0.0 if sp is None else values[:, 2])
+    columns, each = np.column_stack([error, values[:, 1]]), widths(len(values))
+    moves = [Moves.of(columns, width) for width in each]
+    law = np.array([explained(m, m)[0, 1] for m in moves])
+    told = int(np.argmax(law >= min(FINDER.law_told, law.max())))
+    noise = float(shared_noise(moves[told], moves[told])[0, 1])
+    found = FoundPair(0, 1, sp, float(law[told]), noise, each[told], 1.0, 0.0)
+    return with_settings(Bag.of(values), replace(found, told=float(law[told]), told_width=each[told]))
+
+
+def with_settings(bag: Bag, pair: FoundPair) -> FoundPair:
+    """The pair with gain and integral time of the law, from blocks in which it holds and OP is at no limit."""
+    op, low = bag.values[:, pair.op], 0.0 if pair.sp is None else bag.values[:, pair.sp]
+    error = bag.values[:, [pair.pv]] - np.reshape(low, (-1, 1))
+    moves, rows = Moves.of(np.column_stack([error, op]), pair.told_width), free_moves(op, pair.told_width)
+    rows = rows[(rows > 0) & (rows < len(moves.value) - 1)]
+    moved, wanted, summed = moves.value[rows, 0], moves.value[rows, 1], moves.integral[rows, 0]
+    if len(rows) < FINDER.least_moves:
+        return replace(pair, kp=0.0, ti_samples=None)
+    slope, deviation = fitted(wanted, moved, summed)
+    kp, repeats = -float(slope[0]), float(slope[1] / (slope[0] or TINY))
+    level = blocks(error, pair.told_width)[:, 0]
+    beside = level[rows - 1] + level[rows + 2]
+    beside = beside - beside.mean()
+    other = float(beside @ (wanted - slope[0] * moved) / ((beside @ summed) or TINY) / (slope[0] or TINY))
+    surely = abs(slope[0]) / (abs(slope[1]) + FINDER.acts * deviation[1])
+    if surely > FINDER.alone * len(bag.values):
+        return replace(pair, kp=kp, ti_samples=np.inf)
+    agreed = min(repeats, other) > 0.0 and abs(repeats / other - 1.0) < FINDER.agreed
+    return replace(pair, kp=kp, ti_samples=1.0 / other if agreed else None)

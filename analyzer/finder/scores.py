@@ -1,0 +1,55 @@
+"""How much like a controller's each pair of tags of a bag is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analyzer.finder.bag import Bag, Cause, errors, held_at
+from analyzer.finder.held import alike
+from analyzer.finder.law import Moves, explained, shared_noise, widths
+
+
+@dataclass(frozen=True, slots=True)
+class Scores:
+    """The law (either way) and the noise that is shared, of causes and live tags by width, shape (widths, causes,
+    tags); moves, a width each; held, the tags that are plainly held at a set point; alike, which live tags are one
+    but for play or noise, shape (tags, tags)."""
+
+    causes: Sequence[Cause]
+    law: NDArray[np.float32]
+    noise: NDArray[np.float32]
+    moves: Sequence[Moves]
+    widths: Sequence[int]
+    held: set[Cause]
+    alike: NDArray[np.bool_]
+
+    def weight(self, *at: slice | int | NDArray[np.int64]) -> NDArray[np.float32]:
+        """How much like a controller's, at places of (widths, causes, tags)."""
+        return np.asarray(self.law[at] * np.sqrt(self.noise[at]))
+
+
+def scored(bag: Bag) -> Scores:
+    """How much like a controller's each pair of cause and live tag is."""
+    held = held_at(bag)
+    others = [k for k in bag.moving if k not in bag.live]
+    causes = [*((k,) for k in (*bag.live, *others)), *sorted(errors(bag) | held)]
+    columns = [bag.values[:, c[0]] - (bag.values[:, c[1]] if len(c) > 1 else 0.0) for c in causes]
+    error, count = np.column_stack(columns), len(bag.live)
+    each = widths(len(error))
+    moves = [Moves.of(error, width) for width in each]
+    law = np.empty((len(each), len(causes), count), dtype=np.float32)
+    noise = np.empty_like(law)
+    for k, m in enumerate(moves):
+        law[k] = np.maximum(explained(m, m.of_tags(count)), explained(m.of_tags(count), m).T)
+        noise[k] = shared_noise(m, m.of_tags(count))
+    one = alike(bag.values[:, bag.live])
+    place = {tag: k for k, tag in enumerate(bag.live)}
+    for c, cause in enumerate(causes):
+        own = np.isin(bag.live, bag.same[list(cause)])
+        own |= one[[place[k] for k in cause if k in place]].any(axis=0)
+        law[:, c, own] = noise[:, c, own] = 0.0
+    return Scores(causes, law, noise, moves, each, held, one)
