@@ -78,7 +78,7 @@ PER_SEED = 300
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class NightDecision:
     """One oscillating loop: its true cause, whether it is clear, its measures of shape (len(NAMES),)."""
 
     cause: str
@@ -86,7 +86,7 @@ class Told:
     found: Floats
 
 
-def told(prepared: Prepared, stated: Pid | None, kind: str, cause: str, plain: bool) -> Told | None:
+def told(prepared: Prepared, stated: Pid | None, kind: str, cause: str, plain: bool) -> NightDecision | None:
     """One loop measured; None where it does not count as oscillating or cannot be measured."""
     config = Config()
     found = detect(prepared.record, config.oscillation)
@@ -97,10 +97,10 @@ def told(prepared: Prepared, stated: Pid | None, kind: str, cause: str, plain: b
         m = measure(prepared.record, first, stated, config.cause, found.spectrum, kind)
     except TriageError:
         return None
-    return Told(NAMED.get(cause, cause), plain, measures(m, first))
+    return NightDecision(NAMED.get(cause, cause), plain, measures(m, first))
 
 
-def untidy(task: tuple[int, tuple[float, float], bool]) -> list[Told]:
+def untidy(task: tuple[int, tuple[float, float], bool]) -> list[NightDecision]:
     """An untidy loop that shows its cause."""
     seed, lengths, worn = task
     drawn = draw(seed, "load" if worn else None, lengths, worn)
@@ -110,7 +110,7 @@ def untidy(task: tuple[int, tuple[float, float], bool]) -> list[Told]:
     return [] if found is None else [found]
 
 
-def coupled(seed: int) -> list[Told]:
+def coupled(seed: int) -> list[NightDecision]:
     """The loops of a coupled plant that a fault of their own or a neighbour swings."""
     out = []
     drawn = draw_plant(seed, 30, hours=8)
@@ -129,7 +129,7 @@ def coupled(seed: int) -> list[Told]:
     return out
 
 
-def kept(task: tuple[Path, str]) -> list[Told]:
+def kept(task: tuple[Path, str]) -> list[NightDecision]:
     """A loop of a folder that shows its cause."""
     folder, name = task
     truth = json.loads((folder / "truth.json").read_text())[name]
@@ -175,7 +175,7 @@ def fitted(x: Floats, y: np.ndarray, ways: Sequence[str]) -> tuple[Floats, Float
     return w, base - base.mean()
 
 
-def written(loops: Sequence[Told]) -> None:
+def written(loops: Sequence[NightDecision]) -> None:
     """Fit the weights and write them."""
     found = np.array([t.found for t in loops])
     y = np.array([[str(c) for c in CAUSES].index(t.cause) for t in loops])
@@ -198,7 +198,7 @@ def written(loops: Sequence[Told]) -> None:
     )
 
 
-def line(name: str, loops: Sequence[Told], chances: object) -> list[object]:
+def line(name: str, loops: Sequence[NightDecision], chances: object) -> list[object]:
     """How the loops of a set are told by probability alone, as a row of the table."""
     plain = [t for t in loops if t.clear]
     pairs = [(t.cause, max((p := chances(t.found)), key=p.get), max(p.values())) for t in plain]  # type: ignore[operator]
@@ -216,11 +216,13 @@ def main() -> None:
     options = command_line(__doc__, folders="*", jobs=2)
     with Pool(options.jobs) as pool:
 
-        def drawn(seeds: list[int], lengths: tuple[float, float] = CYCLES, worn: bool = False) -> list[Told]:
+        def drawn(
+            seeds: list[int], lengths: tuple[float, float] = CYCLES, worn: bool = False
+        ) -> list[NightDecision]:
             tasks = [(s, lengths, worn) for s in seeds]
             return [t for part in pool.imap(untidy, tasks, chunksize=5) for t in part]
 
-        def plants(first: int, last: int) -> list[Told]:
+        def plants(first: int, last: int) -> list[NightDecision]:
             return [t for part in pool.imap(coupled, range(first, last + 1)) for t in part]
 
         fit = drawn(_seeds(*range(21, 33))) + drawn(_seeds(51, 52), LONG)

@@ -33,7 +33,7 @@ INTERVALS = 11
 SHARE = 0.5
 """Share of cycles with stiction from which the ellipses tell a valve."""
 COLUMNS = ["loop", "cause", "oscillating_pct"]
-Told = Mapping[str, bool]
+NightDecision = Mapping[str, bool]
 
 
 def asked(
@@ -76,7 +76,7 @@ def regular(error: Floats) -> bool:
     return bool(between.mean() > 3.0 * max(between.std(ddof=1), 1e-9))
 
 
-def ellipses(folder: Path, loops: list[str], python: Path) -> Told:
+def ellipses(folder: Path, loops: list[str], python: Path) -> NightDecision:
     """What the other package tells of each recording."""
     with tempfile.TemporaryDirectory() as place:
         paths = {loop: Path(place) / f"{k}.npz" for k, loop in enumerate(loops)}
@@ -91,7 +91,7 @@ def ellipses(folder: Path, loops: list[str], python: Path) -> Told:
     return {loop: cycles > 0 and sticking / cycles >= SHARE for loop, (sticking, cycles) in told.items()}
 
 
-def counted(truth: Told, said: Told, who: Mapping[str, str]) -> str:
+def counted(truth: NightDecision, said: NightDecision, who: Mapping[str, str]) -> str:
     """Faults found and false alarms, a controller once."""
     votes: dict[str, list[tuple[bool, bool]]] = defaultdict(list)
     for loop, at_fault in truth.items():

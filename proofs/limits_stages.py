@@ -18,7 +18,7 @@ from analyzer.loop.cause import dead_valve
 from analyzer.loop.decisions import Finding, SignKind, Status, Swing
 from analyzer.loop.fitness import at_limits
 from analyzer.loop.judged_stretch import differing
-from analyzer.loop.oscillation import barely_seen, counting, detect
+from analyzer.loop.oscillation import counting, detect, subthreshold_period
 from analyzer.loop.quality import prepare
 from analyzer.loops.changes import behaviour_change
 from analyzer.plantwide.night import followers_of, following, likely, swing_of, trace
@@ -72,7 +72,7 @@ def of_oscillation(c: Config) -> list[Any]:
 
     def answer(r: LoopRecord) -> Any:
         found = detect(r, c.oscillation)
-        fast = barely_seen(found, c.oscillation)
+        fast = subthreshold_period(found, c.oscillation)
         shares = ((round(o.period_s, 2), round(o.oscillating_pct)) for o in found.found)
         return *shares, None if fast is None else round(fast, 2)
 

@@ -111,10 +111,10 @@ def judged(seed: int) -> Judged | None:
 
     said = {}
     for name, (places, config) in RULES.items():
-        own = {(assess, "measure"): once, (assess, "told_slip_by_slip"): lambda verdict, *_: verdict}
+        own = {(assess, "measure"): once, (assess, "refine_stick_slip"): lambda verdict, *_: verdict}
         with _under({**places, **own}):
             seen = detect(prepared.record, config.oscillation)
-            found, verdict = assess.convicted(prepared, seen, stated, config, drawn.kind)
+            found, verdict = assess.with_valve_oscillation(prepared, seen, stated, config, drawn.kind)
         said[name] = counting(found) is not None, str(verdict.cause)
     return Judged(drawn.truth["cause"], shows(drawn), clear(drawn), said)
 

@@ -40,7 +40,7 @@ GIST = attrgetter("cause", "fault", "action", "source")
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class NightDecision:
     """What is told of a loop in a night: cause and confidence [%] of each, fault of the valve, the loop that it
     follows, what to do and by when, the pair of settings, and whether that is other than what the night says by
     itself."""
@@ -89,7 +89,7 @@ class Belief:
     widths: tuple[Width, ...] = ()
     before: Calm | None = None
     last: Calm | None = None
-    told: Told = field(default_factory=Told)
+    told: NightDecision = field(default_factory=NightDecision)
     straight_pct: float | None = None
     recorder: str = ""
     phases: tuple[PhaseKnown, ...] = ()
@@ -245,7 +245,7 @@ def said_of(row: Row) -> Witness | None:
     return {"profile": profile, "needed": NEEDED, "op_range": width, "jump": jump, "width": [width, EARLIER]}
 
 
-def tell(now: Belief, row: Row, limits: BeliefLimits) -> Told:
+def tell(now: Belief, row: Row, limits: BeliefLimits) -> NightDecision:
     """What is told of a loop in a night, by what is believed of it with that night."""
     own = _own(row)
     alone = now.cycle.nights == 1 and now.valve.nights <= 1
@@ -257,7 +257,7 @@ def tell(now: Belief, row: Row, limits: BeliefLimits) -> Told:
     return replace(told, own=GIST(told) == GIST(own))
 
 
-def _left_alone(told: Told) -> Told:
+def _left_alone(told: NightDecision) -> NightDecision:
     """Of a loop whose worn valve makes far less of a cycle since its settings were changed: no further settings, and
     the repair at the next shutdown."""
     if not action.is_urgent(told.action, told.due):
@@ -265,36 +265,38 @@ def _left_alone(told: Told) -> Told:
     return replace(told, action=Action.REPAIR_VALVE, due=Due.SHUTDOWN, pair=None, calmed=True)
 
 
-def _own(row: Row) -> Told:
+def _own(row: Row) -> NightDecision:
     """What a night says by itself."""
     confidence = {c: row[f"osc_{c}_pct"] for c in CAUSES if row[f"osc_{c}_pct"] is not None}
     advised, due = Action(row["action"]) if row["action"] else None, Due(row["due"]) if row["due"] else None
     cause, fault, source = Cause(row["cause"]), Fault(row["valve_fault"]), row["source_loop"]
-    return Told(cause, confidence, fault, source, advised, due, cycle.advised_pair(row))
+    return NightDecision(cause, confidence, fault, source, advised, due, cycle.advised_pair(row))
 
 
-def _of_calm(now: Belief, own: Told, limits: BeliefLimits) -> Told:
+def _of_calm(now: Belief, own: NightDecision, limits: BeliefLimits) -> NightDecision:
     """Of a loop that did not oscillate in the night: a worn valve, or nothing."""
     if now.valve.is_worn(limits):
         fault = now.valve.fault(now.told.fault)
         confidence = {**own.confidence, Cause.VALVE: now.valve.worn_pct(limits)}
         if own.action in action.FIRST:
-            return Told(Cause.VALVE, confidence, fault, None, own.action)
+            return NightDecision(Cause.VALVE, confidence, fault, None, own.action)
         due = own.due or Due.SHUTDOWN  # a slave that moves its master cannot wait
-        return Told(Cause.VALVE, confidence, fault, None, Action.REPAIR_VALVE, due)
+        return NightDecision(Cause.VALVE, confidence, fault, None, Action.REPAIR_VALVE, due)
     if own.cause is not Cause.VALVE:
         return own
     left = Action.NONE if own.action is Action.REPAIR_VALVE else own.action
-    return Told(Cause.NONE, own.confidence, Fault.NONE, None, left)
+    return NightDecision(Cause.NONE, own.confidence, Fault.NONE, None, left)
 
 
-def _of_cycle(now: Belief, own: Told, limits: BeliefLimits) -> Told:
+def _of_cycle(now: Belief, own: NightDecision, limits: BeliefLimits) -> NightDecision:
     """Of a loop that oscillated in the night: its source, else the cause that the nights name, and the valve."""
     source, worn = now.cycle.source, now.valve.is_worn(limits)
     if source is not None:
         if own.source is not None:
             return own
-        return Told(Cause.LOAD, now.cycle.chances(limits.between), Fault.NONE, source, Action.SEE_SOURCE_LOOP)
+        return NightDecision(
+            Cause.LOAD, now.cycle.chances(limits.between), Fault.NONE, source, Action.SEE_SOURCE_LOOP
+        )
     cause, confidence = now.cycle.cause, now.cycle.chances(limits.between)
     if cause is Cause.VALVE and not worn:
         cause = Cause.UNDECIDED
@@ -302,11 +304,11 @@ def _of_cycle(now: Belief, own: Told, limits: BeliefLimits) -> Told:
     fault = now.valve.fault(now.told.fault) if worn and (cause is Cause.VALVE or surely) else Fault.NONE
     if cause is Cause.UNDECIDED and fault is Fault.NONE:
         fault = own.fault if own.fault is Fault.UNDECIDED else Fault.NONE
-    told = Told(cause, confidence, fault)
+    told = NightDecision(cause, confidence, fault)
     return _with_remedy(now, own, told)
 
 
-def _with_remedy(now: Belief, own: Told, told: Told) -> Told:
+def _with_remedy(now: Belief, own: NightDecision, told: NightDecision) -> NightDecision:
     """What to do about a cycle of a cause."""
     worn, done = told.fault in (Fault.BACKLASH, Fault.STICTION), now.remedy
     voted = None if done.action is Action.RETUNE and done.held is None else done.action

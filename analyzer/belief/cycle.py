@@ -69,7 +69,7 @@ class CycleBelief:
         return max(self.sources, key=lambda loop: (self.sources[loop], loop))
 
 
-def loud_and_top(before: CycleBelief, row: Row, limits: BeliefLimits) -> tuple[bool, float]:
+def oscillation_state(before: CycleBelief, row: Row, limits: BeliefLimits) -> tuple[bool, float]:
     """Whether a loop oscillates, with a memory, and the largest significance [% h]: what is small beside what
     there was neither ends nor begins an oscillation."""
     now = float(row["oscillation_significance"] or 0.0)
@@ -81,7 +81,7 @@ def loud_and_top(before: CycleBelief, row: Row, limits: BeliefLimits) -> tuple[b
 
 def cycle_with_night(before: CycleBelief, share: float, row: Row, limits: BeliefLimits) -> CycleBelief:
     """The belief with one night more, of which what came before counts for a share."""
-    loud, top = loud_and_top(before, row, limits)
+    loud, top = oscillation_state(before, row, limits)
     begun = _usual_size(before, float(row["oscillation_significance"] or 0.0) if loud else 0.0, limits)
     told = replace(begun, since=before.since or row["night"], nights=before.nights + 1, loud=loud, top=top)
     if not counts(row["oscillating_pct"]):

@@ -13,7 +13,7 @@ import numpy as np
 
 from analyzer.columns import Row
 from analyzer.explain.case import Case
-from analyzer.explain.models import SCALE, Brought, judged, plain_start, rescaled, span_note
+from analyzer.explain.models import SCALE, UserModel, judged, plain_start, rescaled, span_note
 from analyzer.loop.experiments import Learned
 from analyzer.words.decision import as_data as decision_data
 from analyzer.words.experiments import in_a_clause
@@ -39,7 +39,7 @@ class Explained:
     found: Explanation
     said: Answer
     data: dict[str, Any]
-    brought: Brought | None = None
+    brought: UserModel | None = None
 
     def model(self) -> dict[str, Any]:
         """The model found, the plain loop where nothing was, as data to be written."""
@@ -111,7 +111,7 @@ def in_percent_of(c: Case, other: Case) -> Recording:
     return replace(other.subject, pv=pv, op=op, sp=None)
 
 
-def as_data(c: Case, said: Answer, brought: Brought | None = None) -> dict[str, Any]:
+def as_data(c: Case, said: Answer, brought: UserModel | None = None) -> dict[str, Any]:
     """The answer as data that JSON can hold."""
     data = answer_data(c.spec.loop, said, f"{reason(said)} {c.shortened}".strip())
     if brought is not None:

@@ -84,7 +84,7 @@ def plain_start(brought: Mapping[str, Any]) -> Floats:
 
 
 @dataclass(frozen=True, slots=True)
-class Brought:
+class UserModel:
     """The user's model: PV as it simulates it [% PV], shape (n,), its misfit on both parts, one line about it."""
 
     simulated: Floats = field(repr=False)
@@ -93,7 +93,7 @@ class Brought:
     note: str
 
 
-def judged(data: Mapping[str, Any], found: Explanation, s: Recording, more: str = "") -> Brought:
+def judged(data: Mapping[str, Any], found: Explanation, s: Recording, more: str = "") -> UserModel:
     """The user's model on the recording explained, its mean freed, beside the plain loop refitted.
 
     more : what else there is to say of it.
@@ -109,7 +109,7 @@ def judged(data: Mapping[str, Any], found: Explanation, s: Recording, more: str 
     verdict = "" if units else against_plain(own, plain.rmse, s.limits.proof.as_good)
     note = "; ".join(x for x in (said, verdict, units, more) if x) + "."
     fitted, held = misfit(s.pv[:cut], out[:cut], window), misfit(s.pv[cut:], out[cut:], window)
-    return Brought(out, fitted, held, note)
+    return UserModel(out, fitted, held, note)
 
 
 def against_plain(own: float, plain: float, as_good: float) -> str:

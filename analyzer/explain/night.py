@@ -17,7 +17,7 @@ from analyzer.history.export import Export
 from analyzer.loop.decisions import Action, Cause, Fault, Status, counts, decided_fault
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.nights import Night, Plant, cut
-from analyzer.night.workers import Died, executor
+from analyzer.night.workers import WorkerDeath, executor
 from analyzer.store.store import Store
 from analyzer.store.table import rows_table
 from identification.errors import TriageError
@@ -143,7 +143,7 @@ def explain_flagged(
         for q in left:
             workers.submit(q)
         for at, result in enumerate(workers.results(), len(done) + 1):
-            if isinstance(result, Died):
+            if isinstance(result, WorkerDeath):
                 why = abstained(result.task.spec.loop, f"not explained: {result.why}")
                 result = answer_row(why, night.name)
             rows.append(result)

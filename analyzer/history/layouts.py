@@ -17,7 +17,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history.clock import Clock
-from analyzer.history.quality import Scheme, mostly_one, not_good, quality_columns, scheme_of
+from analyzer.history.quality import Scheme, not_good, ones_prevail, quality_columns, scheme_of
 from analyzer.history.series import MainSpan, NoStampError, Series, main_span
 from analyzer.history.table import (
     COLUMNS,
@@ -204,7 +204,7 @@ def open_wide(table: Table, options: ReadOptions) -> Source:
     names = [table.names[i] for i in values_in]
     check_once(table.path, names)
     tags = _with_loop(names, table.path.stem)
-    ones = mostly_one(table.head(sorted({*partner.values()})))
+    ones = ones_prevail(table.head(sorted({*partner.values()})))
     columns = tuple(TagColumn(clock, i, partner.get(i, -1)) for i in values_in)
     layout = [f"wide table, {len(tags)} tags", *said]
     if used := {table.names[c.quality]: c.quality for c in columns if c.quality >= 0}:
@@ -336,7 +336,7 @@ def open_long(table: Table, options: ReadOptions) -> Source | None:
         quality = stated_column(table.path, table.names, options.quality_column, "quality")
     layout = [f"long table, {len(tags)} tags in column '{table.names[tag]}'"]
     if quality is not None:
-        scheme = scheme_of(table.names[quality], _kinds(table, quality), mostly_one(table.head([quality])))
+        scheme = scheme_of(table.names[quality], _kinds(table, quality), ones_prevail(table.head([quality])))
         layout.append(f"column '{table.names[quality]}' read as {scheme.value}")
     columns = (TagColumn(clock, value, -1 if quality is None else quality),)
     return Source(table, tags, columns, options.good_quality, tuple(layout), tag, scheme)

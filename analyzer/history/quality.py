@@ -64,7 +64,7 @@ IS_GOOD: Mapping[Scheme, Callable[[Codes], NDArray[np.bool_]]] = {
 """Which numbers are good; what is no number is good in none."""
 
 
-def mostly_one(columns: Iterable[pa.Array]) -> bool:
+def ones_prevail(columns: Iterable[pa.Array]) -> bool:
     """Whether of the codes 0 and 1 in some columns' rows most are 1."""
     number = np.concatenate([np.empty(0), *(_numbers(codes) for codes in columns)])
     return bool((number == 1).sum() > (number == 0).sum())
@@ -73,7 +73,7 @@ def mostly_one(columns: Iterable[pa.Array]) -> bool:
 def scheme_of(name: str, codes: pa.Array, ones: bool | None = None) -> Scheme:
     """Decide by the column's name and all the codes that occur in it.
 
-    `ones` is whether of the codes 0 and 1 most are 1, as `mostly_one` has it of more rows; None: of these.
+    `ones` is whether of the codes 0 and 1 most are 1, as `ones_prevail` has it of more rows; None: of these.
     """
     number, name = _numbers(codes), plain(name)
     known = number[np.isfinite(number)].astype(np.int64)
@@ -93,7 +93,7 @@ def scheme_of(name: str, codes: pa.Array, ones: bool | None = None) -> Scheme:
         return Scheme.DA
     if (known == PCS7_GOOD).any() and known.max() < 0x100:
         return Scheme.PCS7
-    if len(known) and known.max() < HISTORY.flags and (mostly_one([codes]) if ones is None else ones):
+    if len(known) and known.max() < HISTORY.flags and (ones_prevail([codes]) if ones is None else ones):
         return Scheme.ONE_GOOD
     return Scheme.CONFIDENCE if len(known) and known.max() == CONFIDENCE_FULL else Scheme.UA
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from analyzer.loop.action import decided
-from analyzer.loop.decisions import Action, Cause, Finding, Lack, Lane
+from analyzer.loop.decisions import Action, Cause, Finding, Lane, MissingData
 from analyzer.words.units import duration
 
 if TYPE_CHECKING:
@@ -46,12 +46,12 @@ class Rule:
 
 def _rests(found: Finding, limits: LaneLimits) -> bool:
     """Whether OP rests at a limit; an OP that switches is at one all the time."""
-    return found.lack is not Lack.SWITCHES and found.number("at_limits_pct") > limits.at_limits_pct
+    return found.lack is not MissingData.SWITCHES and found.number("at_limits_pct") > limits.at_limits_pct
 
 
 def _offset(found: Finding) -> bool:
     """Whether a lasting error is what the controller leaves: of gain alone, or one that switches."""
-    return found.known.get("ti") == 0.0 or found.lack is Lack.SWITCHES
+    return found.known.get("ti") == 0.0 or found.lack is MissingData.SWITCHES
 
 
 def _at_limit(found: Finding) -> str:

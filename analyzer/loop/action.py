@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from analyzer.loop.decisions import Action, Cause, Due, Finding, Lack, Lane, Remedy, Status
+from analyzer.loop.decisions import Action, Cause, Due, Finding, Lane, MissingData, Remedy, Status
 
 ACTING = (Action.RETUNE, Action.REPAIR_VALVE)
 """Actions that change a loop."""
@@ -26,11 +26,11 @@ NOTHING_SURER = (None, Action.NONE, Action.NEEDS_DATA, Action.CHECK_SETTINGS)
 """Actions in whose place a doubtful measurement is looked at first: what rests on it is doubtful too."""
 NOTHING_ELSE = (Action.NONE, Action.UNDECIDED)
 """Actions in whose place it is found out what holds OP at its limit."""
-OF_LACK = {Lack.MANUAL_TEST: Action.UNDECIDED, Lack.SWITCHES: Action.NONE}
+OF_LACK = {MissingData.MANUAL_TEST: Action.UNDECIDED, MissingData.SWITCHES: Action.NONE}
 """What is done about a record that lacks something, where that is not to get more data."""
 
 
-def for_lack(lack: Lack | None) -> Action:
+def for_lack(lack: MissingData | None) -> Action:
     """What is done about a record that lacks something for an answer or for settings."""
     return OF_LACK.get(lack, Action.NEEDS_DATA) if lack is not None else Action.NEEDS_DATA
 
@@ -44,10 +44,10 @@ def decided(found: Finding, doubtful: bool) -> Finding:
     at_limit = action in NOTHING_ELSE and not {Lane.AT_LIMIT, Lane.WINDUP}.isdisjoint(lanes)
     if action in NOTHING_SURER and found.status is not Status.FAILED and doubtful:
         action = Action.CHECK_MEASUREMENT
-    elif at_limit or (action is Action.NEEDS_DATA and found.lack is Lack.OP_OFF_LIMITS):
+    elif at_limit or (action is Action.NEEDS_DATA and found.lack is MissingData.OP_OFF_LIMITS):
         action = Action.CHECK_LIMIT
     elif action is Action.NONE and Lane.SLUGGISH in lanes:
-        found, action = replace(found, lack=Lack.STEP_TEST), Action.NEEDS_DATA
+        found, action = replace(found, lack=MissingData.STEP_TEST), Action.NEEDS_DATA
     return (
         found if action is found.remedy.action else replace(found, remedy=Remedy(action, found.remedy.text))
     )

@@ -10,7 +10,7 @@ from analyzer.loop import action
 from analyzer.loop.agreement import agreement
 from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
-from analyzer.loop.decisions import Action, Cause, Due, Fault, Lack, Need, Needs
+from analyzer.loop.decisions import Action, Cause, Due, Fault, MissingData, Requirement, RequirementKind
 from analyzer.loop.fitness import too_thin
 from analyzer.loop.identified import cautious, load_of, recorded_error, tuned, uncertain
 from analyzer.loop.oscillation import counting
@@ -53,7 +53,7 @@ class Advice:
     ti_new: float | None = None
     before: Cycle | None = None
     after: Cycle | None = None
-    lack: Lack | None = None
+    lack: MissingData | None = None
     due: Due = Due.NOW
     compared: Comparison | None = field(default=None, compare=False)
 
@@ -102,7 +102,7 @@ def advise(
     if proposal.action is Action.UNDECIDED and found.verdict.cause is Cause.VALVE:
         proposal = replace(proposal, action=Action.REPAIR_VALVE)
     elif proposal.action is Action.UNDECIDED:
-        return _lacking(Needs(Lack.STEP_TEST, Need.STEP_TEST, (proposal.reason,)))
+        return _lacking(Requirement(MissingData.STEP_TEST, RequirementKind.STEP_TEST, (proposal.reason,)))
     beside = None
     if proposed.loop is not None and proposed.load is not None:
         known = proposed.loop, proposed.load, held or proposal.new, oscillation.period_s, pv_span
@@ -152,7 +152,7 @@ def on_recorded(advice: Advice, found: Assessment, spec: LoopSpec, pv_span: floa
     return replace(advice, reason=SAID["on_recorded"].format(followed, advice.reason))
 
 
-def _unscaled(kept: Advice | None, needs: Needs) -> Advice:
+def _unscaled(kept: Advice | None, needs: Requirement) -> Advice:
     """What is left to do where OP is not in percent: a valve is stroked all the same, else the range is stated."""
     if kept is not None and kept.action is Action.REPAIR_VALVE:
         return replace(kept, reason=str(needs), lack=needs.lack)
@@ -164,7 +164,7 @@ def _or_repair(verdict: Verdict, other: Advice) -> Advice:
     return Advice(Action.REPAIR_VALVE, other.reason) if verdict.cause is Cause.VALVE else other
 
 
-def _lacking(needs: Needs) -> Advice:
+def _lacking(needs: Requirement) -> Advice:
     """The advice to get more data, or a test where no data tell, with what is lacking."""
     return Advice(action.for_lack(needs.lack), str(needs), lack=needs.lack)
 
@@ -223,7 +223,9 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
     if controller.kp == 0.0:
         return _or_repair(found.verdict, Advice(Action.NONE, SAID["integral_alone"]))
     if found.judged_h < config.advice.least_h:
-        return _lacking(Needs(Lack.LONGER, Need.HOURS, (config.advice.least_h, found.judged_h)))
+        return _lacking(
+            Requirement(MissingData.LONGER, RequirementKind.HOURS, (config.advice.least_h, found.judged_h))
+        )
     return _too_thin(found, controller, config)
 
 
@@ -284,13 +286,13 @@ def _for_tuning(verdict: Verdict, loop: Loop, period_s: float | None, config: Co
     load = load_of(fit, loop.controller)
     error = recorded_error(fit, loop.controller)
     thin = too_thin(fit.window.row_s, loop.controller, config) is not None
-    seen = verdict.rests_on.observed
+    seen = verdict.require_measured.observed
     found = recommend(slow, verdict.cause, others, load, config.tuning, error, thin, seen)
     return Proposed(found, loop, load, others) if found.ms is not None else Proposed(found)
 
 
 def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Config) -> Proposed:
-    told_nat, least_nat = verdict.rests_on.evidence, config.advice.valve_nat
+    told_nat, least_nat = verdict.require_measured.evidence, config.advice.valve_nat
     if told_nat < least_nat:
         return Proposed(Proposal(Action.UNDECIDED, SAID["hardly_told"].format(told_nat, least_nat)))
     sought, fit, others = sought_for(verdict, loop.controller, config.advice)

@@ -15,22 +15,22 @@ from analyzer.loop.assessments import Assessments, Hour, assess_span, hourly
 from analyzer.loop.cause import (
     NO_CAUSE,
     Verdict,
-    as_hint,
+    cap_confidence,
     dead_valve,
     hidden_by_grid,
     judge,
     not_assessed,
-    told_apart,
-    told_slip_by_slip,
+    refine_stick_slip,
+    resolve_ambiguity,
     with_dead_valve,
     with_worn_valve,
 )
 from analyzer.loop.cycling_span import Span, detect_where_it_cycles
-from analyzer.loop.decisions import Cause, Lack, LacksError, Need, Needs
+from analyzer.loop.decisions import Cause, LacksError, MissingData, Requirement, RequirementKind
 from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
 from analyzer.loop.judged_stretch import Earlier, Shown, Stretch, as_recorded, judged_stretch, shown
 from analyzer.loop.measure import Measured, measure, ringing_period, time_scale
-from analyzer.loop.oscillation import Oscillation, Oscillations, barely_seen, counting, detect
+from analyzer.loop.oscillation import Oscillation, Oscillations, counting, detect, subthreshold_period
 from analyzer.loop.page_trends import BUCKETS, FINE_BUCKETS, close_view, thinned
 from analyzer.loop.quality import Prepared
 from analyzer.loop.ringing import same_period
@@ -81,30 +81,34 @@ class Assessment:
     waves: tuple[Wave, ...] = ()
     trend: Mapping[str, np.ndarray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-    needs: Needs | None = None
+    needs: Requirement | None = None
     close_s: tuple[float, float] | None = None
-    for_settings: Needs | None = None
+    for_settings: Requirement | None = None
     judged_h: float = 0.0
     outdated: bool = False
     op_scaled: bool = True
     shared: Shared | None = None
 
 
-def unassessable(record: LoopRecord, config: Config) -> Needs | None:
+def unassessable(record: LoopRecord, config: Config) -> Requirement | None:
     """What the record lacks for an assessment; None where it can support one."""
     q = config.quality
     own = ~record.mask("idle")
     if int(own.sum()) < q.samples:
         has = q.samples, int(own.sum())
         if own.all():
-            return Needs(Lack.SAMPLES, Need.SAMPLES, has)
-        return Needs(Lack.SAMPLES, Need.SAMPLES_IN_TURN, (*has, 100 * float(own.mean())))
+            return Requirement(MissingData.SAMPLES, RequirementKind.SAMPLES, has)
+        return Requirement(
+            MissingData.SAMPLES, RequirementKind.SAMPLES_IN_TURN, (*has, 100 * float(own.mean()))
+        )
     share = float(record.usable[own].mean())
     if share >= q.usable_share:
         return None
     manual, bad = float(record.mask("manual").mean()), float(record.bad.mean())
     shares = (100 * q.usable_share, 100 * share, 100 * manual, 100 * bad)
-    return Needs(Lack.AUTOMATIC if manual >= bad else Lack.SAMPLES, Need.AUTOMATIC, shares)
+    return Requirement(
+        MissingData.AUTOMATIC if manual >= bad else MissingData.SAMPLES, RequirementKind.AUTOMATIC, shares
+    )
 
 
 def cause_of(
@@ -117,18 +121,18 @@ def cause_of(
         try:
             measured = measure(record, oscillation, controller, config.cause, found.spectrum, kind)
         except NotAssessedError as error:
-            needs = Needs(Lack.UNBROKEN, Need.AS_TOLD, (str(error),))
+            needs = Requirement(MissingData.UNBROKEN, RequirementKind.AS_TOLD, (str(error),))
     verdict = NO_CAUSE if oscillation is None else not_assessed(needs)
     if measured is not None:
         verdict = verdict_by_measures(measured, prepared, oscillation, config)
         if oscillation is not None:
-            verdict = told_slip_by_slip(verdict, oscillation.period_s, config.cause)
+            verdict = refine_stick_slip(verdict, oscillation.period_s, config.cause)
             verdict = with_worn_valve(verdict, oscillation.period_s, config.cause)
     dead = dead_valve(record, config.cause) if prepared.op_known else None
     return with_dead_valve(verdict, dead) if dead and verdict.cause is not Cause.VALVE else verdict
 
 
-def convicted(
+def with_valve_oscillation(
     prepared: Prepared, found: Oscillations, controller: Pid | None, config: Config, kind: str
 ) -> tuple[Oscillations, Verdict]:
     """What oscillates, of `found` what counts by itself, and why: a cycle that alone is not regular enough to count
@@ -176,7 +180,7 @@ def verdict_by_measures(
     """The verdict by what was measured, as far as sampling and grid let it be told."""
     if hidden_by_grid(measured, prepared.pv_step, oscillation is not None, config.cause):
         measured = replace(measured, evidence=0.0)
-    return told_apart(judge(measured, oscillation, config.cause), prepared, oscillation, config)
+    return resolve_ambiguity(judge(measured, oscillation, config.cause), prepared, oscillation, config)
 
 
 def _known_without_op(figures: Assessments, op: bool) -> Assessments:
@@ -184,7 +188,9 @@ def _known_without_op(figures: Assessments, op: bool) -> Assessments:
     return figures if op else replace(figures, **OF_OP)
 
 
-def hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, config: Config) -> Needs | None:
+def hidden(
+    record: LoopRecord, found: Oscillations, controller: Pid | None, config: Config
+) -> Requirement | None:
     """Why what is seen, or not, says nothing: the loop's cycles are too fast for the sampling; None where not. An
     integral time that is stated says so only where the record shows no other."""
     samples = config.oscillation.samples
@@ -195,14 +201,18 @@ def hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, conf
         folded = None if controller is None else config.advice.cycle_per_ti * controller.ti_s
         if folded is None or folded >= NYQUIST * record.dt_s:
             return None
-        return Needs(Lack.FASTER, Need.UNFOLDED, (folded / samples, record.dt_s, folded))
-    period = barely_seen(found, config.oscillation)
+        return Requirement(
+            MissingData.FASTER, RequirementKind.UNFOLDED, (folded / samples, record.dt_s, folded)
+        )
+    period = subthreshold_period(found, config.oscillation)
     if period is None and controller is not None and math.isfinite(controller.ti_s):
         expected = config.advice.cycle_per_ti * controller.ti_s
         period = expected if expected < samples * record.dt_s else None
     if period is None:
         return None
-    return Needs(Lack.FASTER, Need.OF_A_CYCLE, (period / samples, record.dt_s, period))
+    return Requirement(
+        MissingData.FASTER, RequirementKind.OF_A_CYCLE, (period / samples, record.dt_s, period)
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,7 +243,7 @@ def _judge_stretch(prepared: Prepared, stretch: Stretch, config: Config, kind: s
     found, verdict = judged_where(part, found, span, acting, config, kind)
     thin = None if verdict.told_between_rows else too_thin(record.dt_s, acting, config)
     if _hours_in(part.record) < config.advice.least_h or thin is not None:
-        verdict = as_hint(verdict, config.advice.hint_pct)
+        verdict = cap_confidence(verdict, config.advice.hint_pct)
     return _Judged(part, found if whole else of_all, found, verdict, seen)
 
 
@@ -242,10 +252,10 @@ def judged_where(
 ) -> tuple[Oscillations, Verdict]:
     """What oscillates and why, by the span in which it is on."""
     if span == (0, len(part.record)):
-        return convicted(part, found, controller, config, kind)
+        return with_valve_oscillation(part, found, controller, config, kind)
     cycling = replace(part, record=part.record.span(*span))
     own = detect(cycling.record, config.oscillation)
-    seen, verdict = convicted(cycling, own, controller, config, kind)
+    seen, verdict = with_valve_oscillation(cycling, own, controller, config, kind)
     return found if seen is own else seen, verdict
 
 

@@ -31,7 +31,16 @@ import numpy as np
 
 from analyzer.config import CauseLimits, Config
 from analyzer.loop.cause_weights import chances, measures, signs_of
-from analyzer.loop.decisions import CAUSES, Cause, Fault, Lack, Need, Needs, Sign, SignKind
+from analyzer.loop.decisions import (
+    CAUSES,
+    Cause,
+    Fault,
+    MissingData,
+    Requirement,
+    RequirementKind,
+    Sign,
+    SignKind,
+)
 from analyzer.loop.fitness import compressed
 from analyzer.loop.identified import sensitivity
 from analyzer.loop.measure import Measured
@@ -50,7 +59,7 @@ from identification.estimation.window import Fit
 from identification.limits import FIT
 from identification.record import LoopRecord
 
-NO_MODEL = Needs(None, Need.MODEL)
+NO_MODEL = Requirement(None, RequirementKind.MODEL)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,13 +75,13 @@ class Verdict:
     confidence: dict[Cause, float]
     fault: Fault
     signs: tuple[Sign, ...] = ()
-    needs: Needs | None = None
+    needs: Requirement | None = None
     measured: Measured | None = None
     dead: bool = False
     steady: Verdict | None = None
 
     @property
-    def rests_on(self) -> Measured:
+    def require_measured(self) -> Measured:
         """What was measured; NotAssessedError, with what the record lacks, where nothing was."""
         if self.measured is None:
             raise NotAssessedError(str(self.needs or NO_MODEL))
@@ -81,7 +90,7 @@ class Verdict:
     @property
     def fit(self) -> Fit:
         """The fit that it rests on, the valve's where that is at fault; NotAssessedError where there is none."""
-        m = self.rests_on
+        m = self.require_measured
         if self.cause is not Cause.VALVE:
             return m.linear
         return m.stick_slip if self.fault is Fault.STICTION and m.stick_slip is not None else m.play
@@ -109,7 +118,7 @@ benchmarks/world, seeds 115 to 118, the one wrong cause had .17, the right ones 
 NO_CAUSE = Verdict(Cause.NONE, dict.fromkeys(CAUSES, 0.0), Fault.NONE)
 
 
-def not_assessed(needs: Needs | None) -> Verdict:
+def not_assessed(needs: Requirement | None) -> Verdict:
     """The verdict that abstains and says what it needs."""
     return Verdict(Cause.UNDECIDED, dict.fromkeys(CAUSES, 0.0), Fault.UNDECIDED, needs=needs)
 
@@ -302,7 +311,7 @@ def hidden_by_grid(m: Measured, pv_step: float, oscillates: bool, limits: CauseL
     return rough or abs(best.gain) * best.valve.stickband < limits.grid_steps * pv_step
 
 
-def as_hint(verdict: Verdict, most_pct: float) -> Verdict:
+def cap_confidence(verdict: Verdict, most_pct: float) -> Verdict:
     """A verdict that rests on little: no confidence above `most_pct` [%]."""
     return replace(verdict, confidence={k: min(v, most_pct) for k, v in verdict.confidence.items()})
 
@@ -337,7 +346,7 @@ def with_dead_valve(verdict: Verdict, sign: Sign) -> Verdict:
     )
 
 
-def told_apart(
+def resolve_ambiguity(
     verdict: Verdict, prepared: Prepared, oscillation: Oscillation | None, config: Config
 ) -> Verdict:
     """The verdict, or none where trends on straight segments make a likely valve of a load, where the loop that is
@@ -349,39 +358,49 @@ def told_apart(
     if lacking is None:
         return verdict
     fault = Fault.UNDECIDED if verdict.cause is Cause.VALVE else verdict.fault
-    hint = as_hint(verdict, 0.9 * config.cause.named_pct)
+    hint = cap_confidence(verdict, 0.9 * config.cause.named_pct)
     return replace(hint, cause=Cause.UNDECIDED, fault=fault, needs=lacking)
 
 
-def _hides(verdict: Verdict, prepared: Prepared, oscillation: Oscillation, config: Config) -> Needs | None:
+def _hides(
+    verdict: Verdict, prepared: Prepared, oscillation: Oscillation, config: Config
+) -> Requirement | None:
     """What the recording lacks to tell the cause that is named from others; None where it lacks nothing."""
     limits, pct = config.cause, verdict.confidence[verdict.cause]
     if verdict.cause is Cause.TUNING:
         return _robust(verdict, oscillation, config)
     if verdict.cause is Cause.VALVE:
         return None if pct >= limits.compressed_pct else compressed(prepared, None, config.quality)
-    unlikely = None if pct >= limits.load_pct else Needs(Lack.MANUAL_TEST, Need.LOAD_IN_MANUAL, (pct,))
+    unlikely = (
+        None
+        if pct >= limits.load_pct
+        else Requirement(MissingData.MANUAL_TEST, RequirementKind.LOAD_IN_MANUAL, (pct,))
+    )
     return _too_coarse_for_a_load(prepared, oscillation, limits) or unlikely
 
 
-def _too_coarse_for_a_load(prepared: Prepared, oscillation: Oscillation, limits: CauseLimits) -> Needs | None:
+def _too_coarse_for_a_load(
+    prepared: Prepared, oscillation: Oscillation, limits: CauseLimits
+) -> Requirement | None:
     """What a recording lacks in which every cause looks like a load: a wave of few samples, or of few steps of PV's
     grid, has lost what a valve writes into it; None where it lacks nothing."""
     steps = oscillation.amplitude_pct / max(prepared.pv_step, 1e-12)
     if steps < limits.steps_told:
-        return Needs(Lack.FINER, Need.FINER, (prepared.pv_step, oscillation.amplitude_pct))
+        return Requirement(
+            MissingData.FINER, RequirementKind.FINER, (prepared.pv_step, oscillation.amplitude_pct)
+        )
     samples = oscillation.period_s / prepared.record.dt_s
     if samples < limits.samples_told:
-        return Needs(Lack.FASTER, Need.OF_A_LOAD, (limits.samples_told, samples))
+        return Requirement(MissingData.FASTER, RequirementKind.OF_A_LOAD, (limits.samples_told, samples))
     return None
 
 
-def _robust(verdict: Verdict, oscillation: Oscillation, config: Config) -> Needs | None:
+def _robust(verdict: Verdict, oscillation: Oscillation, config: Config) -> Requirement | None:
     """A test in manual, where signs speak for the tuning and the identified loop is robust; None where it is not."""
     ms = None if verdict.measured is None else sensitivity(verdict.measured, oscillation.period_s)
     if ms is None or ms > config.tuning.ms_most:
         return None
-    return Needs(Lack.MANUAL_TEST, Need.TUNING_IN_MANUAL, (ms,))
+    return Requirement(MissingData.MANUAL_TEST, RequirementKind.TUNING_IN_MANUAL, (ms,))
 
 
 def with_worn_valve(verdict: Verdict, period_s: float, limits: CauseLimits) -> Verdict:
@@ -408,7 +427,7 @@ def is_worn_beside(found: BesideLine, m: Measured, limits: CauseLimits) -> bool:
     return found.evidence >= limits.beside_evidence and steady and crossed and right_way
 
 
-def told_slip_by_slip(verdict: Verdict, period_s: float, limits: CauseLimits) -> Verdict:
+def refine_stick_slip(verdict: Verdict, period_s: float, limits: CauseLimits) -> Verdict:
     """The verdict on a loop that cycles, its valve's fault named anew where slips that scatter explain PV better.
 
     The cause stays: what is asked is how the valve fails that PV and OP convict already. Where its stem is told slip

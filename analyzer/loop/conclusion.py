@@ -14,7 +14,7 @@ from analyzer.loop.advice import Advice
 from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
 from analyzer.loop.cost import RECORDED, STATED, loss
-from analyzer.loop.decisions import Action, Cause, Cell, Fault, Finding, Needs, Remedy, Status, Swing
+from analyzer.loop.decisions import Action, Cause, Cell, Fault, Finding, Remedy, Requirement, Status, Swing
 from analyzer.loop.identified import gain_room, intervals, is_known
 from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillations
@@ -42,11 +42,11 @@ def stated(spec: LoopSpec) -> Known:
 
 
 @dataclass(frozen=True, slots=True)
-class Lost:
+class FailedLoop:
     """Why a loop has no results: its status, and what the record lacks or the error that ended it."""
 
     status: Status
-    why: Needs
+    why: Requirement
 
     def of(self, spec: LoopSpec, night: str, **known: Cell) -> Finding:
         """The same as a finding, with further columns that are known all the same."""

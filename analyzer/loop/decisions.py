@@ -103,7 +103,7 @@ class Due(StrEnum):
     SHUTDOWN = "next shutdown"
 
 
-class Lack(StrEnum):
+class MissingData(StrEnum):
     """What a record lacks for an answer."""
 
     PV = "PV"
@@ -125,7 +125,7 @@ class Lack(StrEnum):
     NEIGHBOUR = "a night after another loop is mended"
 
 
-class Need(StrEnum):
+class RequirementKind(StrEnum):
     """What is needed for an answer, each of them a sentence of words/texts.toml."""
 
     PV_TAG = auto()
@@ -160,11 +160,11 @@ class Need(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Needs:
+class Requirement:
     """What a record lacks, None where it is an error that ended the loop; what it needs, and the figures of that."""
 
-    lack: Lack | None
-    need: Need
+    lack: MissingData | None
+    need: RequirementKind
     figures: Figures = ()
 
     def __str__(self) -> str:
@@ -175,11 +175,11 @@ class Needs:
 class LacksError(NotAssessedError):
     """A question cannot be answered from a record, and it is known what the record lacks."""
 
-    def __init__(self, needs: Needs) -> None:
+    def __init__(self, needs: Requirement) -> None:
         self.needs = needs
         super().__init__(str(needs))
 
-    def __reduce__(self) -> tuple[type[LacksError], tuple[Needs]]:
+    def __reduce__(self) -> tuple[type[LacksError], tuple[Requirement]]:
         """How it travels between processes: by what it was made of."""
         return type(self), (self.needs,)
 
@@ -260,8 +260,8 @@ class Finding:
     loop: str
     night: str
     status: Status
-    lacking: Needs | None = None
-    lack: Lack | None = None
+    lacking: Requirement | None = None
+    lack: MissingData | None = None
     swing: Swing | None = None
     cause: Cause | None = None
     fault: Fault | None = None

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from analyzer.loop.action import OPEN
 from analyzer.loop.conclusion import stated
-from analyzer.loop.decisions import Action, Cause, Cell, Fault, Finding, Needs, Remedy, Status
+from analyzer.loop.decisions import Action, Cause, Cell, Fault, Finding, Remedy, Requirement, Status
 from analyzer.loop.experiments import Learned, as_rows, chosen, model_row, with_constants
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
@@ -47,7 +47,12 @@ def _witnessed(of: Learned, witness: Cell) -> dict[str, Cell]:
 
 
 def by_experiment(
-    of: Learned, spec: LoopSpec, night: str, lacking: Needs, present: Pid | None, known: Mapping[str, Cell]
+    of: Learned,
+    spec: LoopSpec,
+    night: str,
+    lacking: Requirement,
+    present: Pid | None,
+    known: Mapping[str, Cell],
 ) -> Finding:
     """A loop whose record tells nothing but its experiment, with what it lacks for the rest."""
     record, notes = of.prepared.record, "; ".join(of.prepared.notes)

@@ -6,7 +6,7 @@ import numpy as np
 
 from analyzer.config import Config, QualityLimits
 from analyzer.loop.assessments import at_limits_share
-from analyzer.loop.decisions import Lack, Need, Needs
+from analyzer.loop.decisions import MissingData, Requirement, RequirementKind
 from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared, op_range
 from identification.controller.switching import switching
@@ -16,62 +16,72 @@ from identification.models import Pid
 from identification.record import LoopRecord
 
 
-def unfit_for_cause(prepared: Prepared, oscillation: Oscillation | None, config: Config) -> Needs | None:
+def unfit_for_cause(
+    prepared: Prepared, oscillation: Oscillation | None, config: Config
+) -> Requirement | None:
     """What these trends lack for a cause; None where one can be told.
 
     oscillation : None where the loop does not oscillate, or it is not known whether it does.
     """
     record, q = prepared.record, config.quality
     if not prepared.op_known:
-        return Needs(Lack.OP, Need.OP)
+        return Requirement(MissingData.OP, RequirementKind.OP)
     if float(np.ptp(record.op)) == 0.0:
-        return Needs(Lack.MOVING_OP, Need.MOVING_OP)
+        return Requirement(MissingData.MOVING_OP, RequirementKind.MOVING_OP)
     two = switching(record.op, record.usable)
     if two is not None:
-        return Needs(Lack.SWITCHES, Need.SWITCHES, (two.low, two.high, two.switches))
+        return Requirement(MissingData.SWITCHES, RequirementKind.SWITCHES, (two.low, two.high, two.switches))
     jumps = pv_that_jumps(record, config.explain.recorder)
     return jumps or compressed(prepared, oscillation, q) or at_limits(record, q)
 
 
-def pv_that_jumps(record: LoopRecord, limits: RecorderLimits) -> Needs | None:
+def pv_that_jumps(record: LoopRecord, limits: RecorderLimits) -> Requirement | None:
     """What a PV lacks that stands and then jumps, as behind a valve that sticks, though it is the sensor that does;
     None of any other."""
     measured = record.pv[~record.bad]
     jump, stands = least_jump(measured, limits), float(np.mean(np.diff(measured) == 0.0))
-    return Needs(Lack.FINER, Need.PV_AS_MEASURED, (100.0 * stands, jump)) if jump > 0.0 else None
+    return (
+        Requirement(MissingData.FINER, RequirementKind.PV_AS_MEASURED, (100.0 * stands, jump))
+        if jump > 0.0
+        else None
+    )
 
 
-def compressed(prepared: Prepared, oscillation: Oscillation | None, q: QualityLimits) -> Needs | None:
+def compressed(prepared: Prepared, oscillation: Oscillation | None, q: QualityLimits) -> Requirement | None:
     """What trends lack that a historian compressed; None where it did not, or kept enough of each cycle."""
     if prepared.compressed_share <= q.straight_share:
         return None
     straight_pct = 100 * prepared.compressed_share
     if oscillation is None:
-        return Needs(Lack.UNCOMPRESSED, Need.UNCOMPRESSED, (straight_pct,))
+        return Requirement(MissingData.UNCOMPRESSED, RequirementKind.UNCOMPRESSED, (straight_pct,))
     points = prepared.archived_share * oscillation.period_s / prepared.record.dt_s
     if points >= q.archived_points:
         return None
-    return Needs(Lack.UNCOMPRESSED, Need.ARCHIVED, (q.archived_points, points, straight_pct))
+    return Requirement(
+        MissingData.UNCOMPRESSED, RequirementKind.ARCHIVED, (q.archived_points, points, straight_pct)
+    )
 
 
-def at_limits(record: LoopRecord, q: QualityLimits) -> Needs | None:
+def at_limits(record: LoopRecord, q: QualityLimits) -> Requirement | None:
     """What a record lacks whose OP is at a limit for most of the time; None where it is not."""
     saturated = at_limits_share(record)
     if saturated <= q.saturated_share:
         return None
-    return Needs(Lack.OP_OFF_LIMITS, Need.OFF_LIMITS, (100 * saturated,))
+    return Requirement(MissingData.OP_OFF_LIMITS, RequirementKind.OFF_LIMITS, (100 * saturated,))
 
 
-def unfit_for_settings(prepared: Prepared, config: Config) -> Needs | None:
+def unfit_for_settings(prepared: Prepared, config: Config) -> Requirement | None:
     """What these trends lack for new settings; None where nothing that they show by themselves."""
     if not prepared.op_scaled:
         return op_range(prepared.scale, prepared.record.op)
     return compressed(prepared, None, config.quality)
 
 
-def too_thin(dt_s: float, controller: Pid | None, config: Config) -> Needs | None:
+def too_thin(dt_s: float, controller: Pid | None, config: Config) -> Requirement | None:
     """What sampling new settings take, where the controller acts several times between two samples, unseen."""
     samples = config.settings.ti_samples
     if controller is None or dt_s <= controller.ti_s / samples:
         return None
-    return Needs(Lack.FASTER, Need.OF_SETTINGS, (controller.ti_s / samples, controller.ti_s, dt_s))
+    return Requirement(
+        MissingData.FASTER, RequirementKind.OF_SETTINGS, (controller.ti_s / samples, controller.ti_s, dt_s)
+    )

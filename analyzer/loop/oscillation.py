@@ -4,7 +4,7 @@ A peak of the spectrum counts where it carries a fair share of the error, stands
 half-cycles, none larger than the usual one, come back, by more than noise shows in so many cycles: see _in_shape.
 What the set point explains is taken out first, so set point steps and a cascade's moving set point are not
 oscillation of the loop, nor is what dies away where the set point rests, as a programme's corners do. A cycle a
-little short of that counts where PV convicts the valve of making it: see `assess.convicted`.
+little short of that counts where PV convicts the valve of making it: see `assess.with_valve_oscillation`.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ def peaks(b: Bands, least: float) -> list[int]:
     return sorted(ks, key=lambda k: -float(b.power[k] * b.line[k]))[: 2 * LOOP.reported]
 
 
-def barely_seen(found: Oscillations, limits: OscillationLimits) -> float | None:
+def subthreshold_period(found: Oscillations, limits: OscillationLimits) -> float | None:
     """Period [s] of a cycle that stands out of the spectrum with too few samples to be judged, or None."""
     s, b = found.spectrum, found.bands
     if s is None or b is None:

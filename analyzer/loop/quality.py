@@ -15,7 +15,7 @@ import numpy as np
 from analyzer.config import QualityLimits
 from analyzer.history.series import Series
 from analyzer.limits import LOOP
-from analyzer.loop.decisions import Lack, LacksError, Need, Needs
+from analyzer.loop.decisions import LacksError, MissingData, Requirement, RequirementKind
 from analyzer.loop.sample_clock import (
     archived_share,
     clock_of,
@@ -98,16 +98,16 @@ def scale_of(spec: LoopSpec, pv: Floats) -> Scale:
 def _trimmed(pv: Series | None, spec: LoopSpec, limits: QualityLimits) -> tuple[Series, float]:
     """PV between its first and last good sample, and the interval of its samples [s]."""
     if pv is None:
-        raise LacksError(Needs(Lack.PV, Need.PV_TAG, (spec.pv or f"{spec.loop}.PV",)))
+        raise LacksError(Requirement(MissingData.PV, RequirementKind.PV_TAG, (spec.pv or f"{spec.loop}.PV",)))
     good = int((~pv.bad).sum())
     if good == 0:
-        raise LacksError(Needs(Lack.SAMPLES, Need.GOOD_PV))
+        raise LacksError(Requirement(MissingData.SAMPLES, RequirementKind.GOOD_PV))
     if good < limits.samples:
-        raise LacksError(Needs(Lack.SAMPLES, Need.MORE_PV, (limits.samples, good)))
+        raise LacksError(Requirement(MissingData.SAMPLES, RequirementKind.MORE_PV, (limits.samples, good)))
     trimmed = without_stray_ends(pv)
     dt = interval(trimmed.stamp_s)
     if not dt > 0:
-        raise LacksError(Needs(Lack.SAMPLES, Need.STAMPS))
+        raise LacksError(Requirement(MissingData.SAMPLES, RequirementKind.STAMPS))
     return trimmed, dt
 
 
@@ -175,7 +175,9 @@ def _numeric(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits
         if found is None:
             continue
         if found.unread > limits.unread_share * max(found.value.size, 1):
-            raise LacksError(Needs(Lack.READABLE, Need.NUMBERS, (found.unread, tag, found.example)))
+            raise LacksError(
+                Requirement(MissingData.READABLE, RequirementKind.NUMBERS, (found.unread, tag, found.example))
+            )
         out[tag] = replace(found, bad=found.bad | ~np.isfinite(found.value), text=None)
     return out
 
@@ -284,10 +286,14 @@ def _mode_mask(mode: Series, clock: Floats) -> Mask | None:
     return (mode.value == 0)[at] & ~mode.bad[at]
 
 
-def op_range(scale: Scale, op: Floats) -> Needs:
+def op_range(scale: Scale, op: Floats) -> Requirement:
     """What to state where OP [% of the range assumed] cannot be percent of that range."""
     low, high = (scale.op_low + 0.01 * scale.op_span * float(x) for x in (op.min(), op.max()))
-    return Needs(Lack.OP_RANGE, Need.OP_RANGE, (low, high, scale.op_low, scale.op_low + scale.op_span))
+    return Requirement(
+        MissingData.OP_RANGE,
+        RequirementKind.OP_RANGE,
+        (low, high, scale.op_low, scale.op_low + scale.op_span),
+    )
 
 
 def _described(

@@ -10,7 +10,7 @@ from numba import njit
 from analyzer.config import QualityLimits
 from analyzer.history.series import Series, main_span
 from analyzer.limits import LOOP
-from analyzer.loop.decisions import Lack, LacksError, Need, Needs
+from analyzer.loop.decisions import LacksError, MissingData, Requirement, RequirementKind
 from identification.record import Floats, Mask
 
 
@@ -147,7 +147,9 @@ def clock_of(pv: Series, dt_s: float, limits: QualityLimits) -> Floats:
     if count > limits.ticks_per_sample * pv.stamp_s.size:
         share = 100 * pv.stamp_s.size / count
         days = (pv.stamp_s[-1] - pv.stamp_s[0]) / 86400
-        raise LacksError(Needs(Lack.SAMPLES, Need.IN_A_ROW, (pv.stamp_s.size, dt_s, days, share)))
+        raise LacksError(
+            Requirement(MissingData.SAMPLES, RequirementKind.IN_A_ROW, (pv.stamp_s.size, dt_s, days, share))
+        )
     return pv.stamp_s[0] + dt_s * np.arange(count)
 
 

@@ -13,7 +13,7 @@ from analyzer.limits import EXPLAIN
 from analyzer.loop.action import AGAINST
 from analyzer.loop.advice import Advice, propose, sought_for, withheld
 from analyzer.loop.assess import Assessment, assess
-from analyzer.loop.decisions import Action, Cause, Need, Needs, Status
+from analyzer.loop.decisions import Action, Cause, Requirement, RequirementKind, Status
 from analyzer.loop.experiments import Learned, learned
 from analyzer.loop.fitness import at_limits, unfit_for_cause
 from analyzer.loop.identified import intervals, load_of, tuned
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 MAP_POINTS = 36
 """Points of the map along each axis."""
-NO_MOVES = Needs(None, Need.MOVING_PV)
+NO_MOVES = Requirement(None, RequirementKind.MOVING_PV)
 SPREAD = 20.0
 """The map reaches this factor below and above the present settings."""
 FORECAST = ("average_absolute_error", "stem_travel", "oscillation", "variability")

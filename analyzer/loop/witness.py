@@ -36,13 +36,15 @@ def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, config: Conf
         return None
     if not oscillates and not agrees(m, limits):
         m = replace(m, evidence=min(m.evidence, 0.0))
-    convicted = oscillates and verdict.cause is Cause.VALVE
+    with_valve_oscillation = oscillates and verdict.cause is Cause.VALVE
     # one friction for all slips hides their jumps
     slips = None if verdict.for_settings is verdict else verdict.measured
     whole = prepared.compressed_share <= config.lanes.straight_share
     jump = jump_evidence(slips or m, limits) if whole else (0.0, 0.0)
     said = {
-        "profile": [round(float(x), 1) for x in _profile(m, 0.0 if convicted else limits.noise_widths)],
+        "profile": [
+            round(float(x), 1) for x in _profile(m, 0.0 if with_valve_oscillation else limits.noise_widths)
+        ],
         "needed": round(needed(m, limits, oscillates), 1),
         "op_range": float(f"{m.play.valve.stickband / m.size:.4g}") if m.size > 0 else 0.0,
         "jump": [round(x, 1) for x in jump],

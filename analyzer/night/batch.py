@@ -30,7 +30,7 @@ from analyzer.night import chunk
 from analyzer.night.chunk import Done, Task
 from analyzer.night.finish import TELLS_EMPTY, finish_night, is_empty
 from analyzer.night.nights import Night, Plant, nights_of
-from analyzer.night.workers import Died, Executor, executor
+from analyzer.night.workers import Executor, WorkerDeath, executor
 from analyzer.places import afresh, is_passing, not_now
 from analyzer.store.draft import drafted
 from analyzer.store.lock import locked
@@ -90,10 +90,10 @@ def _results(
         for task in tasks:
             workers.submit(task)
         for result in workers.results():
-            yield from _mourned(workers, result) if isinstance(result, Died) else (result,)
+            yield from _retry_or_give_up(workers, result) if isinstance(result, WorkerDeath) else (result,)
 
 
-def _mourned(workers: Executor[Task, Done], died: Died[Task]) -> Iterator[Done]:
+def _retry_or_give_up(workers: Executor[Task, Done], died: WorkerDeath[Task]) -> Iterator[Done]:
     """The loop that was in hand is tried once alone, then given up with the reason; others go to other workers. Where
     it is not known which it was, each is tried by itself."""
     task, at = died.task, died.at

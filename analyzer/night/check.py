@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from analyzer.config import Config
 from analyzer.history.plant_clock import stamp
 from analyzer.loop.assess import hidden, unassessable
-from analyzer.loop.decisions import Needs
+from analyzer.loop.decisions import Requirement
 from analyzer.loop.experiments import Learned, found_in
 from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
 from analyzer.loop.judged_stretch import controller_of, differing
@@ -33,7 +33,7 @@ def _tags(spec: LoopSpec) -> str:
     return ", ".join(f"{role.upper()} {tag}" for role, tag in found if tag)
 
 
-def _fit_for(lacking: Needs | None, spec: LoopSpec, prepared: Prepared, config: Config) -> str:
+def _fit_for(lacking: Requirement | None, spec: LoopSpec, prepared: Prepared, config: Config) -> str:
     """Which questions the record is fit for, in words, as a run judges it."""
     if lacking is not None:
         return f"fit for nothing: {lacking}"

@@ -21,8 +21,16 @@ from analyzer.history.series import Series
 from analyzer.lanes.standing import standing
 from analyzer.loop.advice import Advice, advise, advise_if_sluggish, on_recorded, with_controller_told
 from analyzer.loop.assess import Assessment, assess
-from analyzer.loop.conclusion import Lost, concluded
-from analyzer.loop.decisions import Cell, Finding, Lack, LacksError, Need, Needs, Status
+from analyzer.loop.conclusion import FailedLoop, concluded
+from analyzer.loop.decisions import (
+    Cell,
+    Finding,
+    LacksError,
+    MissingData,
+    Requirement,
+    RequirementKind,
+    Status,
+)
 from analyzer.loop.experiments import learned
 from analyzer.loop.experiments_row import by_experiment, with_experiment
 from analyzer.loop.field_indices import field_indices
@@ -210,19 +218,21 @@ def _settings_row(spec: LoopSpec, night: str, advice: Advice) -> list[dict[str, 
     return [{"loop": spec.loop, "night": night, "settings_page": dumps(page)}]
 
 
-def _lost(error: Exception, config: Config) -> Lost:
+def _lost(error: Exception, config: Config) -> FailedLoop:
     """What is left of a loop that an error has ended."""
     if isinstance(error, LacksError):
-        return Lost(Status.NOT_ASSESSED, error.needs)
+        return FailedLoop(Status.NOT_ASSESSED, error.needs)
     told = str(error) if isinstance(error, TriageError) else f"{type(error).__name__}: {error}"
     if isinstance(error, MemoryError):
         told = f"needs more memory than the {config.workers.memory_mb:.0f} MB that one loop may take"
-    return Lost(Status.NOT_ASSESSED if isinstance(error, NotAssessedError) else Status.FAILED, _as_told(told))
+    return FailedLoop(
+        Status.NOT_ASSESSED if isinstance(error, NotAssessedError) else Status.FAILED, _as_told(told)
+    )
 
 
-def _as_told(text: str) -> Needs:
+def _as_told(text: str) -> Requirement:
     """What an error says of itself."""
-    return Needs(None, Need.AS_TOLD, (text,))
+    return Requirement(None, RequirementKind.AS_TOLD, (text,))
 
 
 def _good_h(pv: Series | None) -> float:
@@ -231,11 +241,11 @@ def _good_h(pv: Series | None) -> float:
     return good * interval(pv.stamp_s) / 3600.0 if pv is not None and good > 1 else 0.0
 
 
-def _samples_of(task: Task, spec: LoopSpec) -> dict[str, Series] | Lost:
+def _samples_of(task: Task, spec: LoopSpec) -> dict[str, Series] | FailedLoop:
     """The loop's raw samples, or why there are none."""
     if spec.pv is None:
         wanted = spec.wanted_pv or f"{spec.loop}.PV"
-        return Lost(Status.NOT_ASSESSED, Needs(Lack.PV, Need.PV_TAG, (wanted,)))
+        return FailedLoop(Status.NOT_ASSESSED, Requirement(MissingData.PV, RequirementKind.PV_TAG, (wanted,)))
     try:
         return task.plant.export.read(spec.tags)
     except Exception as error:  # a broken column is that loop's result
@@ -257,7 +267,7 @@ def assessed(task: Task, began: Callable[[int], None] = lambda at: None) -> dict
         began(at)
         series = _samples_of(task, spec)
         for night in task.nights:
-            if isinstance(series, Lost):
+            if isinstance(series, FailedLoop):
                 kept[night.name].nights.append(series.of(spec, night.name, timezone=night.zone))
                 continue
             advising = night is task.nights[-1]
@@ -270,7 +280,7 @@ def assessed(task: Task, began: Callable[[int], None] = lambda at: None) -> dict
 
 def lose(task: Task, reason: str) -> Done:
     """Write the rows of a chunk that no worker could finish."""
-    lost = Lost(Status.FAILED, _as_told(reason))
+    lost = FailedLoop(Status.FAILED, _as_told(reason))
     for night in task.nights:
         loops = [lost.of(spec, night.name, timezone=night.zone) for spec in task.specs]
         _write_pieces(task, night.name, Rows(nights=loops))

@@ -16,7 +16,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, Self
 
 from analyzer.limits import CLUSTER
-from analyzer.night.workers import Died, Executor, R, T
+from analyzer.night.workers import Executor, R, T, WorkerDeath
 from identification.errors import InputError
 
 GO_ON = (
@@ -63,7 +63,7 @@ class Cluster(Executor[T, R]):
             self._tasks[future] = task
             future.add_done_callback(self._coming.put)
 
-    def results(self) -> Iterator[R | Died[T]]:
+    def results(self) -> Iterator[R | WorkerDeath[T]]:
         from distributed import KilledWorker
 
         with self._told():
@@ -73,7 +73,7 @@ class Cluster(Executor[T, R]):
                 try:
                     yield future.result()
                 except KilledWorker:
-                    yield Died(task, None, WHY, again=False)
+                    yield WorkerDeath(task, None, WHY, again=False)
 
     def _next(self) -> Any:
         """The next task that is done. Raises InputError where nobody has worked on any for too long."""

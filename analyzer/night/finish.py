@@ -22,7 +22,7 @@ from analyzer.lanes.lanes import in_lanes
 from analyzer.loop.decisions import Finding, Status
 from analyzer.plantwide import cascade
 from analyzer.plantwide import night as plantwide
-from analyzer.plantwide.cascade import led_anew, linked
+from analyzer.plantwide.cascade import linked, reassign_sources
 from analyzer.plantwide.night import traced_night
 from analyzer.plantwide.structure import links_of, moves_in
 from analyzer.plantwide.wave import waves_in
@@ -92,7 +92,7 @@ def finish_night(
     for name in JOINED:  # trends are most of a night
         before = () if replace else store.parts_if_there(name, night)
         store.write(name, night, _joined_tables(before, held.tables(name), mine))
-    groups = [*other, *led_anew(found, loops)]
+    groups = [*other, *reassign_sources(found, loops)]
     store.write("groups", night, rows_table(groups, GROUPS) if groups else None)
     joined = [*(k for k in order if k in loops), *beside]
     store.write("nights", night, _joined_rows(held, joined, {k: loops[k] for k in mine}, config))

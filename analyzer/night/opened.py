@@ -21,7 +21,7 @@ from analyzer.loops.spec import ROLES, LoopSpec, unknown_columns
 from analyzer.loops.tags import find_loops, match, read_loops
 from analyzer.night.asked import Asked
 from analyzer.night.nights import Plant
-from analyzer.night.workers import Died, Workers
+from analyzer.night.workers import WorkerDeath, Workers
 from analyzer.places import is_remote
 from identification.errors import InputError
 
@@ -105,7 +105,7 @@ def opened_apart(asked: Asked) -> Plant:
     with Workers(1, find_out, _allowed(asked)) as workers:
         workers.submit(asked)
         (found,) = workers.results()
-    if isinstance(found, Died):
+    if isinstance(found, WorkerDeath):
         raise _ended(asked.export[0], found.why)
     return found
 
@@ -146,7 +146,7 @@ class Guarded(Export):
         self._check_known(tags)
         self._worker.submit((None if self._told else self._plain, tuple(tags)))
         (found,) = self._worker.results()
-        if isinstance(found, Died):
+        if isinstance(found, WorkerDeath):
             self._told.clear()
             raise _ended(self.sources[self._homes[tags[0]][0]].path, found.why)
         self._told[:] = [self._plain]

@@ -48,7 +48,7 @@ SERVER_GONE = 255
 
 
 @dataclass(frozen=True, slots=True)
-class Died(Generic[T]):
+class WorkerDeath(Generic[T]):
     """A worker died over a task, or was ended.
 
     task : what it worked on; at : number of the item in hand, None where that is not known; why, in words; again :
@@ -82,7 +82,7 @@ class Executor(Generic[T, R]):
         """Add a task; one that is to run alone waits until nothing else does that it might end."""
         self._waiting.append(task)
 
-    def results(self) -> Iterator[R | Died[T]]:
+    def results(self) -> Iterator[R | WorkerDeath[T]]:
         """What comes back, as it comes, until no task is left; tasks may be added meanwhile.
 
         Whatever the function raises is raised: an error of an item is the function's business.
@@ -128,7 +128,7 @@ class Workers(Executor[T, R]):
     def submit(self, task: T, alone: bool = False) -> None:
         (self._alone if alone else self._waiting).append(task)
 
-    def results(self) -> Iterator[R | Died[T]]:
+    def results(self) -> Iterator[R | WorkerDeath[T]]:
         while self._waiting or self._alone or any(w.busy for w in self._workers):
             self._feed()
             yield from self._gathered()
@@ -153,7 +153,7 @@ class Workers(Executor[T, R]):
         self._workers.append(worker)
         return worker
 
-    def _gathered(self) -> Iterator[R | Died[T]]:
+    def _gathered(self) -> Iterator[R | WorkerDeath[T]]:
         busy = [w for w in self._workers if w.busy]
         ready = set(wait([w.pipe for w in busy], POLL_S))
         for worker in busy:
@@ -164,7 +164,7 @@ class Workers(Executor[T, R]):
                 yield self._buried(worker, f"took longer than {self.limits.wall_s:g} s", again=False)
         self.watch(sum(worker.at for worker in self._workers if worker.busy))
 
-    def _heard(self, worker: _Worker) -> Iterator[R | Died[T]]:
+    def _heard(self, worker: _Worker) -> Iterator[R | WorkerDeath[T]]:
         try:
             kind, said = worker.pipe.recv()
         except (EOFError, OSError):
@@ -180,11 +180,11 @@ class Workers(Executor[T, R]):
             raise said
         yield said
 
-    def _buried(self, worker: _Worker, why: str, again: bool) -> Died[T]:
+    def _buried(self, worker: _Worker, why: str, again: bool) -> WorkerDeath[T]:
         worker.process.join()
         worker.pipe.close()
         self._workers.remove(worker)
-        return Died(worker.task, worker.at, why, again)
+        return WorkerDeath(worker.task, worker.at, why, again)
 
 
 def executor(

@@ -250,7 +250,7 @@ def _outcome_tiles(cases: Sequence[ChangeCase]) -> parts.Tiles:
     return parts.Tiles(((str(len(cases)), "changes looked at", ""), *shown))
 
 
-def _row(change: Change, found: LoopComparison, first: bool) -> tuple[words.Told, ...]:
+def _row(change: Change, found: LoopComparison, first: bool) -> tuple[words.NightDecision, ...]:
     """A figure before and after; the interval is in percent of before, in the figure's unit where that is zero; the
     remark on a loop stands in its first row."""
     d, ends, unit = change.found, change.interval_pct, change.measure.unit
@@ -297,7 +297,7 @@ def _settings_typed(case: ChangeCase) -> str:
     return f"Kp {kp}, Ti {ti} ({row['form'] or 'ideal'} form, Kp in {gain}, Ti in {row['ti_unit'] or 's'})"
 
 
-def _in_short(case: ChangeCase) -> tuple[words.Told, ...]:
+def _in_short(case: ChangeCase) -> tuple[words.NightDecision, ...]:
     """A loop in one row: what was typed in, the four changes, and what to make of them."""
     by_name = {c.measure.name: c for c in case.found.primary}
     kind = words.texts("outcomes")[grade(case.found)]["tone"]

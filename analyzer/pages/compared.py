@@ -14,7 +14,7 @@ from analyzer.limits import PAGES
 from analyzer.loop.settings_side_by_side import SPREAD, Comparison
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated, derivative_as_stated, unit_ratio
-from analyzer.pages.words import Told, number, page_table, signed, texts
+from analyzer.pages.words import NightDecision, number, page_table, signed, texts
 from analyzer.words.units import duration, gain_unit
 from identification.models import Integrator, Pid
 from identification.simulation.closed_loop import scan_step
@@ -130,7 +130,7 @@ def table(c: Comparison, spec: LoopSpec, unit: str) -> parts.Table:
     )
 
 
-def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[Told, ...]:
+def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[NightDecision, ...]:
     scale, now, (kp, ti) = c.pv_span / 100.0, c.tried[0], as_stated(t.controller, spec, c.pv_span)
     found = c.everywhere.get(t.name) if t is not now else None
     worst = "" if found is None else ", ".join(map(_against_now_pct, (found.worst_travel, found.worst_error)))

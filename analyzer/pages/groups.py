@@ -140,7 +140,7 @@ def morning_table(groups: Sequence[GroupView], linked: bool) -> parts.Table:
 def _members_table(g: GroupView, night: ShownNight) -> parts.Table:
     """The members with their lags and gains, the likeliest source first."""
 
-    def own(row: Row) -> dict[str, words.Told]:
+    def own(row: Row) -> dict[str, words.NightDecision]:
         pct, cause = row["source_pct"], g.loops[row["loop"]]["cause"]
         confidence = parts.Cell(f"{pct:.0f}" if pct >= 1 else "under 1", pct)
         return {"source_pct": confidence, "cause": words.cause_cell(cause)}

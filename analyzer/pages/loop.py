@@ -302,7 +302,7 @@ def nights_section(rows: Sequence[Row]) -> parts.Section:
     return parts.Section("Over the nights", parts.there(drawn, table))
 
 
-def _night_cells(row: Row) -> tuple[words.Told, ...]:
+def _night_cells(row: Row) -> tuple[words.NightDecision, ...]:
     """One night's cells; the last says why where the loop was not assessed."""
     lost = {} if row["status"] == Status.OK else {"action": f"{row['status']}: {row['reason']}"}
     return words.cells(row, "history", **lost)

@@ -63,7 +63,7 @@ def worst_table(night: ShownNight) -> Table:
     """The loops to touch, the worst first, followers under the loop that moves them."""
     here, by = {r["loop"] for r in night.worst}, cost_column(night.rows)
 
-    def own(row: words.Row) -> dict[str, words.Told]:
+    def own(row: words.Row) -> dict[str, words.NightDecision]:
         name, trend = night.link(row["loop"]), night.trends.get(row["loop"])
         drawn = None if trend is None else sparkline(trend, close_span(row, trend))
         changed = row["kp_new"] is not None or row["ti_new"] is not None
@@ -88,7 +88,7 @@ def ranking(night: ShownNight) -> Table:
     shown = declared if by in words.keys("ranking") else (*declared[:4], words.heading(by), *declared[4:])
     figures = [c.key for c in shown if c.numeric]
 
-    def own(row: words.Row) -> Mapping[str, words.Told]:
+    def own(row: words.Row) -> Mapping[str, words.NightDecision]:
         return {name: words.marked_cell(row, name) for name in figures} | {
             "cause": words.cause_cell(row["cause"])
         }
@@ -137,7 +137,7 @@ def score(rows: Sequence[words.Row]) -> float | None:
     return 100.0 * sum(w for w, good in weights if good) / total if total > 0 else None
 
 
-def _area(name: str, rows: Sequence[words.Row]) -> tuple[words.Told, ...]:
+def _area(name: str, rows: Sequence[words.Row]) -> tuple[words.NightDecision, ...]:
     assessed = [r for r in rows if r["status"] == Status.OK]
     worst = sorted((r for r in assessed if r["cause"] != Cause.NONE), key=lambda r: -(r[SIGNIFICANCE] or 0.0))
     numbers = [len(rows), len(assessed)]

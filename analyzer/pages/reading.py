@@ -19,7 +19,7 @@ from analyzer.limits import PAGES
 from analyzer.loop.cost import LOSS, cost, cost_column
 from analyzer.loop.decisions import Cause, Status, counts
 from analyzer.pages.rank import worst_first
-from analyzer.pages.words import Told, cells, keys, page_table
+from analyzer.pages.words import NightDecision, cells, keys, page_table
 from analyzer.store import notes
 from analyzer.store.notes import Note, is_hidden, last
 from analyzer.store.store import Store
@@ -208,7 +208,7 @@ class ShownNight:
         self,
         declared: str,
         rows: Iterable[Row],
-        own: Callable[[Row], Mapping[str, Told]] = lambda row: {},
+        own: Callable[[Row], Mapping[str, NightDecision]] = lambda row: {},
         **stated: Any,
     ) -> Table:
         """A table of loops, as tables.toml declares it but for what is `stated`: each row's own cells, a link to the

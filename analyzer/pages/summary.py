@@ -107,7 +107,7 @@ def news_lines(night: ShownNight) -> list[str]:
 def news_table(night: ShownNight, tones: Sequence[str], name: str, title: str) -> Table:
     """Loops of which there is something new, of the colours asked for."""
 
-    def own(row: words.Row) -> dict[str, words.Told]:
+    def own(row: words.Row) -> dict[str, words.NightDecision]:
         before, now = (words.cell(r, SIGNIFICANCE) for r in (night.earlier[row["loop"]][-1], row))
         news = Cell(row["news"], kind=row["news_tone"])
         return {"news": news, "before": before, "now": now, "action": Cell(action_text(row))}
@@ -166,7 +166,7 @@ def summary_page(store: Store, name: str | None = None) -> Page:
 def _worst(night: ShownNight, left: int) -> Table:
     """The worst loops with what to do, and how many are left out; their notes where there are any."""
 
-    def own(row: words.Row) -> dict[str, words.Told]:
+    def own(row: words.Row) -> dict[str, words.NightDecision]:
         return {"loop": Cell(row["loop"], kind="strong"), "do": _do(row), "note": night.note(row["loop"])}
 
     noted = any(night.note(r["loop"]) for r in night.worst)

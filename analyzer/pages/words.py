@@ -19,7 +19,7 @@ from reports.pages import Cell, Column, Facts, Floats, Listing, Table, Text
 
 __all__ = ["Row", "duration", "number", "stamp"]  # of the words that are not chosen here
 
-Told = Cell | str | float | None
+NightDecision = Cell | str | float | None
 """What a table tells in a cell: a text or a number stands for a cell of it alone."""
 ROOM = "analyzer.pages"
 """Where the tables and texts of pages stand."""
@@ -82,7 +82,7 @@ def keys(*tables: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(c.key for table in tables for c in page_columns(table)))
 
 
-def page_table(declared: str, rows: Iterable[Iterable[Told]], **own: Any) -> Table:
+def page_table(declared: str, rows: Iterable[Iterable[NightDecision]], **own: Any) -> Table:
     """A table of a page with its rows: as tables.toml declares it, but for what is its `own`."""
     stated = {
         k: tuple(v) if isinstance(v, list) else v for k, v in toml_of(ROOM, "tables.toml")[declared].items()
@@ -93,7 +93,7 @@ def page_table(declared: str, rows: Iterable[Iterable[Told]], **own: Any) -> Tab
     )
 
 
-def _as_cell(told: Told) -> Cell:
+def _as_cell(told: NightDecision) -> Cell:
     return told if isinstance(told, Cell) else Cell(told) if isinstance(told, str) else plain_cell(told)
 
 
@@ -135,7 +135,7 @@ def cell(row: Row, name: str) -> Cell:
     return Cell(f"{text} stem" if of_stem else text, value)
 
 
-def cells(row: Row, columns: str | Iterable[Column], **own: Told) -> tuple[Told, ...]:
+def cells(row: Row, columns: str | Iterable[Column], **own: NightDecision) -> tuple[NightDecision, ...]:
     """A row of a table by the keys of its columns: what is its `own`, else what the store holds."""
     shown = page_columns(columns) if isinstance(columns, str) else columns
     return tuple(own[c.key] if c.key in own else cell(row, c.key) for c in shown)

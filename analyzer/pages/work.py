@@ -12,7 +12,7 @@ from analyzer.history.plant_clock import stamp
 from analyzer.limits import PAGES
 from analyzer.loop.decisions import Action, Cause, Fault, Status
 from analyzer.pages.reading import ShownNight, by_loop, oscillates, read_nights
-from analyzer.pages.words import ALL_LOOPS, Row, Told, cause_cell, with_noun
+from analyzer.pages.words import ALL_LOOPS, NightDecision, Row, cause_cell, with_noun
 from analyzer.store.notes import FINISHED, Work, work_on
 from analyzer.store.store import Store
 from analyzer.words.belief import wear_text
@@ -52,7 +52,7 @@ def faulty(night: ShownNight) -> Table:
     return night.table("valves", rows, _of_valve)
 
 
-def _of_valve(row: Row) -> dict[str, Told]:
+def _of_valve(row: Row) -> dict[str, NightDecision]:
     """What the store does not hold of a valve, and place for what is found."""
     fault = "" if row["valve_fault"] in (None, Fault.NONE) else row["valve_fault"]
     known = {"width": fault_width(row), "test": valve_test(row), "found": ""}
@@ -141,7 +141,7 @@ def work_page(store: Store, night: ShownNight) -> Page:
     history = by_loop(read_nights(store, names, READ, works))
     parted = {k: sides(history.get(k, ()), stamp(w.since_s, night.zone)[:10]) for k, w in works.items()}
 
-    def own(row: Row) -> dict[str, Told]:
+    def own(row: Row) -> dict[str, NightDecision]:
         """What is told of a piece of work, and what the nights since say of it."""
         work, finished = works[row["loop"]], works[row["loop"]].state in FINISHED
         late = bool(work.due) and work.due < night.name and not finished

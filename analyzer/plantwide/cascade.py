@@ -15,7 +15,7 @@ from analyzer.loop.decisions import (
     Due,
     Finding,
     GroupRole,
-    Lack,
+    MissingData,
     Remedy,
     Root,
     SignKind,
@@ -71,7 +71,7 @@ def _with_halves(own: Finding, halves: Sequence[Finding], limits: PlantLimits) -
     times = max(size) / min(size)
     apart = stronger.loop, weaker.loop, times, 100.0 * times / (1.0 + times)
     text = sentences("settings")["halves_apart"].format(*apart)
-    return replace(own, remedy=Remedy(Action.NEEDS_DATA, text), lack=Lack.NEIGHBOUR)
+    return replace(own, remedy=Remedy(Action.NEEDS_DATA, text), lack=MissingData.NEIGHBOUR)
 
 
 def _send_on(done: dict[str, Finding], led: Sequence[str], above: str, root: Root) -> None:
@@ -87,7 +87,7 @@ def _send_on(done: dict[str, Finding], led: Sequence[str], above: str, root: Roo
     done[root.loop] = replace(done[root.loop], moves=_moves_with(done[root.loop], *sent))
 
 
-def led_anew(rows: Sequence[Mapping[str, Any]], loops: Mapping[str, Finding]) -> list[dict[str, Any]]:
+def reassign_sources(rows: Sequence[Mapping[str, Any]], loops: Mapping[str, Finding]) -> list[dict[str, Any]]:
     """The rows of groups, those led by a master that follows its slave led by that slave.
 
     A loop that leads one group and follows another loop's in a second one leads as before.
@@ -134,7 +134,7 @@ def _judged_together(
             return following(above, root, above.swing, seen, limits), moved
         if above.remedy.action in ACTING:
             remedy = Remedy(Action.NEEDS_DATA, below_first(below, tie))
-            return replace(above, remedy=remedy, lack=Lack.NEIGHBOUR), below
+            return replace(above, remedy=remedy, lack=MissingData.NEIGHBOUR), below
         return above, below
     if not faulty and below.oscillates and above.oscillates and _alike(above, below, limits):
         root = Root(above.loop, level, None, max(above.confidence.values(), default=0.0))

@@ -20,11 +20,11 @@ from analyzer.loop.decisions import (
     Due,
     Fault,
     Finding,
-    Lack,
     Lane,
-    Need,
-    Needs,
+    MissingData,
     Remedy,
+    Requirement,
+    RequirementKind,
     Sign,
     SignKind,
     Status,
@@ -93,7 +93,7 @@ def finding_of(row: Row) -> Finding:
         row["night"],
         Status(row["status"]),
         _needs(*json.loads(row["reason"])) if row["reason"] else None,
-        _or_none(Lack, row["lack"]),
+        _or_none(MissingData, row["lack"]),
         swing,
         _or_none(Cause, row["cause"]),
         _or_none(Fault, row["valve_fault"]),
@@ -106,8 +106,8 @@ def finding_of(row: Row) -> Finding:
     )
 
 
-def _needs(lack: str | None, need: str, figures: list[Cell]) -> Needs:
-    return Needs(_or_none(Lack, lack), Need(need), tuple(figures))
+def _needs(lack: str | None, need: str, figures: list[Cell]) -> Requirement:
+    return Requirement(_or_none(MissingData, lack), RequirementKind(need), tuple(figures))
 
 
 def _sign_of(points_to: str, strength: float, kind: str, figures: list[Cell]) -> Sign:

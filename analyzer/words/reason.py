@@ -13,7 +13,18 @@ from typing import Any
 
 from analyzer.lanes.lanes import SAID
 from analyzer.limits import PAGES
-from analyzer.loop.decisions import OF_LOAD, Action, Cause, Due, Finding, Lack, Lane, Sign, SignKind, Status
+from analyzer.loop.decisions import (
+    OF_LOAD,
+    Action,
+    Cause,
+    Due,
+    Finding,
+    Lane,
+    MissingData,
+    Sign,
+    SignKind,
+    Status,
+)
 from analyzer.words import sentences
 from analyzer.words.units import duration
 
@@ -24,7 +35,7 @@ MOST_AMPLIFIED = 10.0
 load had bent."""
 SAID_AT_ONCE = (Action.CHECK_SETTINGS, Action.NEEDS_DATA)
 """Actions whose words belong into the list."""
-Told = tuple[str, str]
+NightDecision = tuple[str, str]
 """Words for everybody, and figures for an expert, '' where the words hold them."""
 Chosen = tuple[Any, ...]
 """A sentence of texts.toml by its name, and the figures that it is filled with."""
@@ -40,7 +51,9 @@ def in_short(text: str) -> tuple[str, str]:
 
 def reason(found: Finding) -> str:
     """What was found and why, what the lanes add, and since when it is told."""
-    known = {Lane.MANUAL} if found.lack is Lack.AUTOMATIC else set()  # what it lacks has said so already
+    known = (
+        {Lane.MANUAL} if found.lack is MissingData.AUTOMATIC else set()
+    )  # what it lacks has said so already
     said = [SAID[lane](found) for lane in found.lanes if lane in SAID and lane not in known]
     text = joined(_whole(found), *said)
     changed = found.text("settings_changed")
@@ -69,7 +82,7 @@ def _whole(found: Finding) -> str:
         return f"not assessed: {found.remedy.text or lacking}"
     names = ", ".join(found.moves[:MOST_NAMES]) + (" ..." if len(found.moves) > MOST_NAMES else "")
     moves = f"it also moves {names}: fix this one first" if names else None
-    at_once = found.remedy.action in SAID_AT_ONCE or found.lack is Lack.OP_RANGE
+    at_once = found.remedy.action in SAID_AT_ONCE or found.lack is MissingData.OP_RANGE
     more = found.remedy.text if at_once and found.remedy.text != lacking else None
     first, *others = _cause(found).split("; ")
     worn = valve_text(found) if found.cause is not Cause.VALVE and found.fault in sentences("width") else None
@@ -137,7 +150,7 @@ def joined(*clauses: str | None) -> str:
     return "; ".join(filter(None, kept))
 
 
-def sign_parts(sign: Sign) -> Told:
+def sign_parts(sign: Sign) -> NightDecision:
     """A sign in words and figures."""
     which, *figures = SAYS[sign.kind](*sign.figures)
     said, shown = sentences("signs")[which], sentences("figures_of_signs").get(which, "")

@@ -69,7 +69,7 @@ def answer(found: Explanation, s: Recording) -> Answer:
     if lacking and (verdict, block) == ("unexplained", "none"):
         note = f"Not told: {lacking}."
     if effects:
-        one_move = words.TOLD["one_move"] if found.unproven else untold_gain(found, effects)
+        one_move = words.TOLD["one_move"] if found.unproven else open_gain_note(found, effects)
         caution = lacking or one_move
     if verdict == "unexplained" and found.outside is not None:
         row, fit = found.outside.row, found.outside.fit
@@ -138,7 +138,7 @@ def too_short(found: Explanation, s: Recording) -> str:
     return "" if length >= enough * lag else words.too_short_told(enough, length, lag)
 
 
-def untold_gain(found: Explanation, effects: tuple[EffectFound, ...]) -> str:
+def open_gain_note(found: Explanation, effects: tuple[EffectFound, ...]) -> str:
     """What an experiment does not tell of a supply whose flow at rest may be anything; empty of any other."""
     at_rest = next((e.parameters[AT_REST.name] for e in effects if AT_REST.name in e.parameters), None)
     open_ended = at_rest is not None and at_rest.low < 0.0 < at_rest.high

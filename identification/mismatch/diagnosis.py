@@ -33,7 +33,7 @@ from identification.mismatch.outside import OUTSIDE, RIVALS, about
 from identification.mismatch.plain_loop import Clip, inputs_of, prepared, without_spikes
 from identification.mismatch.proof import passes
 from identification.mismatch.recording import Recording, SeenInCycles, is_experiment, straightened, unlogged
-from identification.mismatch.reference import Foretold, foretold
+from identification.mismatch.reference import Prediction, best_prediction
 from identification.mismatch.selection import (
     Candidate,
     Progress,
@@ -264,7 +264,7 @@ def without_the_idle(found: Explanation, kept: int) -> Explanation:
     return found
 
 
-def left_over(found: Explanation, candidates: list[Candidate]) -> Foretold:
+def left_over(found: Explanation, candidates: list[Candidate]) -> Prediction:
     """What explains the recording beyond the effects taken and has no name among them; nothing where nothing does.
 
     What a reference without a name foretells of the innovations is left; so is what it foretells of the plain loop's
@@ -272,14 +272,14 @@ def left_over(found: Explanation, candidates: list[Candidate]) -> Foretold:
     through whatever the model lacks, and what time does not bind is not bound to time.
     """
     limits, won = found.p.limits.search, gain(found.best, found.plain)
-    left = foretold(found.p, found.best)
+    left = best_prediction(found.p, found.best)
     if left.gain <= max(limits.left_over, limits.left_share * won):
-        left = Foretold()
+        left = Prediction()
     if found.accepted and all(about(c.name).timed for c in found.accepted):
-        rival = foretold(found.p, found.plain, clock=False)
+        rival = best_prediction(found.p, found.plain, clock=False)
         left = rival if rival.gain > max(limits.rival_share * won, limits.left_over) else left
     if not found.accepted and any(c.row.needs == "steps" and c.penalised > 0 for c in candidates):
-        left = Foretold(left.way, max(left.gain, candidates[0].penalised))
+        left = Prediction(left.way, max(left.gain, candidates[0].penalised))
     if found.outside is not None:
-        left = Foretold(left.way, max(left.gain, found.outside.penalised))
+        left = Prediction(left.way, max(left.gain, found.outside.penalised))
     return left

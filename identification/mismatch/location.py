@@ -66,7 +66,7 @@ def least_turn(op: Floats) -> float:
     return max(LOCATION.turn_share * float(high - low), SIGNALS.outlier * noise, 1e-6)
 
 
-def hats(x: Floats) -> Floats:
+def piecewise_linear_basis(x: Floats) -> Floats:
     """Straight pieces between even quantiles of a signal, shape (n, k), none where it stands still."""
     knots = np.unique(np.quantile(x, np.linspace(0.02, 0.98, LOCATION.pieces + 1)))
     if knots.size < 2:
@@ -111,12 +111,12 @@ def groups(pv: Floats, op: Floats, dt_s: float, late: int, memory: int) -> tuple
     index = dt_s * np.arange(pv.size, dtype=np.float64)
     limit = at_limits(o).astype(float)
     found = [
-        Group("pv_level", hats(before), before),
-        Group("op_level", hats(o), o),
+        Group("pv_level", piecewise_linear_basis(before), before),
+        Group("op_level", piecewise_linear_basis(o), o),
         Group("op_direction", way[:, None], way),
         Group("op_rate", np.stack([rate, rate * way], axis=1), travel, way),
         Group("after_reversals", np.stack([fading, fading * way], axis=1), since_s, way),
-        Group("time_in_record", hats(index), index),
+        Group("time_in_record", piecewise_linear_basis(index), index),
     ]
     if limit.sum() >= LOCATION.limit_samples:
         found.append(Group("at_limits", limit[:, None], limit))

@@ -25,7 +25,7 @@ from identification.simulation.vessel import plain_vessel
 
 
 @dataclass(frozen=True, slots=True)
-class Foretold:
+class Prediction:
     """The way that foretells most, and how much [nat]."""
 
     way: str = ""
@@ -177,18 +177,18 @@ def left_freely(p: Problem, fit: Fitted) -> Floats:
     return e - q[:, kept] @ (q[:, kept].T @ e)  # type: ignore[no-any-return]
 
 
-def foretold(p: Problem, fit: Fitted, clock: bool = True) -> Foretold:
+def best_prediction(p: Problem, fit: Fitted, clock: bool = True) -> Prediction:
     """The way that foretells most of a fit's innovations on data held out, a clock among them or not; what the fit's
     constants and its noise model could take up is no way's."""
     root, rest = np.sqrt(p.weight), unfollowed(p, fit)
     e = rest(fit.e * root)
-    best = Foretold("clock", _gained(fit, e, _by_clock(e, root))) if clock else Foretold()
+    best = Prediction("clock", _gained(fit, e, _by_clock(e, root))) if clock else Prediction()
     for way, signals in ways(p, fit):
         x = rest(np.nan_to_num(np.stack(signals) * root).T)
         size = x.std(axis=0)
         kept = size > 1e-9 * size.max(initial=1e-30)
         won = max(_gained(fit, e, _by_ridge(e, x[:, kept] / size[kept], prior)) for prior in REFERENCE.priors)
-        best = Foretold(way, won) if won > best.gain else best
+        best = Prediction(way, won) if won > best.gain else best
     return best
 
 

@@ -64,9 +64,9 @@ def compete(
     firsts = counted_alike(x, [first for first, _ in begun])
     tried = sorted(zip(firsts, (models for _, models in begun), strict=True), key=lambda t: -t[0].penalised)
     most = x.p.limits.search.followed
-    ended = [outdoing(x, followed(x, first, models, least)) for first, models in tried[:most]]
+    ended = [gain_over_opponent(x, followed(x, first, models, least)) for first, models in tried[:most]]
     sticking = sticking_candidates(x, [first for first, _ in tried], rows, tell)
-    found = [*ended, *sticking, *(outdoing(x, first) for first, _ in tried[most:])]
+    found = [*ended, *sticking, *(gain_over_opponent(x, first) for first, _ in tried[most:])]
     return sorted(counted_alike(x, found), key=lambda c: -c.penalised)
 
 
@@ -148,7 +148,7 @@ def counted_alike(x: Round, found: list[Candidate]) -> list[Candidate]:
     return [c if c.row.opponent is not None else penalised(x, replace(c.fit, count=most)) for c in found]
 
 
-def outdoing(x: Round, first: Candidate) -> Candidate:
+def gain_over_opponent(x: Round, first: Candidate) -> Candidate:
     """A candidate of an experiment that has an opponent, by what it gains over that: the same course of a load that
     is added, which is no effect but the plain loop's own. One that moves PV as much as OP does needs no such proof:
     whether it changes the gain too, the record may not tell."""

@@ -38,7 +38,7 @@ def switched(pv: Floats, at: float, band: float) -> Floats:
     return out
 
 
-def recalled(pv: Floats, change: float, memory_s: float, dt_s: float) -> Floats:
+def gain_change_by_history(pv: Floats, change: float, memory_s: float, dt_s: float) -> Floats:
     """Relative change of gain with where PV has been before each sample, shape (n,).
 
     pv : deviation from where the gain is itself, shape (n,) [% PV]; change : per 10 % of PV [-]; memory_s : time
@@ -148,7 +148,7 @@ def history(inputs: ModelInputs, c: Floats) -> Floats:
     """Relative change of gain with where the recorded PV has been, shape (n,)."""
     if inputs.pv is None or c[Slot.RECALL] == 0:
         return np.zeros(inputs.op.size)
-    return recalled(inputs.pv, float(c[Slot.RECALL]), float(c[Slot.RECALL_T]), inputs.dt_s)
+    return gain_change_by_history(inputs.pv, float(c[Slot.RECALL]), float(c[Slot.RECALL_T]), inputs.dt_s)
 
 
 def through_valve(inputs: ModelInputs, c: Floats) -> Floats:

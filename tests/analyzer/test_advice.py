@@ -14,7 +14,7 @@ from analyzer.loop.advice import advise, propose, sought_for
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.cause import NO_CAUSE, not_assessed
 from analyzer.loop.conclusion import concluded
-from analyzer.loop.decisions import Lack, Need, Needs
+from analyzer.loop.decisions import MissingData, Requirement, RequirementKind
 from analyzer.loop.identified import lag_factor, load_of, scan_noise, tuned, uncertain
 from analyzer.loop.oscillation import Oscillations
 from analyzer.loop.quality import prepare
@@ -167,7 +167,10 @@ def test_load_is_left_alone():
 def test_no_cause_no_settings(pipe):
     """Verdicts without a cause and verdicts that abstain get no settings."""
     row = spec(kp=1.0, ti=10.0)
-    asked = [replace(pipe, verdict=v) for v in (NO_CAUSE, not_assessed(Needs(Lack.OP, Need.OP)))]
+    asked = [
+        replace(pipe, verdict=v)
+        for v in (NO_CAUSE, not_assessed(Requirement(MissingData.OP, RequirementKind.OP)))
+    ]
     assert [advise(a, row, Pid(1, 10), 100.0, CONFIG).action for a in asked] == ["none", "needs data"]
 
 
@@ -256,7 +259,9 @@ def test_unstated_settings_are_asked_for(pipe):
 
 def test_settings_are_not_asked_for_where_they_would_help_nothing(pipe):
     """On a record that bears no settings the reason is the record, stated kp and ti or not."""
-    packed = replace(pipe, for_settings=Needs(Lack.UNCOMPRESSED, Need.UNCOMPRESSED, (90.0,)))
+    packed = replace(
+        pipe, for_settings=Requirement(MissingData.UNCOMPRESSED, RequirementKind.UNCOMPRESSED, (90.0,))
+    )
     reasons = {advise(packed, spec(), pid, 100.0, CONFIG).reason for pid in (None, PIPE.controller)}
     assert reasons == {f"no new settings: {packed.for_settings}"}
 
@@ -286,7 +291,7 @@ def test_play_is_the_model_where_it_cycles_by_itself(tank):
 def test_a_calm_loop_witnesses_no_width_that_its_stretches_do_not_bear_out(pipe):
     """Stick-slip that was tried on a calm loop is not told slip by slip: its width is none where single stretches
     alone speak for it."""
-    m = pipe.verdict.rests_on
+    m = pipe.verdict.require_measured
     tried = replace(m.play, valve=m.play.valve._replace(sliding=0.25 * m.play.valve.stickband))
     single = replace(m, stick_slip=tried, steady=0.0, asked=0.0)
     calm = replace(pipe.verdict, measured=single, steady=None)

@@ -20,7 +20,7 @@ from analyzer.loop.assessments import (
     noise_band,
     travel_of,
 )
-from analyzer.loop.decisions import Lack
+from analyzer.loop.decisions import MissingData
 from analyzer.loop.oscillation import detect
 from analyzer.loop.quality import Prepared, Scale
 from identification.record import LoopRecord
@@ -268,7 +268,7 @@ def test_what_cannot_be_assessed_says_what_it_needs_and_has():
     r = replace(record(50 + noise(12)), masks={"manual": T < 0.8 * N})
     found = unassessable(r, CONFIG)
     assert found is not None
-    assert found.lack is Lack.AUTOMATIC
+    assert found.lack is MissingData.AUTOMATIC
     assert str(found).startswith("needs 30 % good samples in automatic, has 20 % (manual 80 %")
 
 

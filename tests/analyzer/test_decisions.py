@@ -16,11 +16,11 @@ from analyzer.loop.decisions import (
     Cause,
     Fault,
     Finding,
-    Lack,
     LacksError,
-    Need,
-    Needs,
+    MissingData,
     Remedy,
+    Requirement,
+    RequirementKind,
     Root,
     SignKind,
     Status,
@@ -72,8 +72,10 @@ def test_a_follower_is_under_load_whatever_its_own_signs(own):
 
 def test_what_a_record_lacks_travels_between_processes():
     """An error that says what a record lacks is the same behind a pipe, text and kind."""
-    error = pickle.loads(pickle.dumps(LacksError(Needs(Lack.SAMPLES, Need.SAMPLES, (200, 12)))))
-    assert (error.needs.lack, str(error)) == (Lack.SAMPLES, "needs 200 samples, has 12")
+    error = pickle.loads(
+        pickle.dumps(LacksError(Requirement(MissingData.SAMPLES, RequirementKind.SAMPLES, (200, 12))))
+    )
+    assert (error.needs.lack, str(error)) == (MissingData.SAMPLES, "needs 200 samples, has 12")
 
 
 def row_without(n: int, *roles: str) -> dict[str, object]:
@@ -93,8 +95,8 @@ def row_without(n: int, *roles: str) -> dict[str, object]:
 def test_the_store_says_what_a_loop_lacks():
     """Too few samples, and a cycling loop without OP, are told apart in the column `lack`, beside the sentence."""
     short, blind = row_without(50), row_without(7200, "op", "sp")
-    assert (short["status"], short["lack"]) == (Status.NOT_ASSESSED, Lack.SAMPLES)
-    assert (blind["status"], blind["lack"]) == (Status.OK, Lack.OP)
+    assert (short["status"], short["lack"]) == (Status.NOT_ASSESSED, MissingData.SAMPLES)
+    assert (blind["status"], blind["lack"]) == (Status.OK, MissingData.OP)
     assert "needs OP" in str(blind["reason"])
 
 

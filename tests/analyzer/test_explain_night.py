@@ -24,7 +24,7 @@ from analyzer.explain.night import (
 )
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.nights import Night, Plant
-from analyzer.night.workers import Died
+from analyzer.night.workers import WorkerDeath
 from analyzer.pages import night as night_pages
 from analyzer.store.store import Store
 from identification.errors import NotAssessedError
@@ -70,10 +70,10 @@ class DyingWorkers:
     def submit(self, task: Question, alone: bool = False) -> None:
         self.tasks.append(task)
 
-    def results(self) -> Iterator[dict[str, Any] | Died[Question]]:
+    def results(self) -> Iterator[dict[str, Any] | WorkerDeath[Question]]:
         for at, task in enumerate(self.tasks):
             yield (
-                Died(task, 0, "its worker process was ended by SIGKILL", True)
+                WorkerDeath(task, 0, "its worker process was ended by SIGKILL", True)
                 if at % 2
                 else self.function(task)
             )

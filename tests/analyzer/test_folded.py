@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analyzer.loop.decisions import Lack
+from analyzer.loop.decisions import MissingData
 from analyzer.night import chunk
 from analyzer.night.nights import Night
 from analyzer.store import rows
@@ -31,4 +31,4 @@ def test_a_folded_cycle_has_no_figures_and_no_picture(ti_s: float, told: bool) -
     row = night_row(ti_s)
     figures = ("period_s", "oscillating_pct", "close_first_s", "close_last_s", "turns")
     assert [row[name] is not None for name in figures] == [told] * len(figures)
-    assert (row["lack"] == Lack.FASTER) is not told
+    assert (row["lack"] == MissingData.FASTER) is not told

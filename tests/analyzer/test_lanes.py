@@ -9,7 +9,7 @@ import pytest
 
 from analyzer.lanes.lanes import FIGURE, in_lanes
 from analyzer.loop.action import decided
-from analyzer.loop.decisions import Action, Finding, Lane, Need, Needs, Remedy, Status
+from analyzer.loop.decisions import Action, Finding, Lane, Remedy, Requirement, RequirementKind, Status
 from analyzer.loops.spec import LoopSpec
 from analyzer.night import chunk
 from analyzer.night.nights import Night
@@ -189,7 +189,9 @@ def test_without_importance_oscillation_comes_first() -> None:
 
 def test_a_failed_loop_asks_for_nothing() -> None:
     """What failed has no action; its reason stands."""
-    failed = Finding("L", "2026-03-02", Status.FAILED, Needs(None, Need.AS_TOLD, ("ValueError: x",)))
+    failed = Finding(
+        "L", "2026-03-02", Status.FAILED, Requirement(None, RequirementKind.AS_TOLD, ("ValueError: x",))
+    )
     done = night_row(in_lanes(failed, CONFIG.lanes))
     assert (done["action"], done["reason"], done["lanes"]) == (None, "ValueError: x", None)
 

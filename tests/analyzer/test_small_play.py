@@ -78,5 +78,5 @@ def test_a_play_wider_than_op_of_a_calm_loop_is_none() -> None:
     """A sound P-only level whose set point kicks OP is blamed for no play that is wider than OP's usual range."""
     record = api.read(LEVEL / "export.parquet", loops=LEVEL / "loops.csv").loop("TIC25")
     found = api.assess(record).verdict
-    assert found.rests_on.size > 1.0
+    assert found.require_measured.size > 1.0
     assert (found.cause, found.fault) == ("none", "none")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analyzer.loop.assess import assess
-from analyzer.loop.decisions import Lack
+from analyzer.loop.decisions import MissingData
 from analyzer.loop.fitness import pv_that_jumps
 from proofs.plant import CONFIG, Sketch, Trends, prepared
 
@@ -39,7 +39,7 @@ def test_its_valve_is_not_blamed(grip: float) -> None:
     found = assess(prepared(trends), HEALTHY.controller, CONFIG)
     assert found.verdict.cause in ("undecided", "none")
     assert found.verdict.needs is not None
-    assert found.verdict.needs.lack is Lack.FINER
+    assert found.verdict.needs.lack is MissingData.FINER
     assert "stands" in str(found.verdict.needs)
 
 

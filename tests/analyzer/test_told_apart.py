@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from analyzer.loop.assess import assess
-from analyzer.loop.cause import told_apart
-from analyzer.loop.decisions import Cause, Lack
+from analyzer.loop.cause import resolve_ambiguity
+from analyzer.loop.decisions import Cause, MissingData
 from analyzer.loop.oscillation import counting
 from identification.models import Fopdt, Loop
 from proofs.plant import CONFIG, Sketch, prepared, simulate
@@ -30,9 +30,9 @@ def test_a_load_is_told_where_it_is_likely(loaded, pct, cause):
     made, found = loaded
     assert found.verdict.cause == "load"
     verdict = replace(found.verdict, confidence={**found.verdict.confidence, Cause.LOAD: pct})
-    told = told_apart(verdict, made, counting(found.oscillations), CONFIG)
+    told = resolve_ambiguity(verdict, made, counting(found.oscillations), CONFIG)
     assert told.cause == cause
-    assert (told.needs is not None and told.needs.lack is Lack.MANUAL_TEST) == (cause == "undecided")
+    assert (told.needs is not None and told.needs.lack is MissingData.MANUAL_TEST) == (cause == "undecided")
     assert told.needs is None or f"by {pct:.0f} % alone" in str(told.needs)
 
 
@@ -44,8 +44,8 @@ def test_no_tuning_is_told_against_its_own_sensitivity(loaded):
     true = replace(found.verdict.measured.linear, gain=gain, time_constant_s=lag, dead_time_s=late)
     measured = replace(found.verdict.measured, linear=true)
     accused = replace(found.verdict, cause=Cause.TUNING, measured=measured)
-    told = told_apart(accused, made, counting(found.oscillations), CONFIG)
-    assert (told.cause, told.needs.lack) == ("undecided", Lack.MANUAL_TEST)
+    told = resolve_ambiguity(accused, made, counting(found.oscillations), CONFIG)
+    assert (told.cause, told.needs.lack) == ("undecided", MissingData.MANUAL_TEST)
     assert "robust (Ms 1." in str(told.needs)
     m = replace(accused.measured, controller=replace(accused.measured.controller, kp=8 * SINE.kp))
     assert (
@@ -53,5 +53,5 @@ def test_no_tuning_is_told_against_its_own_sensitivity(loaded):
         < 2.0
         < maximum_sensitivity(Loop(Fopdt(*SINE.process), m.controller))
     )
-    tight = told_apart(replace(accused, measured=m), made, counting(found.oscillations), CONFIG)
+    tight = resolve_ambiguity(replace(accused, measured=m), made, counting(found.oscillations), CONFIG)
     assert tight.cause == "tuning"

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from analyzer.loop.assess import cause_of, convicted
+from analyzer.loop.assess import cause_of, with_valve_oscillation
 from analyzer.loop.measure import measure
 from analyzer.loop.oscillation import counting, detect
 from analyzer.loop.quality import prepare
@@ -105,7 +105,7 @@ def test_a_cycle_short_of_regular_counts_where_its_valve_is_convicted(seed):
     ready, stated = recorded(drawn, config)
     seen = detect(ready.record, config.oscillation)
     assert counting(seen) is None
-    found, said = convicted(ready, seen, stated, config, drawn.kind)
+    found, said = with_valve_oscillation(ready, seen, stated, config, drawn.kind)
     assert counting(found) is not None
     assert said.cause == NAMED[drawn.truth["cause"]] == "valve"
 
@@ -141,7 +141,7 @@ def test_a_healthy_loop_s_near_cycle_counts_for_nothing():
         ready, stated = recorded(drawn, eager)
         seen = detect(ready.record, eager.oscillation)
         looked += counting(detect(ready.record, eager.oscillation.nearly())) is not None
-        found, _ = convicted(ready, seen, stated, eager, drawn.kind)
+        found, _ = with_valve_oscillation(ready, seen, stated, eager, drawn.kind)
         assert counting(found) is None
     assert looked > 0
 
@@ -151,7 +151,9 @@ def test_no_valve_is_blamed_for_a_coarse_grid_in_a_calm_loop(seed):
     """In calm healthy loops whose PV covers one to five steps of its grid, no valve is told."""
     drawn = draw(seed)
     ready, stated = recorded(drawn, CONFIG)
-    found, said = convicted(ready, detect(ready.record, CONFIG.oscillation), stated, CONFIG, drawn.kind)
+    found, said = with_valve_oscillation(
+        ready, detect(ready.record, CONFIG.oscillation), stated, CONFIG, drawn.kind
+    )
     assert drawn.truth["cause"] == "healthy"
     assert counting(found) is None
     assert said.cause == "none"

@@ -5,7 +5,17 @@ from __future__ import annotations
 import json
 import math
 
-from analyzer.loop.decisions import Cause, Finding, Lack, Need, Needs, Sign, SignKind, Status, Swing
+from analyzer.loop.decisions import (
+    Cause,
+    Finding,
+    MissingData,
+    Requirement,
+    RequirementKind,
+    Sign,
+    SignKind,
+    Status,
+    Swing,
+)
 from analyzer.plantwide.structure import Tie
 from analyzer.store.rows import finding_of, night_row, piece_row
 from analyzer.words import sentences
@@ -45,8 +55,8 @@ FOUND = Finding(
     "FIC1",
     "2026-03-02",
     Status.OK,
-    Needs(Lack.FINER, Need.PV_AS_MEASURED, (98.0, 0.8)),
-    Lack.FINER,
+    Requirement(MissingData.FINER, RequirementKind.PV_AS_MEASURED, (98.0, 0.8)),
+    MissingData.FINER,
     Swing(20.0, 90.0, 60.0, 2.0),
     Cause.UNDECIDED,
     signs=SIGNS,
@@ -56,7 +66,7 @@ FOUND = Finding(
 def test_each_kind_has_its_words() -> None:
     """There is no sign, and nothing that is needed, that words do not tell."""
     assert set(SAYS) == set(SignKind)
-    assert set(sentences("needs")) == set(Need)
+    assert set(sentences("needs")) == set(RequirementKind)
 
 
 BOTH_WAYS = {

@@ -15,7 +15,7 @@ import pytest
 
 from analyzer.config import WorkerLimits
 from analyzer.night import own_limits
-from analyzer.night.workers import Began, Died, Workers
+from analyzer.night.workers import Began, WorkerDeath, Workers
 
 LIMITS = WorkerLimits(memory_mb=512.0, processor_s=600.0, wall_s=6000.0)
 """Limits of memory that tell, and of time that no busy machine reaches; tests of time have one of their own."""
@@ -56,7 +56,7 @@ def act(task: tuple[str, ...], began: Began) -> tuple[str, ...]:
 
 def carried_out(
     *tasks: tuple[str, ...], limits: WorkerLimits = LIMITS
-) -> list[tuple[str, ...] | Died[tuple[str, ...]]]:
+) -> list[tuple[str, ...] | WorkerDeath[tuple[str, ...]]]:
     """What two workers make of some tasks."""
     with Workers(2, act, limits) as workers:
         for task in tasks:
@@ -74,10 +74,10 @@ def test_all_tasks_come_back_once():
 def test_a_killed_worker_costs_its_item_and_the_others_go_on():
     """A worker that is killed says which item it had in hand; all other tasks are done."""
     found = carried_out(("a", "killed", "b"), ("c",), ("d",), ("e",))
-    died = [r for r in found if isinstance(r, Died)]
+    died = [r for r in found if isinstance(r, WorkerDeath)]
     assert [(d.task, d.at, d.again) for d in died] == [(("a", "killed", "b"), 1, True)]
     assert "SIGKILL" in died[0].why
-    assert sorted(r for r in found if not isinstance(r, Died)) == [("c",), ("d",), ("e",)]
+    assert sorted(r for r in found if not isinstance(r, WorkerDeath)) == [("c",), ("d",), ("e",)]
 
 
 @linux
@@ -90,7 +90,7 @@ def test_a_greedy_item_gets_a_memory_error():
 def test_an_item_that_computes_for_ever_is_ended():
     """An item over its processor time ends its worker, with that reason and no second try."""
     (died,) = carried_out(("a", "spinning"), limits=replace(LIMITS, processor_s=2.0))
-    assert isinstance(died, Died)
+    assert isinstance(died, WorkerDeath)
     assert (died.at, died.again) == (1, False)
     assert "2 s of processor time" in died.why
 
@@ -98,7 +98,7 @@ def test_an_item_that_computes_for_ever_is_ended():
 def test_an_item_that_hangs_is_ended():
     """An item that waits for ever without computing is ended by the clock."""
     (died,) = carried_out(("hanging",), limits=replace(LIMITS, wall_s=6.0))
-    assert isinstance(died, Died)
+    assert isinstance(died, WorkerDeath)
     assert (died.at, died.again) == (0, False)
     assert "longer than 6 s" in died.why
 

@@ -20,7 +20,7 @@ from analyzer.loop.decisions import (
     Status,
     Swing,
 )
-from analyzer.plantwide.cascade import led_anew, linked
+from analyzer.plantwide.cascade import linked, reassign_sources
 from analyzer.plantwide.night import following
 from analyzer.plantwide.structure import Link, Tie
 from analyzer.words.reason import reason
@@ -138,7 +138,7 @@ def test_those_that_a_master_moves_follow_its_slave_where_the_slave_is_the_root(
     assert (done["FIC1"].moves, done["TIC1"].moves) == (("PIC7", "TIC1"), ())
     roles = {"TIC1": GroupRole.SOURCE, "FIC1": GroupRole.CANDIDATE, "PIC7": GroupRole.FOLLOWER}
     rows = [{"loop": k, "group": "1", "role": r, "source_pct": 9.0 * (k == "TIC1")} for k, r in roles.items()]
-    told = {r["loop"]: (r["role"], r["source_pct"]) for r in led_anew(rows, done)}
+    told = {r["loop"]: (r["role"], r["source_pct"]) for r in reassign_sources(rows, done)}
     assert told["FIC1"] == (GroupRole.SOURCE, 9.0)
     assert (told["TIC1"][0], told["PIC7"][0]) == (GroupRole.FOLLOWER, GroupRole.FOLLOWER)
 
@@ -154,4 +154,4 @@ def test_a_loop_that_leads_one_group_and_follows_in_another_leads_as_before() ->
         LIMITS,
     )
     rows = [{"loop": "FIC2", "group": "1", "role": GroupRole.SOURCE, "source_pct": 90.0}]
-    assert led_anew(rows, {"FIC2": leads, "PIC9": found("PIC9", Cause.VALVE, 360.0)}) == rows
+    assert reassign_sources(rows, {"FIC2": leads, "PIC9": found("PIC9", Cause.VALVE, 360.0)}) == rows

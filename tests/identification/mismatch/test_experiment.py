@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identification.controller.check import StatedSettings
-from identification.mismatch.answer import answer, untold_gain
+from identification.mismatch.answer import answer, open_gain_note
 from identification.mismatch.catalogue.supply_variation import AT_REST
 from identification.mismatch.diagnosis import explain
 from identification.mismatch.recording import Recording, coarser_by, is_experiment
@@ -85,7 +85,7 @@ def test_a_supply_whose_part_in_the_gain_is_not_seen_is_told_with_that() -> None
     assert said.verdict == "supply-variation"
     assert not said.caution
     any_sign = replace(said.effects[0], parameters={AT_REST.name: Estimate(10.0, -35.0, 55.0, "% OP")})
-    assert untold_gain(found, (any_sign,)) == TOLD["wanders"]
+    assert open_gain_note(found, (any_sign,)) == TOLD["wanders"]
 
 
 @pytest.mark.parametrize("seed", [1, 3, 16])

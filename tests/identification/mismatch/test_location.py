@@ -11,10 +11,10 @@ from identification.mismatch.location import (
     at_limits,
     block_products,
     directions,
-    hats,
     least_turn,
     located,
     part_of_range,
+    piecewise_linear_basis,
     turns,
 )
 
@@ -175,4 +175,4 @@ def test_limits_and_hats() -> None:
     op = np.concatenate(([50.0, 100, 100, 60, 70, 40, 40, 40], np.arange(45.0, 60.0)))
     np.testing.assert_array_equal(at_limits(op)[:9], [0, 1, 1, 0, 0, 1, 1, 1, 0])
     assert not at_limits(np.repeat([40.0, 60.0, 40.0], 5)).any()
-    assert hats(np.full(50, 3.0)).shape == (50, 0)
+    assert piecewise_linear_basis(np.full(50, 3.0)).shape == (50, 0)

@@ -7,7 +7,7 @@ import pytest
 
 from identification.limits import LIMITS
 from identification.mismatch.plain_loop import inputs_of, prepared
-from identification.mismatch.reference import Foretold, foretold, on_above
+from identification.mismatch.reference import Prediction, best_prediction, on_above
 from proofs.concealed.plant import Plant
 from proofs.experiments import drawn
 from tests.proofs.concealed.sealed_loop import PLANT, N, recording
@@ -15,11 +15,11 @@ from tests.proofs.concealed.sealed_loop import PLANT, N, recording
 CLOCK = np.arange(N)
 
 
-def left_of(plant: Plant, seed: int, **acting: np.ndarray) -> Foretold:
+def left_of(plant: Plant, seed: int, **acting: np.ndarray) -> Prediction:
     """What the plain loop leaves of a loop of the sealed generator."""
     s = recording(plant, seed, **acting)
     p, fit = prepared(inputs_of(s), s.pv - s.pv.mean(), s.usable)
-    return foretold(p, fit)
+    return best_prediction(p, fit)
 
 
 def test_load_and_noise_are_not_foretold() -> None:
@@ -71,7 +71,7 @@ def test_the_errors_of_an_experiment_s_simulation_are_not_foretold() -> None:
     for seed in range(6):
         s, _ = drawn("plain", seed)
         p, fit = prepared(inputs_of(s), s.pv - s.pv.mean(), s.usable, experiment=True)
-        assert foretold(p, fit).gain < LIMITS.search.left_over
+        assert best_prediction(p, fit).gain < LIMITS.search.left_over
 
 
 def test_a_switch_remembers_where_it_was_last() -> None:

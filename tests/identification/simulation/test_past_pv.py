@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.simulation.open_loop import RAMP, recalled, returned, switched
+from identification.simulation.open_loop import RAMP, gain_change_by_history, returned, switched
 
 
 def test_load_is_switched_as_a_schmitt_trigger_does() -> None:
@@ -32,7 +32,7 @@ def test_load_is_switched_as_a_schmitt_trigger_does() -> None:
 def test_past_of_pv_is_a_first_order_mean_of_it() -> None:
     """A step of PV is remembered as 1 - exp(-t / memory), and never by the sample at which it is recorded."""
     pv = np.where(np.arange(3000) >= 500, 5.0, 0.0)
-    gain = recalled(pv, 0.4, 300.0, 2.0)
+    gain = gain_change_by_history(pv, 0.4, 300.0, 2.0)
     assert not gain[:501].any()
     middle_s = 2.0 * np.arange(2499) + 1.0
     assert np.allclose(gain[501:], 0.2 * (1.0 - np.exp(-middle_s / 300.0)), atol=1e-5)
@@ -40,7 +40,7 @@ def test_past_of_pv_is_a_first_order_mean_of_it() -> None:
 
 def test_gain_never_changes_its_sign() -> None:
     """However far PV has been, a twentieth of the gain is left."""
-    assert recalled(np.full(500, -90.0), 3.0, 10.0, 1.0).min() == -0.95
+    assert gain_change_by_history(np.full(500, -90.0), 3.0, 10.0, 1.0).min() == -0.95
 
 
 def test_what_returns_is_pv_of_a_while_ago() -> None:
