@@ -2,7 +2,6 @@
 
 import os
 
-import pytest
 from hypothesis import HealthCheck, settings
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -19,13 +18,3 @@ settings.load_profile(os.environ.get("TRIAGE_SEARCH", "suite"))
 """The suite's random searches have a fixed seed and no clock, so that no test hangs on luck or on a busy machine;
 what the long search finds (TRIAGE_SEARCH=long) becomes an example beside the test. The first call of a kernel may
 compile it, which takes longer than any deadline."""
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests of a file that share a fixture go to one process, so that no night of theirs is assessed twice."""
-    for item in items:
-        made = getattr(item, "_fixtureinfo", None)
-        known = made.name2fixturedefs.values() if made else ()
-        if any(f.scope == "module" for several in known for f in several):
-            item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
