@@ -14,6 +14,7 @@ from click.testing import CliRunner
 
 from analyzer.cli import main as triage
 from analyzer.explain.text import answer_lines
+from analyzer.explain.words import held_out
 from analyzer.pages.night import pages_of_night
 from analyzer.store.store import Store
 from analyzer.words.reason import in_short
@@ -81,7 +82,7 @@ def of_explain(asked: tuple[str, ...], row: dict[str, Any], store: str) -> Itera
     if row["valve_fault"] in ("none", "backlash", "stiction") and named - {row["valve_fault"]}:
         yield f"explain: {', '.join(sorted(named))} where the night has valve_fault {row['valve_fault']}"
     if found["moved"]:
-        plain, better = (found["fit"][k]["held_out"]["rmse"] for k in ("baseline", "explained"))
+        plain, better = held_out(found)
         claimed = "improved loop" in "\n".join(answer_lines(found))
         if claimed and better >= plain:
             yield f"explain: an improved loop whose held-out error rises from {plain:.4g} to {better:.4g}"

@@ -67,7 +67,7 @@ def agreement(loop: Loop, fit: Fit, load: Floats, period_s: float) -> Agreement:
     every = max(round(dt_s / scan_s), 1)
     digit = op_step(window.op)
     recorded = [_travel(x[-last:], dt_s) for x in (play(window.op, digit), stem)]
-    rounded = digit * np.round(sim.op[::every] / max(digit, 1e-9))
+    rounded = digit * np.round(sim.op[::every] / digit) if digit > 0.0 else sim.op[::every]
     simulated = [_travel(x, every * scan_s) for x in (play(rounded, digit), sim.stem[::every])]
     op, moved = (s / max(r, 1e-9) for s, r in zip(simulated, recorded, strict=True))
     error = float(np.mean(np.abs(sim.error))) / max(recorded_error(fit, loop.controller), 1e-9)
