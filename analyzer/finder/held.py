@@ -82,8 +82,8 @@ def resting_level(pv: Matrix, op: Matrix, width: int) -> tuple[float, float]:
     return float(pv.mean() + rest / width), float(off / width)
 
 
-def free_moves(op: Matrix, width: int) -> np.ndarray:
-    """Moves between blocks of which neither has OP at a limit; all where it rests there most of the time."""
+def free_moves(op: Matrix, width: int) -> NDArray[np.int64]:
+    """Places of the moves between blocks of so many samples of which neither has OP, shape (n,), at a limit."""
     margin = FINDER.at_limit * np.ptp(op)
     limited = (op <= op.min() + margin) | (op >= op.max() - margin)
     within = blocks(limited[:, None].astype(float), width)[:, 0] == 0.0
@@ -140,5 +140,5 @@ def answers(values: Matrix, tags: Sequence[int], set_points: Sequence[int]) -> M
     x, s = (np.diff(values[:, list(of)], axis=0) for of in (tags, set_points))
     length = np.outer(np.sqrt((x**2).sum(axis=0)), np.sqrt((s**2).sum(axis=0))) + TINY
     now, later = x.T @ s / length, x[1:].T @ s[:-1] / length
-    alike = np.maximum(np.where(now**2 > FINDER.repeats, 0.0, np.abs(now)), np.abs(later))
-    return np.asarray(alike * np.sqrt(len(x) / (1.0 - np.minimum(alike**2, 1.0 - TINY))))
+    share = np.maximum(np.where(now**2 > FINDER.repeats, 0.0, np.abs(now)), np.abs(later))
+    return np.asarray(share * np.sqrt(len(x) / (1.0 - np.minimum(share**2, 1.0 - TINY))))
