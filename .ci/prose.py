@@ -89,11 +89,11 @@ def blocks(text: str) -> Iterator[tuple[int, str]]:
         alone = line.startswith(("|", "#"))
         if alone or not line.strip() or re.match(r"\s*(?:[-*]|\d+\.)\s", line):
             yield start, held
-            start, held = number, ""
+            start, held = number + (not line.strip()), ""
         if alone:
             yield from ((number, cell) for cell in line.strip("|# ").split("|"))
             start = number + 1
-        else:
+        elif line.strip():
             held += f"{line}\n"
 
 
