@@ -25,8 +25,8 @@ def outcome(d: Drawn, new: Controller) -> tuple[float, float, float, float]:
 
 
 def verdict(error: float, travel: float, kind: str = "") -> str:
-    """Improved, better, none or harm: improved where travel or error falls by 30 % and neither rises by 15 %; of a sluggish
-    loop, whose valve is to move more, by its error alone."""
+    """Improved, better, none or harm: improved where travel or error falls by 30 % and neither rises by 15 %. Of a
+    sluggish loop, whose valve has to move more, only the error counts."""
     travel = error if kind == "sluggish" else travel
     if max(error, travel) > 1.15:
         return "harm"
@@ -67,7 +67,9 @@ def main() -> None:
         worst = f"{100 * (a[:, 0].max() - 1):+.0f}" if found else ""
         ms = f"{a[:, 3].max():.2f}" if found else ""
         rows.append((kind, n, len(found), said.count("improved"), said.count("harm"), *middle, worst, ms))
-    heads = "kind|loops|new settings|improved|harm|error, median %|stem travel, median %|worst error %|largest Ms after"
+    heads = (
+        "kind|loops|new settings|improved|harm|error, median %|stem travel, median %|worst error %|largest Ms"
+    )
     print(table(heads, rows, True))
 
 

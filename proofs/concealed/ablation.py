@@ -128,11 +128,12 @@ def section(rows: pd.DataFrame) -> str:
         "## Ablation: the best wrong effect in the right one's place",
         "`python proofs/concealed/ablation.py CASES --out PROOF.md`. Every row is fitted whole and at its best\n"
         "size, which is stricter than a wrong effect of the right one's size. Gains are compared after the penalty\n"
-        "for constants and search. Some effects have others as special cases (stick-slip has backlash, two valves have\n"
-        'a stop). A wrong one may then be as good on later data; "no worse" is within 2 %.',
+        "for constants and search. Some effects have others as special cases: stick-slip has backlash, two valves\n"
+        'have a stop. A wrong one may then be as good on later data; "no worse" is within 2 %.',
         table(head, lines),
         f"Lost on the fitted recording: {worst or 'none'}.",
-        f"The controller's Kp and Ti, found from SP, PV and OP of the same cases, are within 2 % in {settings}\n"
+        "The controller's Kp and Ti were identified from SP, PV and OP of the same cases. They are within 2 % in "
+        f"{settings}\n"
         f"(medians {100 * rows.kp_error.abs().median():.2f} % and {100 * rows.ti_error.abs().median():.2f} %).",
     ]
     return "\n\n".join(parts) + "\n"

@@ -14,9 +14,9 @@ from proofs.first_hour.cases import MISTAKES, Mistake
 
 HEAD = """# First mistakes and their messages
 
-`python -m proofs.first_hour > docs/first-hour.md` writes this page, and tests/proofs/first_hour repeats each case. The
-trends are of a level loop that cycles because of a valve backlash of 4 %. Exit status 2 means that nothing could be
-done. Exit status 0 means that a night was written; its list then reports what the trends can show.
+`python -m proofs.first_hour > docs/first-hour.md` writes this page, and tests/proofs/first_hour repeats each case.
+The trends are of a level loop that cycles because of a valve backlash of 4 %. Exit status 2 means that nothing could
+be done. Exit status 0 means that a night was written; its list then reports what the trends can show.
 
 | mistake | exit | message | in the list |
 |---|---|---|---|"""
