@@ -49,7 +49,8 @@ BANNED = {
     r"of another hand|by another hand|a hand that": "independent generator",
     r"plays?": "backlash",
     r"waves?": "oscillation, waveform",
-    r"cured|sound": "repaired, no fault found",
+    r"cured|healthy|sound": "repaired, no fault found",
+    r"chance of so much": "p-value",
     r"kin|look-alikes?|twins?|likeness": "indistinguishable effects, slow reference implementation",
     r"telltale|telling": "discriminating",
     r"priced?|prices": "penalty, cost",
@@ -65,10 +66,15 @@ BANNED = {
 }
 
 
-def pages(root: Path) -> Iterator[Path]:
-    """The pages that are read."""
+def pages(root: Path) -> Iterator[tuple[Path, str]]:
+    """The pages that are read and their texts; of CHANGELOG.md the newest of several sections."""
     for pattern in PAGES:
-        yield from (page for page in sorted(root.glob(pattern)) if page.name not in GENERATED)
+        for page in sorted(page for page in root.glob(pattern) if page.name not in GENERATED):
+            yield page, page.read_text(encoding="utf-8")
+    log = root / "CHANGELOG.md"
+    sections = log.read_text(encoding="utf-8").split("\n## ") if log.exists() else []
+    if len(sections) > 2:
+        yield log, "\n## ".join(sections[:2])
 
 
 def without_code(text: str) -> str:
@@ -116,8 +122,8 @@ def main(root: Path) -> int:
     """Print the findings of all pages; 1 if there are any."""
     lines = [
         f"{page.relative_to(root)}:{line}: {what}"
-        for page in pages(root)
-        for line, what in sorted(findings(page.read_text(encoding="utf-8")))
+        for page, text in pages(root)
+        for line, what in sorted(findings(text))
     ]
     words = len((root / "README.md").read_text(encoding="utf-8").split())
     if words > README_WORDS:
