@@ -1,6 +1,6 @@
 """The oldest versions that a pyproject.toml allows, as pip's constraints: python .ci/floors.py pyproject.toml
 
-Of what users install: the dependencies, and the extras but for the tests' own tools.
+Of what users install: the dependencies, and the extras except the tools of tests and pages.
 """
 
 import re
@@ -12,7 +12,8 @@ from pathlib import Path
 def floors(text: str) -> list[str]:
     """`numpy>=1.26` as `numpy==1.26`, each package once."""
     project = tomllib.loads(text)["project"]
-    extras = (needs for name, needs in project["optional-dependencies"].items() if name != "test")
+    tools = {"test", "docs"}
+    extras = (needs for name, needs in project["optional-dependencies"].items() if name not in tools)
     wanted = [*project["dependencies"], *(need for needs in extras for need in needs)]
     return [
         f"{name}=={least}"

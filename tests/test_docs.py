@@ -9,6 +9,7 @@ import sys
 import tomllib
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner
 
@@ -67,6 +68,21 @@ def test_each_command_has_help_and_an_example(name):
     result = CliRunner().invoke(main, [name, "--help"])
     assert result.exit_code == 0
     assert "Example" in result.output
+
+
+@pytest.mark.parametrize(
+    "page", ["README.md", *(f"docs/{p.name}" for p in sorted((ROOT / "docs").glob("*.md")))]
+)
+def test_commands_on_pages_are_the_program_s(page):
+    """Each `triage` command on a page, in a block or in a sentence, exists and has the options that are shown."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    shown = re.findall(r"(?:^|`|bin/)triage ([a-z-][^`&;|#\n]*)", text, re.MULTILINE)
+    for name, *words in (line.split() for line in shown):
+        command = main.commands[name]
+        if isinstance(command, click.Group):
+            command = command.commands[words[0]]
+        known = {option for p in command.params for option in (*p.opts, *p.secondary_opts)}
+        assert {word.split("=")[0] for word in words if word.startswith("--")} <= known, (name, words)
 
 
 def headings(text: str) -> list[str]:

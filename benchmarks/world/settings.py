@@ -25,12 +25,12 @@ def outcome(d: Drawn, new: Controller) -> tuple[float, float, float, float]:
 
 
 def verdict(error: float, travel: float, kind: str = "") -> str:
-    """Cured, better, none or harm: cured where travel or error falls by 30 % and neither rises by 15 %; of a sluggish
-    loop, whose valve is to move more, by its error alone."""
+    """Improved, better, none or harm: improved where travel or error falls by 30 % and neither rises by 15 %. Of a
+    sluggish loop, whose valve has to move more, only the error counts."""
     travel = error if kind == "sluggish" else travel
     if max(error, travel) > 1.15:
         return "harm"
-    return "cured" if min(error, travel) <= 0.7 else "better" if min(error, travel) <= 0.95 else "none"
+    return "improved" if min(error, travel) <= 0.7 else "better" if min(error, travel) <= 0.95 else "none"
 
 
 def line(d: Drawn, row: dict[str, Any], found: tuple[float, ...] | None) -> str:
@@ -66,8 +66,10 @@ def main() -> None:
         middle = [f"{100 * (np.median(a[:, k]) - 1):+.0f}" if found else "" for k in (0, 1)]
         worst = f"{100 * (a[:, 0].max() - 1):+.0f}" if found else ""
         ms = f"{a[:, 3].max():.2f}" if found else ""
-        rows.append((kind, n, len(found), said.count("cured"), said.count("harm"), *middle, worst, ms))
-    heads = "kind|loops|new settings|cured|harm|error, median %|stem travel, median %|worst error %|largest Ms after"
+        rows.append((kind, n, len(found), said.count("improved"), said.count("harm"), *middle, worst, ms))
+    heads = (
+        "kind|loops|new settings|improved|harm|error, median %|stem travel, median %|worst error %|largest Ms"
+    )
     print(table(heads, rows, True))
 
 

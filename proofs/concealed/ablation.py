@@ -127,12 +127,13 @@ def section(rows: pd.DataFrame) -> str:
     parts = [
         "## Ablation: the best wrong effect in the right one's place",
         "`python proofs/concealed/ablation.py CASES --out PROOF.md`. Every row is fitted whole and at its best\n"
-        "size, a harder opponent than a wrong effect of the right one's size. Gains are compared after the penalty\n"
-        "of constants and search. Some rows hold others as special cases (stick-slip a play, two valves a stop), so\n"
-        "a wrong one may do as well on later data; no worse is within 2 %.",
+        "size, which is stricter than a wrong effect of the right one's size. Gains are compared after the penalty\n"
+        "for constants and search. Some effects have others as special cases: stick-slip has backlash, two valves\n"
+        'have a stop. A wrong one may then be as good on later data; "no worse" is within 2 %.',
         table(head, lines),
         f"Lost on the fitted recording: {worst or 'none'}.",
-        f"The controller's Kp and Ti, found from SP, PV and OP of the same cases, are within 2 % in {settings}\n"
+        "The controller's Kp and Ti were identified from SP, PV and OP of the same cases. They are within 2 % in "
+        f"{settings}\n"
         f"(medians {100 * rows.kp_error.abs().median():.2f} % and {100 * rows.ti_error.abs().median():.2f} %).",
     ]
     return "\n\n".join(parts) + "\n"

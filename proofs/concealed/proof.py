@@ -40,7 +40,7 @@ def by_level(rows: pd.DataFrame) -> str:
     head = [
         "level",
         "information: name",
-        "with kin and alternatives",
+        "with indistinguishable effects",
         "size: name",
         "block",
         "misfit recovered",
@@ -151,13 +151,13 @@ def section(rows: pd.DataFrame, params: pd.DataFrame, picture: str | None) -> st
         by_level(rows),
         mistakes(rows),
         f"![Power against strength]({picture})" if picture else "",
-        "### By effect\nRight answers per level (kin and alternatives count), and every name given.",
+        "### By effect\nRight answers per level (indistinguishable effects count), and every name given.",
         confusion(rows),
         "### Harmless oddities",
         oddities(rows),
         "### Parameters",
         parameter_table(params),
-        "### The plain loop\nMedian error, and saved models within 5 %. Set points move under load.",
+        "### The baseline model\nMedian error, and saved models within 5 %. Set points move under load.",
         plain_loops(rows),
     ]
     return "\n\n".join(p for p in parts if p) + "\n"

@@ -1,4 +1,4 @@
-"""What is said to the mistakes of a first hour, as a page: python -m proofs.first_hour > docs/first-hour.md"""
+"""The messages for the mistakes of a first hour, as a page: python -m proofs.first_hour > docs/first-hour.md"""
 
 from __future__ import annotations
 
@@ -11,15 +11,14 @@ from click.testing import CliRunner
 
 from analyzer.cli import main as triage
 from proofs.first_hour.cases import MISTAKES, Mistake
-from reports.markdown import escaped
 
-HEAD = """# A first hour's mistakes, and what is said
+HEAD = """# First mistakes and their messages
 
-Written by `python -m proofs.first_hour > docs/first-hour.md`; tests/proofs/first_hour asks each again. The trends are
-of a level that cycles for a play of 4 % in its valve. Exit status 2 is *nothing could be done*, 0 is a night that was
-written, whose list then says what the trends can show.
+`python -m proofs.first_hour > docs/first-hour.md` writes this page, and tests/proofs/first_hour repeats each case.
+The trends are of a level loop that cycles because of a valve backlash of 4 %. Exit status 2 means that nothing could
+be done. Exit status 0 means that a night was written; its list then reports what the trends can show.
 
-| mistake | exit | said | in the list |
+| mistake | exit | message | in the list |
 |---|---|---|---|"""
 
 
@@ -39,6 +38,11 @@ def answered(mistake: Mistake, folder: Path) -> tuple[int, str, str, str]:
     return done.exit_code, told[-1].replace(str(folder), "."), action, reason
 
 
+def quoted(text: str) -> str:
+    """Output of the program as inline code in a cell of a table."""
+    return f"`{text.replace('|', '/')}`" if text else ""
+
+
 def main() -> None:
     """Print the page."""
     print(HEAD)
@@ -46,7 +50,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             status, said, action, reason = answered(mistake, Path(folder))
         shown = f"{action}: {reason}" if action else ""
-        print(f"| {mistake.what} | {status} | {escaped(said)} | {escaped(shown)} |")
+        print(f"| {mistake.what} | {status} | {quoted(said)} | {quoted(shown)} |")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,136 @@
+"""Plain English in the project's pages: python .ci/prose.py [FOLDER]
+
+Prints one line for each banned phrase, each long sentence and a README that is too long, and exits with 1 if there
+is one. Code blocks, inline code, links' addresses and figures are not read.
+"""
+
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+PAGES = (
+    "README.md",
+    "CONTRIBUTING.md",
+    "CONVENTIONS.md",
+    "PROOF.md",
+    "docs/*.md",
+    "benchmarks/world/README.md",
+)
+GENERATED = {"columns.md"}
+"""docs/columns.py writes it from analyzer/columns.toml."""
+
+SENTENCE_WORDS = 25
+"""ASD-STE100 (Simplified Technical English) allows 25 in descriptions; code in back quotes is one word."""
+
+README_WORDS = 900
+"""Words of the README as `wc -w` counts them, its commands and its list included."""
+
+SENTENCE_END = re.compile(r"(?<=[.!?])[)*]*\s+(?=[(*\"]*[A-Z\d])")
+BANNED = {
+    r"tells? apart|told apart": "distinguish",
+    r"told|tells?|telling": "report, show, state",
+    r"said": "reported, stated",
+    r"asked|asks?": "require, test, query, use",
+    r"hangs? on|hung on": "depend on",
+    r"rests? on|rested on": "be based on, use",
+    r"own(?:s|ed)? up to": "reported as unexplained",
+    r"stands? for": "mean",
+    r"stands?|stood": "be, be listed, be kept",
+    r"speaks?|speaking": "show, support, concern",
+    r"convict(?:s|ed)?": "identified as faulty",
+    r"foretells?|foretold|foresees?|foresaw|foreseen": "predict",
+    r"(?:as|kept) by a clock": "constant frequency",
+    r"driven from outside|from outside": "external disturbance",
+    r"plain (?:loop|simulation|lag|model)s?": "baseline model (FOPDT, ideal valve)",
+    r"turns? of OP|on a turn": "OP reversal",
+    r"leaves? over|left over|what is left": "residual",
+    r"bears?|borne": "have, allow, support",
+    r"of another hand|by another hand|a hand that": "independent generator",
+    r"plays?": "backlash",
+    r"waves?": "oscillation, waveform",
+    r"cured|healthy|sound": "repaired, no fault found",
+    r"chance of so much": "p-value",
+    r"kin|look-alikes?|twins?|likeness": "indistinguishable effects, slow reference implementation",
+    r"telltale|telling": "discriminating",
+    r"priced?|prices": "penalty, cost",
+    r"rivals?": "candidate",
+    r"mended": "corrected, repaired",
+    r"anew": "again",
+    r"goes? on|going on|gone on": "continue",
+    r"whole of": "all of",
+    r"beside": "next to, compared with, in addition to",
+    r"whatever": "independently of",
+    r"amid": "among",
+    r"seeks?|sought": "search for",
+}
+
+
+def pages(root: Path) -> Iterator[tuple[Path, str]]:
+    """The pages that are read and their texts; of CHANGELOG.md the newest of several sections."""
+    for pattern in PAGES:
+        for page in sorted(page for page in root.glob(pattern) if page.name not in GENERATED):
+            yield page, page.read_text(encoding="utf-8")
+    log = root / "CHANGELOG.md"
+    sections = log.read_text(encoding="utf-8").split("\n## ") if log.exists() else []
+    if len(sections) > 2:
+        yield log, "\n## ".join(sections[:2])
+
+
+def without_code(text: str) -> str:
+    """A text of as many lines, without code blocks and comments; inline code is one word, a link is its text."""
+
+    def lines(kept: str) -> "re._Repl":
+        return lambda m: m.expand(kept) + "\n" * (m.group().count("\n") - m.expand(kept).count("\n"))
+
+    text = re.sub(r"^```.*?^```|<!--.*?-->", lines(""), text, flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(r"`[^`]+`", lines("Code"), text)
+    return re.sub(r"!?\[([^\]]*)\]\([^)]*\)", lines(r"\1"), text)
+
+
+def blocks(text: str) -> Iterator[tuple[int, str]]:
+    """First line and text of each paragraph, list item, heading and cell of a table."""
+    start, held = 1, ""
+    for number, line in enumerate([*without_code(text).splitlines(), ""], 1):
+        alone = line.startswith(("|", "#"))
+        if alone or not line.strip() or re.match(r"\s*(?:[-*]|\d+\.)\s", line):
+            yield start, held
+            start, held = number + (not line.strip()), ""
+        if alone:
+            yield from ((number, cell) for cell in line.strip("|# ").split("|"))
+            start = number + 1
+        elif line.strip():
+            held += f"{line}\n"
+
+
+def findings(text: str) -> Iterator[tuple[int, str]]:
+    """Line and report of each banned phrase and of each long sentence of a page."""
+    for start, block in blocks(text):
+        for pattern, instead in BANNED.items():
+            for found in re.finditer(rf"\b(?:{pattern})\b", block.replace("\n", " "), re.IGNORECASE):
+                yield start + block.count("\n", 0, found.start()), f"'{found.group()}'; write: {instead}"
+        at = 0
+        for end in (*(m.end() for m in SENTENCE_END.finditer(block)), len(block)):
+            words = [word for word in block[at:end].split() if re.search(r"\w", word)]
+            if len(words) > SENTENCE_WORDS:
+                limit = f"{len(words)} words; at most {SENTENCE_WORDS}"
+                yield start + block.count("\n", 0, at), f"a sentence of {limit}: {' '.join(words[:6])} ..."
+            at = end
+
+
+def main(root: Path) -> int:
+    """Print the findings of all pages; 1 if there are any."""
+    lines = [
+        f"{page.relative_to(root)}:{line}: {what}"
+        for page, text in pages(root)
+        for line, what in sorted(findings(text))
+    ]
+    words = len((root / "README.md").read_text(encoding="utf-8").split())
+    if words > README_WORDS:
+        lines.append(f"README.md:1: {words} words; at most {README_WORDS}")
+    print("".join(f"{line}\n" for line in lines), end="")
+    return int(bool(lines))
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1] if len(sys.argv) > 1 else ".")))

@@ -1,0 +1,66 @@
+"""The check of the pages' prose finds what it is for, and nothing else."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CHECK = Path(__file__).resolve().parents[2] / ".ci" / "prose.py"
+PLAIN = """# A page
+
+The valve has a backlash of 3 %.
+The loop oscillates, and `the period is told` by the [list](plain-loop-told.md).
+
+```sh
+echo the plain loop is told
+```
+
+| column | holds |
+|---|--:|
+| error | 3.1 |
+"""
+
+
+def checked(folder: Path) -> subprocess.CompletedProcess[str]:
+    """The check on the pages of a folder."""
+    return subprocess.run(
+        [sys.executable, str(CHECK), str(folder)], capture_output=True, text=True, check=False
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        (PLAIN, []),
+        ("# A page\n\nThe fault of a loop hangs\non another loop.\n", ["3: 'hangs on'"]),
+        ("| valve | at a turn of OP |\n", ["1: 'turn of OP'"]),
+        ("- One.\n- Two " + "and two " * 15 + "are many.\n", ["2: a sentence of 33 words"]),
+        ("Short. " * 901, ["1: 901 words"]),
+    ],
+    ids=["plain", "phrase", "cell", "sentence", "length"],
+)
+def test_prose_is_checked(text: str, found: list[str], tmp_path: Path) -> None:
+    """A banned phrase, also over two lines, a long sentence and a long README are found with their line; code is not
+    read, and plain text has no finding."""
+    (tmp_path / "README.md").write_text(text, encoding="utf-8")
+    done = checked(tmp_path)
+    lines = done.stdout.splitlines()
+    assert done.returncode == bool(found), done.stderr
+    assert len(lines) == len(found)
+    assert all(line.startswith(f"README.md:{part}") for line, part in zip(lines, found, strict=True)), lines
+
+
+def test_the_newest_changes_are_checked(tmp_path: Path) -> None:
+    """Of a CHANGELOG with two versions the newer one is read; the older one, or a single one, is not."""
+    (tmp_path / "README.md").write_text(PLAIN, encoding="utf-8")
+    log, old = tmp_path / "CHANGELOG.md", "## 0.1\n\nThe valve is told.\n"
+    for text, status in (
+        (f"# Changes\n\n{old}", 0),
+        (f"# Changes\n\n## 0.2\n\nNothing.\n\n{old}", 0),
+        (f"# Changes\n\n{old}\n{old}", 1),
+    ):
+        log.write_text(text, encoding="utf-8")
+        assert checked(tmp_path).returncode == status
