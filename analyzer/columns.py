@@ -10,8 +10,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from importlib.resources import files
+from operator import attrgetter
 from typing import Any
 
+NAME = attrgetter("name")
 Row = Mapping[str, Any]
 """A row of a table of results: its cells by column."""
 
@@ -116,7 +118,8 @@ def names(columns: Sequence[Column]) -> tuple[str, ...]:
 def row_of(values: Mapping[str, Any], columns: Sequence[Column] = NIGHTS) -> dict[str, Any]:
     """A row with every column of a table, None where nothing is known. Raises ValueError for a value whose column is
     declared nowhere."""
-    unknown = sorted(values.keys() - {c.name for c in columns})
+    empty: dict[str, Any] = dict.fromkeys(map(NAME, columns))
+    unknown = sorted(values.keys() - empty.keys())
     if unknown:
         raise ValueError(f"no such column: {', '.join(unknown)}; declare it in analyzer/columns.toml")
-    return {c.name: values.get(c.name) for c in columns}
+    return {**empty, **values}

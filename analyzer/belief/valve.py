@@ -169,7 +169,7 @@ def _begun_anew(recent: Sequence[tuple[str, Floats]], said: Witness) -> ValveBel
 
 def _kept(x: Floats) -> tuple[float, ...]:
     """As the store keeps it."""
-    return tuple(round(float(v), 3) for v in x)
+    return tuple(np.round(x, 3).tolist())
 
 
 def _nights_kept(recent: Sequence[tuple[str, Floats]]) -> tuple[Recent, ...]:

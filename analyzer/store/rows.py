@@ -80,7 +80,7 @@ def piece_row(found: Finding) -> dict[str, Any]:
         "due": found.remedy.due,
         "reason": json.dumps(astuple(found.lacking)) if found.lacking is not None else None,
     }
-    return {k: finite(v) for k, v in row_of(row).items()}
+    return row_of({k: finite(v) for k, v in row.items()})
 
 
 def finding_of(row: Row) -> Finding:
