@@ -158,8 +158,8 @@ def tune(loop: PlantLoop) -> of_settings.Tuning:
 
 
 def explain(loop: PlantLoop) -> Explained:
-    """Effects that the loop's baseline model does not include; `.data` is the output of `triage explain --format
-    json`. Raises NotAssessedError if OP or PV is missing or never moves."""
+    """Effects that the loop's baseline model does not include; `.data` is the output of
+    `triage explain --format json`. Raises NotAssessedError if OP or PV is missing or never moves."""
     from analyzer.explain.case import case, tags_of
     from analyzer.explain.explained import explained
 

@@ -21,7 +21,7 @@ LABELS = 110.0
 PANEL = (150.0, 56.0, 14.0)
 """Width of a panel's bars, of the figures right of them, and of the distance to the next."""
 RIM = 150.0
-"""Changes are drawn up to this [%]; the text beside gives the exact value."""
+"""Changes are drawn up to this [%]; the adjacent text gives the exact value."""
 TREND, FIRST, OTHER = 1040.0, 200.0, 130.0
 """Width of a trend, and heights of its first panel and of the others."""
 BUCKETS = 1040
@@ -143,7 +143,7 @@ def _panel(chart: IntervalChart, label: str, rows: list[str]) -> str:
 
 
 def _interval(bar: IntervalBar, y: float, x: svg.Axis) -> str:
-    """A bar from zero to the change, its interval as a line, both cut at the ends; the figure beside it."""
+    """A bar from zero to the change, its interval as a line, both cut at the ends; the figure next to it."""
     if bar.value is None or bar.low is None or bar.high is None:
         return svg.written(x.last + PANEL[1], y + 4, "–", "end", "quiet")
     zero, value, low, high = x.places(np.clip([0.0, bar.value, bar.low, bar.high], x.low, x.high))

@@ -125,7 +125,7 @@ def stamps_clock(table: Table, column: int, options: ReadOptions, name: str) -> 
 
 
 def _stands(table: Table, second: NDArray[np.float64], tag: int) -> bool:
-    """Whether all first rows have one stamp [s], each of the tags in more than one of them."""
+    """Whether all first rows have the same stamp [s], with several rows for each tag."""
     known = second[np.isfinite(second)]
     if known.size < HISTORY.minutes_rows or np.ptp(known) > 0.0:
         return False

@@ -221,8 +221,8 @@ def _clear_change(found: LoopComparison, name: str) -> Change | None:
 def wear_texts(found: LoopComparison, row: words.Row) -> tuple[str, ...]:
     """The effect of the change on valve life and on the plant's cost of error, from numbers in loops.csv.
 
-    valve_life_travel_pct : travel after which a valve is overhauled [% of stroke, summed] cost_per_error_pct_h : cost
-    of one percent of average absolute error per hour [cost_unit]
+    valve_life_travel_pct : travel after which a valve is overhauled [% of stroke, summed]
+    cost_per_error_pct_h : cost of one percent of average absolute error per hour [cost_unit]
     """
     texts = []
     travel, life = _clear_change(found, "valve_travel_pct_per_h"), _stated(row, "valve_life_travel_pct")

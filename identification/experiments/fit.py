@@ -61,7 +61,7 @@ class Shape:
 class Fitted:
     """A candidate at its optimum.
 
-    times : logs of lags [s], dead time [s], log of play and slack as a share of it, logs of neighbours' lags;
+    times : logs of lags [s], dead time [s], log backlash width, slack as a share of it, logs of neighbours' lags;
     linear : coefficients of the columns; log_likelihood [nat]; variance of the white noise [% PV squared]; wander of
     the load.
     """

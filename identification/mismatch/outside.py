@@ -1,4 +1,4 @@
-"""Known physics without a name in the catalogue. Where it explains a recording best, a text reports it beside
+"""Known physics without a name in the catalogue. Where it explains a recording best, a text reports it with
 `unexplained`, so that no name of the catalogue is used for it."""
 
 from __future__ import annotations

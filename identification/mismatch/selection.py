@@ -95,7 +95,7 @@ def penalty(p: Problem, row: Variant) -> float:
 
 
 def penalised(x: Round, fit: Fitted) -> Candidate:
-    """A fit as a candidate beside the fit before."""
+    """A fit as a candidate, with its gain over the previous fit."""
     won = gain(fit, x.near)
     return Candidate(fit, won, won - penalty(x.p, fit.model.added[-1]))
 

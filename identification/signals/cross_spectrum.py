@@ -38,7 +38,7 @@ def tapered(lines: Complex) -> Complex:
 
 
 def band(line: float) -> tuple[int, int, int]:
-    """First line, line after the last and width of the pieces [lines] of the band about a frequency [lines]."""
+    """First line, line after the last and width of the sections [lines] of the band about a frequency [lines]."""
     half = max(SIGNALS.shared_band * line, SIGNALS.side_lines)
     width = max(SIGNALS.piece_lines, round(SIGNALS.piece * line))
     return max(round(line - half), 1), round(line + half) + 1, width

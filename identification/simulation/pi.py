@@ -1,12 +1,12 @@
-"""The PID law, once: the velocity form with backward-Euler integration and a filtered derivative.
+"""The PID law in velocity form, with backward-Euler integration and a filtered derivative.
 
-PV passes a lag of pv_filter_s first. With e = SP - PV, dSP the move of SP, and s(e) what of the error counts (all of
-it; less inside the gap; e abs(e) / 100), OP moves at each scan by
+PV first passes a lag of pv_filter_s. With e = SP - PV, dSP the move of SP, and s(e) the effective error (e; reduced
+inside the gap; e abs(e) / 100), OP moves at each scan by
 
     kp (s(e(k)) - s(e(k-1) + (1 - sp_weight) dSP)) + ki s(e(k)) + D(k) - D(k-1)
     D(k) = a D(k-1) - kp Td / (Tf + dt) (PV(k) - PV(k-1) - td_sp_weight dSP),  Tf = Td / N,  a = Tf / (Tf + dt)
 
-at the most by op_rate dt, and is held within its limits, which is its anti-windup; ki = kp dt/Ti. kp > 0 means that
+but by at most op_rate dt. OP is clipped to its limits, which is the anti-windup; ki = kp dt/Ti. kp > 0 means that
 OP falls when PV rises. The derivative with its filter is that of Astrom, Hagglund (2006), in backward differences.
 """
 
