@@ -1,7 +1,7 @@
-"""Which loops, in what order, kept where; the command line. Imports all other packages.
+"""Ranking of loops, storage of results, and the command line. Imports all other packages.
 
-`import analyzer as triage` gives a notebook its seven functions (docs/python.md), imported when first asked for: no
-command of the shell waits for what it does not use.
+`import analyzer as triage` gives a notebook its seven functions (docs/python.md), imported on first use: no command
+of the shell waits for modules that it does not use.
 """
 
 from importlib import import_module
@@ -14,7 +14,7 @@ __all__ = ["assess", "explain", "fit", "nights", "read", "simulate", "tune"]
 
 
 def __getattr__(name: str) -> Any:
-    """One of the seven, from analyzer/api.py."""
+    """One of the seven functions, from analyzer/api.py."""
     if name not in __all__:
         raise AttributeError(f"module 'analyzer' has no attribute {name!r}")
     return getattr(import_module("analyzer.api"), name)

@@ -1,4 +1,4 @@
-"""What a notebook needs: read an export, assess a loop, fit, simulate, tune, explain, read a store into pandas.
+"""Functions for notebooks: read an export, assess a loop, fit, simulate, tune, explain, read a store into pandas.
 
 From the project's folder:
 >>> import analyzer as triage
@@ -63,7 +63,7 @@ def read(
     config: Config | None = None,
     **reading: Any,
 ) -> Plant:
-    """Open an export. Raises InputError where the export or a table cannot be used; the text says what was seen, what
+    """Open an export. Raises InputError if the export or a table cannot be used; the text names what was seen, what
     was expected and what to do.
 
     Parameters
@@ -71,11 +71,11 @@ def read(
     export : path or sequence of paths
         CSV or Parquet, wide or long, or folders of them.
     loops, changes : path or None
-        loops.csv and changes.csv; without loops.csv loops are found by their tags' endings.
+        loops.csv and changes.csv; without loops.csv loops are found by the endings of tags.
     config : Config or None
-        Thresholds; the defaults where None.
+        Thresholds; None: the defaults.
     **reading
-        How to read text: timezone, delimiter, decimal, encoding, day_first, date_format, time_column,
+        Format of text files: timezone, delimiter, decimal, encoding, day_first, date_format, time_column,
         quality_column, good_quality.
     """
     paths = [Path(p) for p in ([export] if isinstance(export, str | Path) else export)]
@@ -85,14 +85,14 @@ def read(
 
 
 def assess(loop: PlantLoop) -> of_night.Assessment:
-    """What a night says of a loop: does it oscillate, why, and its figures. Raises NotAssessedError where the record
-    cannot support it; the text says what it needs."""
+    """Assess a loop as in a night: oscillation, cause, and figures. Raises NotAssessedError if the record is not
+    sufficient; the text gives the requirement."""
     return of_night.assess(loop.prepared, loop.controller, loop.plant.config, loop.spec.type, loop.earlier)
 
 
 @dataclass(frozen=True)
 class Identified:
-    """Process and valve as identified: the likeliest model, and its parameters with 90 % intervals by name."""
+    """Identified process and valve: the most likely model, and its parameters with 90 % intervals by name."""
 
     process: Process
     valve: Valve
@@ -100,8 +100,8 @@ class Identified:
 
 
 def fit(loop: PlantLoop) -> Identified:
-    """Process and valve from the trends of a loop. Raises NotAssessedError where they give no model; the text says
-    what they lack.
+    """Identify process and valve from the trends of a loop. Raises NotAssessedError if they give no model; the text
+    gives the missing data.
 
     >>> import analyzer as triage
     >>> plant = triage.read("sample_data/mill.parquet", loops="sample_data/loops.csv")
@@ -146,8 +146,8 @@ def simulate(
 
 
 def tune(loop: PlantLoop) -> of_settings.Tuning:
-    """New settings for a loop, what they would do, and why. Raises InputError where loops.csv does not state the
-    present settings; NotAssessedError where the trends give no model."""
+    """New settings for a loop, their expected effect, and the reason. Raises InputError if loops.csv does not state
+    the present settings; NotAssessedError if the trends give no model."""
     controller, found = loop.controller, assess(loop)
     if controller is None:
         raise InputError(f"{loop.spec.loop}: no kp and ti in loops.csv", "both", "state them")
@@ -158,8 +158,8 @@ def tune(loop: PlantLoop) -> of_settings.Tuning:
 
 
 def explain(loop: PlantLoop) -> Explained:
-    """What physics the loop's plain model lacks; `.data` is what `triage explain --format json` prints. Raises
-    NotAssessedError where OP or PV is missing or never moves."""
+    """Effects that the loop's baseline model does not include; `.data` is the output of
+    `triage explain --format json`. Raises NotAssessedError if OP or PV is missing or never moves."""
     from analyzer.explain.case import case, tags_of
     from analyzer.explain.explained import explained
 
@@ -169,14 +169,14 @@ def explain(loop: PlantLoop) -> Explained:
 
 
 def nights(store: str | Path, table: str = "nights") -> pd.DataFrame:
-    """Every night of a store as one frame, with the column `night`. Raises InputError where there is no such store.
+    """Every night of a store as one frame, with the column `night`. Raises InputError if there is no such store.
 
     Parameters
     ----------
     store : path
         A folder that `triage run` wrote.
     table : str
-        nights (a row a loop, as that night says by itself), beliefs (what nights say together), hours, trends,
+        nights (one row per loop, from that night alone), beliefs (joint results of nights), hours, trends,
         groups or explained.
     """
     import pandas as pd

@@ -1,4 +1,4 @@
-"""The command line: parse, call one function, print. Heavy packages are imported where they are needed."""
+"""The command line: parse, call one function, print. Slow packages are imported where they are needed."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
-"""Loops run side by side, one a process, on matrices of a few columns: threads of linear algebra only get in their
-way. Set before numpy is imported."""
+"""Loops run in parallel, one per process, on matrices of a few columns: threads of linear algebra only slow them
+down. Set before numpy is imported."""
 
 
 @click.group(
@@ -30,7 +30,7 @@ way. Set before numpy is imported."""
 )
 @click.version_option(package_name="loop-triage", prog_name="triage")
 def main() -> None:
-    """Nightly triage of PID loops: which oscillate, why, what to type in, and whether it helped.
+    """Nightly triage of PID loops: which oscillate, why, new settings, and whether they helped.
 
     \b
     triage run export.parquet --loops loops.csv --store store
@@ -42,7 +42,7 @@ def main() -> None:
 @options.finding
 @options.export_options
 def check(asked: Asked) -> None:
-    """What was read: loops, tags, gaps, quality, and which questions it is fit for.
+    """Check an export: loops, tags, gaps, quality, and the analyses that the data allow.
 
     Example: triage check export.csv --loops loops.csv
     """
@@ -51,7 +51,7 @@ def check(asked: Asked) -> None:
     lost = 0
     for line, bad in check_lines(asked):
         lost += bad
-        click.echo(visible(line))  # one line, whatever a tag holds
+        click.echo(visible(line))  # one line, whatever characters a tag contains
     sys.exit(options.SOME_LOST if lost else 0)
 
 
@@ -80,7 +80,7 @@ def check(asked: Asked) -> None:
 def rank(
     store: Path, top: int | None, groups: bool, everything: bool, wide: bool, form: str, **by: Any
 ) -> None:
-    """The morning list: loops of one night, the worst first.
+    """The morning list: the loops of one night, worst first.
 
     Example: triage rank store --top 20 --format markdown
     """
@@ -107,7 +107,7 @@ def rank(
 @options.formats("text", "json")
 @click.option("--out", type=options.FOLDER, help="Directory for pictures, and a page to try settings on.")
 def tune(asked: Asked, tag: str, store: Path | None, form: str, out: Path | None) -> None:
-    """One loop: what the night decided, model, limit cycle predicted, new Kp and Ti, forecast, travel map.
+    """One loop: the night's decision, model, predicted limit cycle, new Kp and Ti, forecast, travel map.
 
     Example: triage tune export.parquet --loops loops.csv --loop LIC2107 --store store --out pictures
     """
@@ -130,7 +130,7 @@ def tune(asked: Asked, tag: str, store: Path | None, form: str, out: Path | None
 
 @main.command()
 def config() -> None:
-    """All limits with their defaults as TOML: what each decides, its unit and range, and what set it.
+    """All limits with their defaults as TOML: meaning, unit, range and source of each.
 
     Example: triage config > limits.toml; edit it; triage run export.parquet --config limits.toml --store store
     """

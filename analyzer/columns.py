@@ -1,4 +1,4 @@
-"""The columns of the results: declared once in columns.toml; rows, the store's types, lists and pages come from here.
+"""The columns of the results: declared once in columns.toml; rows, the store's types, lists and pages use them.
 
 `python docs/columns.py > docs/columns.md` prints them as a page of the documentation.
 """
@@ -19,7 +19,7 @@ Row = Mapping[str, Any]
 
 
 class Kind(StrEnum):
-    """What a column's cells hold; an empty cell is what is not known."""
+    """Contents of a column's cells; an empty cell means unknown."""
 
     TEXT = "text"
     NUMBER = "number"
@@ -30,9 +30,9 @@ class Kind(StrEnum):
 class Column:
     """One column of results.
 
-    name : as in store, CSV and JSON; kind : what its cells hold; title, unit : for people, unit '' for none; source :
-    what it comes from; meaning : one sentence; short : heading where there is little room, '' for the title itself;
-    hourly : whether the table of hours has it too.
+    name : as in store, CSV and JSON; kind : contents of its cells; title, unit : for people, unit '' for none; source
+    : its origin; meaning : one sentence; short : heading if there is little space, '' for the title itself; hourly :
+    whether the table of hours has it too.
     """
 
     name: str
@@ -51,12 +51,12 @@ class Column:
 
     @property
     def is_number(self) -> bool:
-        """Whether its cells hold numbers."""
+        """Whether its cells are numbers."""
         return self.kind is Kind.NUMBER
 
     @property
     def hint(self) -> str:
-        """What the column is, for who points at its heading."""
+        """Tooltip of the column's heading."""
         unit = f" [{self.unit}]" if self.unit else ""
         return f"{self.title}{unit}: {self.meaning}"
 
@@ -73,30 +73,30 @@ def _declared() -> dict[str, Table]:
 
 
 TABLES = _declared()
-"""All that are declared, by the name of what they are of."""
+"""All declared columns, by the name of their table."""
 RANKING = TABLES["ranking"]
 """The contract's columns in its order."""
 LISTED = TABLES["listed"]
-"""Columns that follow in CSV and JSON: facts of the plant, the units that settings stand in, the advice in full."""
+"""Further columns in CSV and JSON: facts of the plant, the units of settings, the full advice."""
 NOTED = TABLES["noted"]
-"""What `triage note` keeps, joined when a night is listed."""
+"""Columns from `triage note`, joined when a night is listed."""
 GROUP_LIST = TABLES["group_list"]
-"""Of a group, as `triage rank --groups` lists it."""
+"""Columns of a group in `triage rank --groups`."""
 NIGHTS = (*RANKING, *LISTED, *TABLES["stored"])
-"""Of the table of nights: a row a loop."""
+"""Columns of the table of nights: one row per loop."""
 BELIEVED = TABLES["believed"]
-"""Of a belief alone."""
+"""Columns only in a belief."""
 BY_NAME: Mapping[str, Column] = {c.name: c for c in (*NIGHTS, *BELIEVED)}
-"""What a loop's row may hold, with what beliefs add to it."""
+"""Possible columns of a loop's row, including those of beliefs."""
 _KEYS = (BY_NAME["loop"], BY_NAME["night"])
 HOURS = (*_KEYS, *TABLES["hour"], *(c for c in NIGHTS if c.hourly))
-"""Of the table of hours: a row a loop and hour."""
+"""Columns of the table of hours: one row per loop and hour."""
 EXPLAINED = (*_KEYS, *TABLES["explanation"])
-"""Of the table of explanations: a row a loop that was explained."""
+"""Columns of the table of explanations: one row per explained loop."""
 SETTINGS = (*_KEYS, *TABLES["compared"])
-"""Of the table of settings compared: a row a loop."""
+"""Columns of the table of compared settings: one row per loop."""
 GROUPS = (*_KEYS, *TABLES["group"])
-"""Of the table of groups: a row a loop and group."""
+"""Columns of the table of groups: one row per loop and group."""
 RESTING = tuple(
     BY_NAME[name]
     for name in (
@@ -105,9 +105,9 @@ RESTING = tuple(
         *("advice", "expected_period_s", "expected_pv_amplitude_pct", "reason", "lanes"),
     )
 )
-"""Columns of a night's row that rest on all nights: a belief states them anew."""
+"""Columns of a night's row based on all nights: a belief replaces them."""
 BELIEFS = (*_KEYS, *RESTING, *BELIEVED)
-"""Of the table of beliefs: a row a loop and night."""
+"""Columns of the table of beliefs: one row per loop and night."""
 
 
 def names(columns: Sequence[Column]) -> tuple[str, ...]:
@@ -116,8 +116,7 @@ def names(columns: Sequence[Column]) -> tuple[str, ...]:
 
 
 def row_of(values: Mapping[str, Any], columns: Sequence[Column] = NIGHTS) -> dict[str, Any]:
-    """A row with every column of a table, None where nothing is known. Raises ValueError for a value whose column is
-    declared nowhere."""
+    """A row with every column of a table, None if unknown. Raises ValueError for a value of an undeclared column."""
     empty: dict[str, Any] = dict.fromkeys(map(NAME, columns))
     unknown = sorted(values.keys() - empty.keys())
     if unknown:

@@ -1,4 +1,4 @@
-"""The limits of a run: limits.toml states them by section, a file changes them, `triage config` prints them."""
+"""The limits of a run: stated in limits.toml by section, changed by a file, printed by `triage config`."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ WIDTH = 100
 
 
 class OscillationLimits(Limits, section="oscillation"):
-    """When a peak of the spectrum is an oscillation."""
+    """Criteria of an oscillation in the spectrum."""
 
     def nearly(self) -> OscillationLimits:
-        """The limits of a cycle that another sign must confirm: half-cycles need not be like one another, for a valve
-        slips when OP has come far enough, whatever the time."""
+        """The limits for a cycle that needs further confirmation: half-cycles may differ, because a valve slips when
+        OP has moved far enough, at any time."""
         asked = ("shape", "shape_least", "swing", "swing_least")
         return replace(
             self,
@@ -48,62 +48,62 @@ class OscillationLimits(Limits, section="oscillation"):
 
 
 class QualityLimits(Limits, section="quality"):
-    """When samples or trends are unfit."""
+    """Criteria of unusable samples or trends."""
 
 
 class CauseLimits(Limits, section="cause"):
-    """When a cause is named."""
+    """Criteria of a cause."""
 
     def needed(self, count: int, excited: bool, oscillating: bool) -> float:
-        """Evidence that a valve's fault needs [nat]: a floor, and a share of the samples judged, for no model is
-        exact."""
+        """Evidence required for a valve fault [nat]: a minimum, and a share of the samples judged, because no model
+        is exact."""
         per_sample = self.evidence_per_sample * (1.0 if oscillating else self.quiet_factor)
         least = self.evidence if excited or oscillating else self.evidence_unexcited
         return max(least, per_sample * count)
 
 
 class PlantLimits(Limits, section="plant"):
-    """When loops share an oscillation, and where it starts."""
+    """Criteria of a common oscillation of loops, and of its source."""
 
 
 class SettingsLimits(Limits, section="settings"):
-    """When the settings that OP follows are not the stated ones."""
+    """Criteria of settings in OP that differ from the stated ones."""
 
 
 class AdviceLimits(Limits, section="advice"):
-    """What new settings and firm verdicts rest on at least."""
+    """Minimum evidence for new settings and firm verdicts."""
 
 
 class FigureLimits(Limits, section="figures"):
-    """What the assessments of a span leave out."""
+    """Samples that the assessments of a span leave out."""
 
 
 class LaneLimits(Limits, section="lanes"):
-    """From where on a loop stands in a lane."""
+    """Limits above which a loop is in a lane."""
 
 
 class NightLimits(Limits, section="nights"):
-    """How an export becomes nights, and which of two records of a loop is kept."""
+    """Division of an export into nights, and choice between two records of a loop."""
 
 
 class BeliefLimits(Limits, section="belief"):
-    """What nights together say of a loop, and from when on it is told."""
+    """Joint results of several nights on a loop, and when they are reported."""
 
 
 class WearLimits(Limits, section="wear"):
-    """When a valve wears, and how far that is carried on."""
+    """Criteria of a wearing valve, and extrapolation of its wear."""
 
 
 class ComparisonLimits(Limits, section="before_after"):
-    """When the spans before and after a change can be compared, and how sure a verdict is."""
+    """Comparability of the spans before and after a change, and the confidence of a verdict."""
 
 
 class ChangeLimits(Limits, section="changes"):
-    """When a change of a controller that nobody stated is offered."""
+    """When an unstated change of a controller is proposed."""
 
 
 class WorkerLimits(Limits, section="workers"):
-    """What one loop may cost before it is given up, so that the night goes on."""
+    """Limits of time and memory for one loop, after which the night goes on without it."""
 
 
 class OpeningLimits(Limits, section="opening"):
@@ -137,27 +137,27 @@ class Config:
 
     @property
     def explain(self) -> ExplainLimits:
-        """What decides about the explanation of one recording."""
+        """Limits for the explanation of one recording."""
         recorder, controller = self.explain_recorder, self.explain_controller
         return ExplainLimits(recorder, controller, self.explain_search, self.explain_proof)
 
 
 def read_config(path: Path | None) -> Config:
-    """The limits of a file, defaults where it is silent; the defaults alone without one. Raises InputError where the
-    file is not TOML, or has an unknown name, a wrong type or a value out of range."""
+    """The limits of a file, with defaults for missing ones; only the defaults without a file. Raises InputError if
+    the file is not TOML, or has an unknown name, a wrong type or a value out of range."""
     if path is None:
         return Config()
     try:
         stated = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (ValueError, RecursionError) as error:  # of the decoder, of the encoding, of numbers without end
+    except (ValueError, RecursionError) as error:  # of the decoder, of the encoding, of endless numbers
         remedy = "begin with what 'triage config' prints"
         raise InputError(f"{path}: {error}", "TOML in UTF-8", remedy) from error
     return configured(stated, str(path))
 
 
 def configured(stated: Mapping[str, Any], where: str) -> Config:
-    """The limits with those that are stated, by section and name, in place of the defaults. Raises InputError for an
-    unknown name, a wrong type or a value out of range."""
+    """The limits with the stated ones, by section and name, instead of the defaults. Raises InputError for an unknown
+    name, a wrong type or a value out of range."""
     config = Config()
     changed = {}
     for name, section in stated.items():
@@ -175,7 +175,7 @@ def _require_known(name: str, known: list[str], seen: str) -> None:
 
 
 def _section(limits: Any, stated: Mapping[str, Any], where: str) -> Any:
-    """A section's limits with those that are stated."""
+    """A section's limits with the stated ones."""
     known = {f.name: f for f in fields(limits)}
     values = {}
     for name, value in stated.items():
@@ -196,7 +196,7 @@ def _checked(field: Field[Any], default: Any, value: Any, where: str) -> Any:
 
 
 def _is_number(value: Any, said: Limit, whole: bool = False) -> bool:
-    """Whether a value is a number of the kind that is wanted, within its range."""
+    """Whether a value is a number of the required kind, within its range."""
     if isinstance(value, bool) or not isinstance(value, int if whole else (int, float)):
         return False
     return bool(said.least <= value <= said.most)  # false of NaN
@@ -214,7 +214,7 @@ def _rows_by_type(said: Limit, value: Any, where: str) -> tuple[tuple[str, float
 
 
 def limit_of(field: Field[Any]) -> Limit:
-    """What is declared of a field."""
+    """The declaration of a field."""
     said: Limit = field.metadata[KEY]
     return said
 

@@ -1,11 +1,11 @@
-"""Where the command `triage` begins: a program that cannot even be imported ends with a status of its own."""
+"""Entry point of the command `triage`: a program that cannot be imported ends with its own exit status."""
 
 from __future__ import annotations
 
 import sys
 
 NOTHING_DONE = 2
-"""Exit status of a program that could not start; Python's own would be 1, which says that a night is there."""
+"""Exit status of a program that could not start; Python's own would be 1, which means that a night was written."""
 
 
 def main() -> None:

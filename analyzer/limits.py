@@ -1,4 +1,4 @@
-"""The limits that no plant changes: limits.toml states them beside those of a run (analyzer/config.py)."""
+"""The limits that no plant changes: in limits.toml together with those of a run (analyzer/config.py)."""
 
 from __future__ import annotations
 
@@ -6,27 +6,27 @@ from identification.limits import Limits
 
 
 class HistoryLimits(Limits, section="history"):
-    """How exports are read: what their columns, clocks and names are known by, and what is too much to read."""
+    """Reading of exports: recognition of columns, clocks and names, and limits of size."""
 
 
 class FinderLimits(Limits, section="finder"):
-    """What tags must show before they are taken as a loop (analyzer/finder)."""
+    """Criteria of the data for a loop found among tags (analyzer/finder)."""
 
 
 class WaveLimits(Limits, section="waves"):
-    """What is kept of a loop's waves and moves, and when those of two loops can be compared: alike in all nights."""
+    """Stored oscillations and moves of a loop, and comparability of two loops: the same in all nights."""
 
 
 class LoopLimits(Limits, section="loop"):
-    """How the record of one loop is read, and which of its signs are told."""
+    """Reading of one loop's record, and which of its signs are reported."""
 
 
 class ExplainingLimits(Limits, section="explain"):
-    """Which part of a recording is explained, and which models are tried on it."""
+    """Which part of a recording is explained, and which models are tried."""
 
 
 class StoreLimits(Limits, section="store"):
-    """When another run is at work on a store, and when what it left is dead."""
+    """When another run on a store is active, and when its leftovers are dead."""
 
 
 class ClusterLimits(Limits, section="cluster"):
@@ -38,7 +38,7 @@ class StorageLimits(Limits, section="storage"):
 
 
 class PageLimits(Limits, section="pages"):
-    """How much pages tell."""
+    """Amount of information on pages."""
 
 
 HISTORY, FINDER, WAVES, LOOP = HistoryLimits(), FinderLimits(), WaveLimits(), LoopLimits()

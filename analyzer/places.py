@@ -1,7 +1,7 @@
-"""Where exports and stores lie: in a directory, or on shared storage that a URL names (s3://, gs://, abfs:// ...).
+"""Locations of exports and stores: a directory, or shared storage with a URL (s3://, gs://, abfs:// ...).
 
 A URL becomes a path object with the methods of pathlib (universal_pathlib over fsspec); credentials and endpoint come
-from where the storage's own library looks for them, such as AWS_ENDPOINT_URL.
+from the sources of the storage's own library, such as AWS_ENDPOINT_URL.
 """
 
 from __future__ import annotations
@@ -23,37 +23,37 @@ from analyzer.limits import STORAGE
 from identification.errors import InputError, NotNowError
 
 URL = re.compile(r"[a-z][a-z0-9+.-]+://", re.IGNORECASE)
-"""How a URL begins; a drive letter is no scheme."""
+"""Beginning of a URL; a drive letter is no scheme."""
 LIBRARIES = frozenset({"botocore", "aiobotocore", "aiohttp", "s3fs", "gcsfs", "adlfs", "azure", "google"})
-"""Packages whose errors say what shared storage refuses."""
+"""Packages whose errors mean a refusal by shared storage."""
 OPTIONS: Mapping[str, dict[str, Any]] = {
     scheme: {"config_kwargs": {"retries": {"max_attempts": 0}}} for scheme in ("s3", "s3a")
 }
-"""What kinds of storage are told: requests are made again here, and not by the library below as well."""
+"""Options for kinds of storage: requests are repeated here, and not by the library below as well."""
 PASSING = frozenset(
     getattr(errno, name)
     for name in ("EBUSY", "EIO", "EREMOTEIO", "EAGAIN", "EHOSTUNREACH", "ENETUNREACH", "EPIPE")
     if hasattr(errno, name)
 )
-"""What the libraries of storage make of an answer such as 503."""
+"""Errors of storage libraries for a response such as 503."""
 UNREACHED = frozenset(
     {"EndpointConnectionError", "ConnectTimeoutError", "ReadTimeoutError", "ConnectionClosedError"}
     | {"ClientConnectorError", "ServerDisconnectedError", "ClientPayloadError", "FSTimeoutError"}
 )
-"""Errors of storage that did not answer, by name: its packages may not be installed."""
+"""Errors of storage that did not respond, by name: its packages may not be installed."""
 AT_ONCE = 8
-"""Requests of shared storage at one time."""
+"""Simultaneous requests to shared storage."""
 T = TypeVar("T")
 NEEDED = "pip install 'loop-triage[remote]', and for other storage than s3 the fsspec package of that storage"
 
 
 class OutageError(InputError):
-    """Shared storage did not answer, or was busy, for minutes: it may answer again."""
+    """Shared storage did not respond, or was busy, for minutes: it may respond later."""
 
 
 def place(text: str) -> Path:
-    """A path of this machine, or of shared storage where the text is a URL. Raises InputError for a URL of storage
-    for which no package is installed."""
+    """A path of this machine, or of shared storage if the text is a URL. Raises InputError for a URL of storage
+    without an installed package."""
     if not URL.match(text):
         return Path(text)
     if urlsplit(text).scheme == "file":
@@ -70,8 +70,8 @@ def place(text: str) -> Path:
 
 
 def be_patient(path: Path) -> None:
-    """Let this process ask shared storage again, with growing waits, where it fails for a while; nothing for a path
-    of this machine. A worker does so before it reads or writes."""
+    """Let this process repeat requests to shared storage, with growing delays, if it fails temporarily; no effect for
+    a local path. A worker calls this before it reads or writes."""
     if not is_remote(path) or cast(Any, path).protocol not in ("s3", "s3a"):
         return
     import s3fs.core
@@ -79,7 +79,7 @@ def be_patient(path: Path) -> None:
     s3fs.core.S3FileSystem.retries = STORAGE.tries
     if hasattr(s3fs.core, "set_custom_error_handler"):
         s3fs.core.set_custom_error_handler(is_outage)
-    logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # of requests in hand when a run ends
+    logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # of unfinished requests when a run ends
 
 
 def is_remote(path: Path) -> bool:
@@ -88,22 +88,22 @@ def is_remote(path: Path) -> bool:
 
 
 def refused(error: Exception) -> bool:
-    """Whether an error is one of shared storage: no credentials, no such bucket, nobody at the endpoint."""
+    """Whether an error is a refusal by shared storage: no credentials, no such bucket, no server at the endpoint."""
     return type(error).__module__.split(".")[0] in LIBRARIES
 
 
 def is_passing(error: BaseException) -> bool:
-    """Whether an error says nothing of what a file holds: system or storage did not hand it out, or memory ended."""
+    """Whether an error says nothing about the contents of a file: an error of the system or storage, or of memory."""
     if isinstance(error, IsADirectoryError | NotADirectoryError):
         return False
-    if type(error) is OSError and error.errno is None:  # what Parquet finds wrong with a file
+    if type(error) is OSError and error.errno is None:  # raised by Parquet for a file's contents
         return False
     return isinstance(error, MemoryError | OSError) or (isinstance(error, Exception) and refused(error))
 
 
 def is_outage(error: BaseException | None) -> bool:
-    """Whether an error, or what caused it, is one of shared storage that may answer again: it is busy, broken down or
-    not to be reached. What it refuses, for want of a right or of an object, it will refuse again."""
+    """Whether an error, or its cause, is a temporary one of shared storage: it is busy, failed or unreachable. A
+    refusal, for a missing right or object, is permanent."""
     if error is None or isinstance(error, PermissionError | FileNotFoundError | FileExistsError):
         return False
     if isinstance(error, OutageError) or type(error).__name__ in UNREACHED:
@@ -118,7 +118,7 @@ def is_outage(error: BaseException | None) -> bool:
 
 
 def not_now(path: Path, error: BaseException) -> NotNowError:
-    """What is said of a file that cannot be read at this time, and is not known to be damaged."""
+    """Error for a file that cannot be read now, and is not known to be damaged."""
     why = " ".join(str(error).split())[:200] or type(error).__name__
     do = "look at endpoint and credentials" if is_remote(path) else "make it readable"
     return NotNowError(
@@ -128,7 +128,7 @@ def not_now(path: Path, error: BaseException) -> NotNowError:
 
 
 def remove_tree(path: Path) -> None:
-    """Delete a directory and all in it, as far as that can be done; nothing where there is none."""
+    """Delete a directory and its contents as far as possible; no effect if there is none."""
     if not is_remote(path):
         shutil.rmtree(path, ignore_errors=True)
         return
@@ -138,8 +138,8 @@ def remove_tree(path: Path) -> None:
 
 
 def each(function: Callable[..., T], paths: Sequence[Path], *beside: Iterable[Any]) -> list[T]:
-    """What a function gives for each of some paths, and what stands beside each; at once where they are of shared
-    storage, which answers many requests as fast as one. The first error is raised."""
+    """Results of a function for each of some paths, and for further arguments; in parallel for shared storage, which
+    answers many requests as fast as one. The first error is raised."""
     if len(paths) < 2 or not is_remote(paths[0]):
         return list(map(function, paths, *beside))
     with ThreadPoolExecutor(AT_ONCE) as pool:
@@ -147,7 +147,7 @@ def each(function: Callable[..., T], paths: Sequence[Path], *beside: Iterable[An
 
 
 def afresh(path: Path) -> Path:
-    """A path of which nothing is known from before: other processes write to shared storage, too."""
+    """A path without cached information, because other processes also write to shared storage."""
     if is_remote(path):
         remote: Any = path
         remote.fs.invalidate_cache(remote.path)
@@ -155,10 +155,10 @@ def afresh(path: Path) -> Path:
 
 
 def content(path: Path) -> bytes:
-    """What a small file holds now.
+    """The present contents of a small file.
 
-    One of shared storage is asked for in one request: it may be written anew while it is read. Raises
-    FileNotFoundError where there is none.
+    An object of shared storage is read in one request, because it may be rewritten meanwhile. Raises
+    FileNotFoundError if there is none.
     """
     if not is_remote(path):
         return path.read_bytes()
@@ -167,7 +167,7 @@ def content(path: Path) -> bytes:
 
 
 def is_whole(path: Path) -> bool:
-    """Whether shared storage hands out all of an object: twice the same bytes, as many as it states."""
+    """Whether shared storage returns a complete object: twice the same bytes, as many as stated."""
     remote: Any = path
     try:
         held, again = content(path), content(path)
@@ -179,8 +179,8 @@ def is_whole(path: Path) -> bool:
 
 
 def at_hand(paths: Sequence[Path], into: Path) -> tuple[list[Path], dict[Path, str]]:
-    """Paths of this machine, and from which URL each file among them was copied into a directory, each with its own
-    name. Raises InputError where there is nothing at a URL."""
+    """Local paths, and the URL from which each file among them was copied into a directory, each with its own name.
+    Raises InputError if there is nothing at a URL."""
     found: list[Path] = []
     origins: dict[Path, str] = {}
     for path in paths:
@@ -199,8 +199,8 @@ def at_hand(paths: Sequence[Path], into: Path) -> tuple[list[Path], dict[Path, s
 
 @contextmanager
 def answering(url: Path) -> Iterator[None]:
-    """What shared storage refuses as one line with the URL that was asked for. Raises InputError where it refuses, or
-    nobody answers there."""
+    """Convert a refusal of shared storage to one line with the URL. Raises InputError if it refuses, or no server
+    responds."""
     try:
         yield
     except Exception as error:
@@ -214,14 +214,14 @@ def answering(url: Path) -> Iterator[None]:
 
 
 def _files(path: Path, copied: Path) -> list[tuple[Path, Path]]:
-    """The files at a URL, itself or those under it, and where each goes."""
+    """The files at a URL, itself or those under it, and their destinations."""
     if path.is_file():
         return [(path, copied)]
     root = str(path).rstrip("/") + "/"
     found = [(p, copied / PurePosixPath(str(p).removeprefix(root))) for p in path.rglob("*") if p.is_file()]
     if not found:
         raise InputError(f"{path}: nothing there", "a file or a folder of exports", "correct the URL")
-    for url, local in found:  # objects may be named as no file can be, or as one outside the copies
+    for url, local in found:  # names of objects may be invalid for files, or point outside the copies
         if not local.resolve().is_relative_to(copied.resolve()):
             seen = f"{url}: a name that leads out of its folder"
             raise InputError(seen, "names without ..", "rename the object")
@@ -229,7 +229,7 @@ def _files(path: Path, copied: Path) -> list[tuple[Path, Path]]:
 
 
 def _copy(url: Path, local: Path) -> None:
-    """One file, whole or not at all, and of one state of the object."""
+    """Copy one file, completely or not at all, in one state of the object."""
     before = _state(url)
     local.parent.mkdir(parents=True, exist_ok=True)
     begun = local.with_name(f".{local.name}.{secrets.token_hex(8)}.tmp")
@@ -245,7 +245,7 @@ def _copy(url: Path, local: Path) -> None:
 
 
 def _state(url: Any) -> tuple[object, ...]:
-    """By what a state of an object is known."""
+    """Identification of a state of an object."""
     known = afresh(url).fs.info(url.path)  # type: ignore[attr-defined]
     return tuple(
         str(known.get(name)) for name in ("size", "ETag", "etag", "LastModified", "mtime", "generation")
@@ -253,7 +253,7 @@ def _state(url: Any) -> tuple[object, ...]:
 
 
 def bring(path: Path, origins: Mapping[Path, str]) -> None:
-    """Copy a file anew that this machine has not: a worker of a cluster has none of what was copied elsewhere."""
+    """Copy a file missing on this machine: a worker of a cluster has none of the copies made elsewhere."""
     if path in origins and not path.exists():
         made = path.parent
         _copy(place(origins[path]), path)

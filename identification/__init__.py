@@ -1,4 +1,4 @@
-"""What a loop is, how it behaves, how it is found from its trends. Imports none of the other packages."""
+"""Loop models, their simulation, and their identification from trends. Imports none of the other packages."""
 
 import atexit
 import contextlib
@@ -10,14 +10,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 KERNELS = "NUMBA_CACHE_DIR"
-"""Where numba keeps compiled kernels."""
+"""Environment variable for numba's folder of compiled kernels."""
 
 
 def _name_of_kernels() -> str:
-    """The folder of the kernels of this state of the sources and of their limits, which are kept apart.
+    """The folder for the kernels of this state of the sources and of their limits.
 
-    numba keeps a kernel until its own file changes, though another kernel that it calls may have changed or gone:
-    after an update in place every loop would fail, or be judged by old code.
+    numba keeps a kernel until its own file changes, although another kernel that it calls may have changed or been
+    removed: after an update in place every loop would fail, or be analysed by old code.
     """
     here = Path(__file__).parent
     sources = [*sorted(here.rglob("*.py")), here / "limits.toml"]
@@ -27,8 +27,8 @@ def _name_of_kernels() -> str:
 
 
 def _places() -> Iterator[Path]:
-    """Where kernels may be kept, the best first: as stated, beside the code, where a service or a user keeps what is
-    made again when it is lost."""
+    """Possible folders for kernels, best first: as configured, beside the code, and the cache folder of a service or
+    user."""
     if stated := os.environ.get(KERNELS):
         yield Path(stated).parent if Path(stated).name.startswith("kernels-") else Path(stated)
     yield Path(__file__).parent / "__pycache__"
@@ -48,10 +48,10 @@ def _is_writable(folder: Path) -> bool:
 
 
 def _keep_kernels() -> None:
-    """Give numba a folder that can be written: without one, the import of a kernel is an error.
+    """Give numba a writable folder: without one, the import of a kernel is an error.
 
-    Beside the code or elsewhere; the last resort is a folder that goes with this process. What was compiled at
-    installation is copied there. Where no folder can be made, kernels are compiled and not kept.
+    The folder is beside the code or elsewhere; the last resort is a temporary folder of this process. Kernels
+    compiled at installation are copied there. If no folder can be made, kernels are compiled and not kept.
     """
     name, beside = _name_of_kernels(), Path(__file__).parent / "__pycache__"
     place = next(filter(_is_writable, _places()), None)

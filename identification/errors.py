@@ -1,6 +1,6 @@
-"""What may fail, said once.
+"""The errors of the project.
 
-Every error that reaches a user says what was seen, what was expected and what to do about it.
+Every error shown to a user names what was seen, what was expected and what to do.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ class TriageError(Exception):
 class InputError(TriageError):
     """An export, a loops.csv or an option cannot be used as it is.
 
-    seen : what was found, with file, tag, column and row where they are known; expected : what would have been
-    usable; remedy : what the user can do.
+    seen : what was found, with file, tag, column and row if known; expected : what would have been usable; remedy :
+    what the user can do.
     """
 
     def __init__(self, seen: str, expected: str, remedy: str) -> None:
@@ -22,14 +22,14 @@ class InputError(TriageError):
         super().__init__(f"{seen}; expected {expected}; {remedy}")
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str]]:
-        """How it travels between processes: by what it was made of."""
+        """Pickling between processes: by the constructor's arguments."""
         return type(self), (self.seen, self.expected, self.remedy)
 
 
 class NotNowError(TriageError):
-    """A file or a storage cannot be read or written at this time, and nothing says that it is damaged: the same
-    command may succeed later."""
+    """A file or a storage cannot be read or written now, without evidence of damage: the same command may succeed
+    later."""
 
 
 class NotAssessedError(TriageError):
-    """A question cannot be answered from this record; the text says what it needs and what it has."""
+    """A question cannot be answered from this record; the text gives what it needs and what it has."""

@@ -1,4 +1,4 @@
-"""Numbers that decide something: limits.toml of each package states them, here they become typed tables."""
+"""Thresholds: limits.toml of each package states them; this module makes typed tables of them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ KEY = "limit"
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """What is said of a number: unit ('-' for none), least and greatest value, meaning, and who or what set it."""
+    """Description of a number: unit ('-' for none), least and greatest value, meaning, and source."""
 
     unit: str
     least: float
@@ -32,7 +32,7 @@ def _stated(package: str) -> Mapping[str, Any]:
 class Limits:
     """A frozen dataclass whose fields are a section of limits.toml of the package in which it is declared.
 
-    The section states each field's value, and what `Limit` says of it; types for mypy: .ci/limits_types.py.
+    The section states each field's value and its `Limit`; types for mypy: .ci/limits_types.py.
     """
 
     def __init_subclass__(cls, section: str) -> None:
@@ -51,35 +51,35 @@ def _value(stated: Any) -> Any:
 
 
 class FitLimits(Limits, section="fit"):
-    """Where fits of a process behind a valve begin, how far they are followed, and what one must gain on another."""
+    """Fits of a process behind a valve: starts, length of the descent, and required gain of one fit over another."""
 
 
 class SlipLimits(Limits, section="slips"):
-    """The search for a stem whose slips scatter."""
+    """The search for a stem with irregular slips."""
 
 
 class StemLimits(Limits, section="stem"):
-    """What a recorded stem shows of its valve."""
+    """Valve identification from a recorded stem position."""
 
 
 class IntervalLimits(Limits, section="intervals"):
-    """How wide the intervals of identified constants are told."""
+    """Width of the intervals of identified constants."""
 
 
 class RecorderLimits(Limits, section="recorder"):
-    """What a recorder did to the trends before anyone saw them: lines, steps, ends, stamps."""
+    """Effects of a recorder on the trends: lines, steps, ends, stamps."""
 
 
 class ControllerLimits(Limits, section="controller"):
-    """Whether the stated controller gives OP from SP and PV: settings, clock, gap and logic."""
+    """Whether the stated controller reproduces OP from SP and PV: settings, clock, gap and logic."""
 
 
 class SearchLimits(Limits, section="search"):
-    """Which effects explain a recording: what one has to gain, and how far candidates are followed."""
+    """Which effects explain a recording: the required gain of an effect, and how far candidates are followed."""
 
     @property
     def one_constant(self) -> float:
-        """Gain that an effect of one constant has to bring [nat]."""
+        """Required gain of an effect with one constant [nat]."""
         return self.search_penalty + self.parameter_penalty
 
 
@@ -88,40 +88,40 @@ class ProofLimits(Limits, section="proof"):
 
 
 class LawLimits(Limits, section="law"):
-    """What a record tells of a controller's law, by OP's increments."""
+    """Identification of a controller's law from OP's increments."""
 
 
 class LocationLimits(Limits, section="location"):
-    """Where a misfit is said to live: features, chance and spans."""
+    """Location of a misfit: features, p-values and spans."""
 
 
 class ReferenceLimits(Limits, section="reference"):
-    """What the most flexible model may go with, that has no name for it."""
+    """Influences in the most flexible model, which has no names for them."""
 
 
 class FrictionLimits(Limits, section="friction"):
-    """Where stems that stick are sought for an explanation, and how long one holds its place."""
+    """Starts of sticking valves in an explanation, and how long a stem keeps its position."""
 
 
 class SmoothLimits(Limits, section="smooth"):
-    """How a process is fitted under a load that is smooth, and under one that has a line."""
+    """Fit of a process under a smooth load, and under a load with a line."""
 
 
 class StartLimits(Limits, section="starts"):
-    """Where effects begin that are found by what the plain loop leaves."""
+    """Starts of effects that are found from the residual of the baseline model."""
 
 
 class SignalLimits(Limits, section="signals"):
-    """How spectra, cycles and correlations are read, and what of noise is an outlier."""
+    """Spectra, cycles and correlations, and outliers of noise."""
 
 
 class ExperimentLimits(Limits, section="experiments"):
-    """How experiments are found in a record, and how each is fitted over its answer."""
+    """Detection of experiments in a record, and the fit of each over its response."""
 
 
 @dataclass(frozen=True, slots=True)
 class ExplainLimits:
-    """What decides about recorder, controller, effects and their proof."""
+    """Thresholds for recorder, controller, effects and their proof."""
 
     recorder: RecorderLimits = field(default_factory=RecorderLimits)
     controller: ControllerLimits = field(default_factory=ControllerLimits)
@@ -130,9 +130,9 @@ class ExplainLimits:
 
 
 LIMITS = ExplainLimits()
-"""The limits where none are given."""
+"""The default limits."""
 FIT, SLIPS, STEM, INTERVALS = FitLimits(), SlipLimits(), StemLimits(), IntervalLimits()
 LAW, LOCATION, REFERENCE, SIGNALS = LawLimits(), LocationLimits(), ReferenceLimits(), SignalLimits()
 FRICTION, STARTS, SMOOTH = FrictionLimits(), StartLimits(), SmoothLimits()
 EXPERIMENTS = ExperimentLimits()
-"""Numbers of a method, the same for every plant: no plant has reasons of its own to change them."""
+"""Numbers of a method, the same for every plant: no plant has a reason to change them."""

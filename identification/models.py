@@ -1,4 +1,4 @@
-"""What a loop is made of: process, valve, controller, and the estimate of a number.
+"""The parts of a loop: process, valve, controller; and the estimate of a number.
 
 Units inside the project: seconds, percent of PV span, percent of OP span. Gains are % PV per % OP.
 Signs: P and I act on e = SP - PV; kp > 0 means that OP falls when PV rises.
@@ -37,7 +37,7 @@ class Fopdt:
 
     @property
     def slope(self) -> float:
-        """Gain over time constant [% PV / (% OP s)]: the integrator that the process is at high frequency."""
+        """Gain over time constant [% PV / (% OP s)]: the equivalent integrator at high frequency."""
         return self.gain / self.time_constant_s
 
 
@@ -53,30 +53,29 @@ Process = Fopdt | Integrator
 
 
 class Motion(StrEnum):
-    """What a stem does once it has let go."""
+    """Motion of a stem after it starts to slip."""
 
     RESTS = "rests"
     """It rests again at once (He, Wang, Pottmann, Qin 2007)."""
     HALTS = "halts"
-    """It follows OP until OP turns or stands still (Kano 2004); dry friction does so too."""
+    """It follows OP until OP reverses or stops (Kano 2004); also true of dry friction."""
     SLIDES = "slides"
-    """It follows OP until OP turns (Choudhury, Thornhill, Shah 2005)."""
+    """It follows OP until OP reverses (Choudhury, Thornhill, Shah 2005)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Backlash:
-    """Play of full width `width` [% OP] (d of the describing function is half of it)."""
+    """Backlash of full width `width` [% OP] (d of the describing function is half of it)."""
 
     width: float
 
 
 @dataclass(frozen=True, slots=True)
 class Stiction:
-    """Two-parameter stick-slip: stickband S [% OP] on reversal, slip jump J [% OP] when it lets go.
+    """Two-parameter stick-slip: stickband S [% OP] on reversal, slip jump J [% OP] at the start of a slip.
 
-    S is the whole of the travel that OP needs after a reversal before the stem moves (deadband plus
-    stickband); 0 <= J <= S in what is met in plants, J = 0 being backlash (Choudhury, Thornhill, Shah 2005).
-    After a jump the stem does as `motion` says.
+    S is the total travel of OP after a reversal before the stem moves (deadband plus stickband); 0 <= J <= S in
+    plants, J = 0 is backlash (Choudhury, Thornhill, Shah 2005). `motion` determines the motion after a jump.
     """
 
     stickband: float
@@ -96,7 +95,7 @@ class Form(StrEnum):
 
 
 class ErrorForm(StrEnum):
-    """What of the error a controller acts on."""
+    """The part of the error on which a controller acts."""
 
     LINEAR = "linear"
     SQUARED = "squared"
@@ -105,15 +104,15 @@ class ErrorForm(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Pid:
-    """A PID controller in percent of spans and seconds, ideal form, as simulation/pi.py steps it.
+    """A PID controller in percent of spans and seconds, ideal form, as simulated by simulation/pi.py.
 
-    kp [% OP / % PV] (negative: direct acting; 0: integral alone, whose ti_s is then % PV s per % OP, negative where
-    it is direct acting), ti_s [s] (inf or 0: no integral), td_s [s], scan_s [s] the period at which it computes
-    (0: continuous), op_lo and op_hi [% OP] its output limits. td_filter : N of the derivative's filter, whose time
-    constant is Td / N (0 or inf: none). pv_filter_s : time constant of the filter of PV before the law [s]. gap :
-    size of the error [% PV] inside of which the gain is gap_gain times the gain outside [-]; the law has no jump at
-    its edge. error_form : as above. op_rate : most that OP moves [% OP/s] (inf or 0: no limit). sp_weight and
-    td_sp_weight : what gain and derivative take of the set point's moves [-].
+    kp [% OP / % PV] (negative: direct acting; 0: integral only, whose ti_s is then % PV s per % OP, negative where it
+    is direct acting), ti_s [s] (inf or 0: no integral), td_s [s], scan_s [s] the scan period (0: continuous), op_lo
+    and op_hi [% OP] its output limits. td_filter : N of the derivative's filter, whose time constant is Td / N (0 or
+    inf: none). pv_filter_s : time constant of the filter of PV before the law [s]. gap : size of the error [% PV]
+    inside which the gain is gap_gain times the gain outside [-]; the law has no jump at its edge. error_form : as
+    above. op_rate : largest rate of OP [% OP/s] (inf or 0: no limit). sp_weight and td_sp_weight : set point weights
+    of gain and derivative [-].
     """
 
     kp: float

@@ -1,4 +1,4 @@
-"""One loop's trends on one clock: the type that plants deliver and that the simulator returns."""
+"""Trends of one loop on one clock: the same type for plant data and for the simulator."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class LoopRecord:
     sp, pv : set point and process value [% of PV span]; op : controller output [% of OP span]; bad : True where a
     sample must not be used (gap, bad quality), values there are filled, never NaN; position : stem position [% of OP
     span] where recorded; sp_estimated : whether no SP was recorded and one was estimated from PV; masks : True where
-    the named thing happens: gap, stale, compressed, quantized, saturated, manual, idle; feed : what acts on OP beside
-    the error, in its own unit, where stated and recorded.
+    the named thing happens: gap, stale, compressed, quantized, saturated, manual, idle; feed : feedforward signal of
+    OP, in its own unit, where stated and recorded.
     """
 
     tag: str
@@ -51,12 +51,12 @@ class LoopRecord:
 
     @property
     def at_work(self) -> Mask:
-        """True where a sample is good and no other one has the loop's valve, in manual too, shape (n,)."""
+        """True where a sample is good and no other loop has the valve, in manual too, shape (n,)."""
         return ~(self.bad | self.mask("idle"))
 
     @property
     def usable(self) -> Mask:
-        """True where a sample is good and the loop at work in automatic, shape (n,)."""
+        """True where a sample is good and the loop active in automatic, shape (n,)."""
         return self.at_work & ~self.mask("manual")
 
     @property
@@ -70,14 +70,14 @@ class LoopRecord:
         return self.pv.size * self.dt_s
 
     def mask(self, name: str) -> Mask:
-        """The named mask, all False where it was never set; shape (n,)."""
+        """The named mask, all False if it was never set; shape (n,)."""
         found = self.masks.get(name)
         return np.zeros(self.pv.size, dtype=bool) if found is None else found
 
     def thinned(self, factor: int) -> LoopRecord:
-        """Every so-manieth sample, with OP's mean until the next, which drives the process meanwhile.
+        """Every `factor`-th sample, with OP's mean until the next, which drives the process meanwhile.
 
-        A sample is bad, or a named thing happens at it, where that is so of any until the next.
+        A sample is bad, or a named thing happens at it, if that is true of any sample until the next.
         """
         n = self.pv.size // factor * factor
 
@@ -94,7 +94,7 @@ class LoopRecord:
         return replace(kept, start_s=self.start_s + max(first, 0) * self.dt_s)
 
     def _each(self, trend: Callable[[Floats], Floats], mask: Callable[[Mask], Mask]) -> LoopRecord:
-        """The record with each trend, and each mask, as a function leaves it."""
+        """The record with a function applied to each trend, and another to each mask."""
         return replace(
             self,
             sp=trend(self.sp),

@@ -1,1 +1,1 @@
-"""Pages in, text out: HTML, Markdown and charts. Imports none of the other packages."""
+"""Rendering of pages as text: HTML, Markdown and charts. Imports none of the other packages."""

@@ -1,4 +1,4 @@
-"""Pages written into a folder: HTML or Markdown, assets once, a CSV of every table."""
+"""Writing of pages to a folder: HTML or Markdown, shared assets, a CSV file of every table."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from reports.whole_file import whole_file
 
 
 def write_text(path: Path, text: str) -> Path:
-    """Write a file so that a reader sees all of it or the one before."""
+    """Write a file atomically: a reader sees either the new file or the previous one."""
     with whole_file(path) as temporary:
         temporary.write_text(text, "utf-8", newline="\n")
     return path
 
 
 WRITTEN = "pages.json"
-"""Where a folder keeps the names of the pages that were written into it."""
+"""File in a folder with the names of the pages written there."""
 
 
 def forget_stale(out: Path, names: Sequence[str], kept_names: Collection[str] = ()) -> list[str]:
-    """Delete pages that an earlier writing left in a folder, but for the files that this one wrote (`names`) or that
-    stay all the same; nothing else is touched."""
+    """Delete pages of an earlier run from a folder, except the files of this run (`names`) and `kept_names`; no other
+    file is deleted."""
     try:
         before = json.loads((out / WRITTEN).read_text("utf-8"))
     except (OSError, ValueError):
@@ -40,7 +40,7 @@ def forget_stale(out: Path, names: Sequence[str], kept_names: Collection[str] = 
 
 
 def _forget_tables(folder: Path, stale: Collection[str], kept: Collection[str]) -> None:
-    """Delete the tables of stale pages; of names that begin alike a table is that of the longest."""
+    """Delete the tables of stale pages; a table belongs to the page with the longest matching name."""
     for table in sorted(folder.glob("*.csv")) if stale else ():
         owners = [s for s in (*stale, *kept) if table.name[: len(s) + 1] == f"{s}-"]
         if owners and max(owners, key=len) in stale:
@@ -48,12 +48,12 @@ def _forget_tables(folder: Path, stale: Collection[str], kept: Collection[str]) 
 
 
 def write_csv(page: Page, out: Path) -> list[Path]:
-    """A CSV of every table of a page, in `out`/csv."""
+    """Write a CSV file of every table of a page to `out`/csv."""
     return [write_text(out / "csv" / f"{page.name}-{t.name}.csv", as_csv(t)) for t in page.tables()]
 
 
 def write_html(pages: Iterable[Page], out: Path, single_file: bool = False) -> list[Path]:
-    """Pages as HTML; their assets beside them unless each is to be one file."""
+    """Write pages as HTML, with shared assets in the folder unless each page is a single file."""
     if not single_file:
         for name in (*html.ASSETS, html.LICENCE):
             write_text(out / "assets" / name, html.asset(name))
@@ -61,7 +61,7 @@ def write_html(pages: Iterable[Page], out: Path, single_file: bool = False) -> l
 
 
 def write_markdown(pages: Iterable[Page], out: Path) -> list[Path]:
-    """Pages as Markdown with their pictures in a folder of the page's name."""
+    """Write pages as Markdown, with their pictures in a folder of the page's name."""
     written = []
     for page in pages:
         folder = f"{page.name}-pictures"

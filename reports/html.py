@@ -1,7 +1,7 @@
-"""Pages as HTML: self-contained or with shared assets, no request to any network.
+"""Pages as HTML: self-contained or with shared assets, without network requests.
 
-Templates place what is prepared here and compute nothing. Every text is escaped by jinja2; what is marked as
-safe is drawn in reports.pictures, which escapes its texts itself.
+Templates place prepared values and compute nothing. Every text is escaped by jinja2; texts marked as safe are drawn
+by reports.pictures, which escapes them itself.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from reports.texts import visible_parts
 ASSETS = ("page.css", "uPlot.min.css", "uPlot.iife.min.js", "page.js", "what_if.js")
 LICENCE = "uPlot.LICENSE.txt"
 FINE_S = 1e-3
-"""Step of times that are no whole seconds [s]."""
+"""Resolution of times that are not whole seconds [s]."""
 MISSING = MOST_LEVEL + 1
-"""Code of a bucket that is not shown."""
+"""Code of a bucket without a value."""
 
 
 def _coded(values: Floats, gap: np.ndarray) -> dict[str, object]:
@@ -40,7 +40,7 @@ def _coded(values: Floats, gap: np.ndarray) -> dict[str, object]:
 
 
 def trend_data(trend: Trend) -> Markup:
-    """A trend as JSON for the page's script; '<' is written as an escape, so that no text ends the script."""
+    """A trend as JSON for the page's script; '<' is escaped, so that no text can end the script."""
     start = float(trend.time_s[0]) if trend.time_s.size else 0.0
     passed = trend.time_s - start
     tick = 1.0 if np.abs(passed - np.round(passed)).max(initial=0.0) < FINE_S else FINE_S
@@ -71,12 +71,12 @@ def what_if_data(block: WhatIf) -> Markup:
 
 
 def _for_script(data: dict[str, object]) -> Markup:
-    """JSON of which no text can end the script that holds it."""
+    """JSON in which no text can end the script."""
     return Markup(json.dumps(data).replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
 
 
 def sort_key(cell: Cell) -> str:
-    """What a column is sorted by: the full number; '' where the text itself is."""
+    """Sort key of a cell: the full number; '' where the text itself is the key."""
     return "" if cell.number is None else f"{cell.number:.10g}"
 
 
@@ -91,7 +91,7 @@ def _environment() -> Environment:
 
 
 def policy(single_file: bool) -> str:
-    """The content security policy: nothing from outside, no inline code but that of this page."""
+    """The content security policy: no external resources, no inline code except that of this page."""
     scripts = styles = "'self' file:"
     if single_file:
         digests = {name: hashlib.sha256(asset(name).encode()).digest() for name in ASSETS}
@@ -102,12 +102,12 @@ def policy(single_file: bool) -> str:
 
 
 def render(page: Page, single_file: bool = False) -> str:
-    """A page as HTML; style and scripts are written into a `single_file`, else it asks for them in assets/."""
+    """A page as HTML; style and scripts are included in a `single_file`, otherwise loaded from assets/."""
     inlined = {a: Markup(asset(a)) for a in ASSETS} if single_file else {}
     parts = {"policy": Markup(policy(single_file)), "single_file": single_file, "inlined": inlined}
     return _environment().get_template("page.html.j2").render(page=visible_parts(page), **parts)
 
 
 def mail(page: Page) -> str:
-    """A page's texts, lists and tables as one small mail: no scripts, no pictures, nothing asked of any network."""
+    """A page's texts, lists and tables as one small mail: no scripts, no pictures, no network requests."""
     return _environment().get_template("mail.html.j2").render(page=visible_parts(page))

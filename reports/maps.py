@@ -13,23 +13,23 @@ from reports import svg
 from reports.pages import Field, Floats, Graph, HeatMap, Node, Tile, TreeMap
 
 NAMES, WIDTH, ROW, FOOT = 120.0, 640.0, 20.0, 44.0
-"""Of a colour map: room for names, width of the map, height of a row, room below for the axis."""
+"""Layout of a colour map: space for names, width of the map, height of a row, space below for the axis."""
 FIELD = (62.0, 420.0, 270.0, 40.0)
-"""Of a field: room for the vertical axis, width, height, room below for the other axis."""
+"""Layout of a field: space for the vertical axis, width, height, space below for the other axis."""
 TITLED = 16.0
-"""How far down from the top a field's vertical axis has its name, where no long figure stands."""
+"""Vertical position of the name of a field's vertical axis, above the figures."""
 FAINT = 0.12
-"""Opacity of a field's least value."""
+"""Opacity of a field's smallest value."""
 BOX = (150.0, 38.0)
 GAP = (110.0, 16.0)
-"""Width and height of a graph's box, and the room to the next."""
+"""Width and height of a graph's box, and the distance to the next."""
 TREE = (1000.0, 360.0)
 HEAD = 17.0
-"""Of a treemap: width and height, and room for a group's name."""
+"""Layout of a treemap: width and height, and space for a group's name."""
 
 
 def heat_map(m: HeatMap) -> svg.Drawing:
-    """Rows of cells whose colour is the deeper, the larger their share."""
+    """Rows of cells with a colour that darkens with their share."""
     step, foot = WIDTH / max(m.x.size, 1), ROW * len(m.rows)
     axis = svg.Axis.of_cells(m.x, NAMES, NAMES + WIDTH)
     body = []
@@ -51,7 +51,7 @@ def heat_map(m: HeatMap) -> svg.Drawing:
 
 
 def opacities(value: Floats) -> Floats:
-    """Opacity of each cell by the logarithm of its value, 0 where there is none; shape as given."""
+    """Opacity of each cell by the logarithm of its value, 0 if there is none; shape as given."""
     known = value[value > 0]
     if not known.size:
         return np.zeros(value.shape)
@@ -61,7 +61,7 @@ def opacities(value: Floats) -> Floats:
 
 
 def _cells(f: Field) -> list[str]:
-    """Rectangles of a field, from the foot."""
+    """Rectangles of a field, from the bottom."""
     left, width, height, _ = FIELD
     wide, high = width / f.x.size, height / f.y.size
     opacity = opacities(f.value)
@@ -77,7 +77,7 @@ def _cells(f: Field) -> list[str]:
 
 
 def field(f: Field, alone: bool = False) -> svg.Drawing:
-    """Cells coloured by their value, two axes, and named points; `alone`, without the figure under an axis's name."""
+    """Cells coloured by their value, two axes, and named points; `alone`: without the figure under the axis name."""
     left, width, height, foot = FIELD
     across, along = (left, left + width), (0.0, height)
     x, y = svg.Axis.of_cells(f.x, *across), svg.Axis.of_cells(f.y, height, 0.0)
@@ -110,7 +110,7 @@ def places(g: Graph) -> dict[str, tuple[float, float]]:
 
 
 def _arrow(first: tuple[float, float], last: tuple[float, float], text: str) -> str:
-    """A curve from one box to another with a tip and a text at its end."""
+    """A curve from one box to another with an arrowhead and a text at its end."""
     a, b, c, d = first[0] + BOX[0], first[1] + BOX[1] / 2, last[0] - 2, last[1] + BOX[1] / 2
     x1, y1, middle, end, x2, y2 = map(svg.digits, (a, b, 0.5 * (a + c), c - 6, c, d))
     curve = f"M{x1},{y1}C{middle},{y1} {middle},{y2} {end},{y2}"
@@ -141,7 +141,7 @@ class Room(NamedTuple):
 
 
 def squarified(sizes: Sequence[float], room: Room) -> list[Room]:
-    """Rectangles of areas in proportion to sizes (above zero, the largest first), as square as can be, in a room."""
+    """Rectangles with areas proportional to sizes (above zero, the largest first), nearly square, in a rectangle."""
     total = sum(sizes)
     areas = [s * room.w * room.h / total for s in sizes] if total > 0 else []
     out: list[Room] = []
@@ -153,13 +153,13 @@ def squarified(sizes: Sequence[float], room: Room) -> list[Room]:
 
 
 def _worst(areas: Sequence[float], side: float) -> float:
-    """The worst ratio of sides of a row of rectangles along a side."""
+    """The worst aspect ratio of a row of rectangles along a side."""
     total = sum(areas)
     return max(side**2 * max(areas) / total**2, total**2 / (side**2 * min(areas)))
 
 
 def _row(areas: Sequence[float], side: float) -> int:
-    """How many of the next rectangles make a row whose worst ratio does not grow."""
+    """Number of next rectangles in a row for which the worst aspect ratio does not grow."""
     count = 1
     while count < len(areas) and _worst(areas[: count + 1], side) <= _worst(areas[:count], side):
         count += 1
@@ -167,8 +167,8 @@ def _row(areas: Sequence[float], side: float) -> int:
 
 
 def _laid(areas: Sequence[float], room: Room) -> tuple[list[Room], Room]:
-    """A row along the shorter side of a room, and the room that is left."""
-    if room.w < room.h:  # the same of the room turned over
+    """A row along the shorter side of a rectangle, and the remaining rectangle."""
+    if room.w < room.h:  # the same for the transposed rectangle
         row, left = _laid(areas, Room(room.y, room.x, room.h, room.w))
         return [Room(r.y, r.x, r.h, r.w) for r in row], Room(left.y, left.x, left.h, left.w)
     out, at = [], room.y
@@ -180,7 +180,7 @@ def _laid(areas: Sequence[float], room: Room) -> tuple[list[Room], Room]:
 
 
 def laid_out(m: TreeMap, width: float, height: float) -> list[tuple[str, Room, list[tuple[Tile, Room]]]]:
-    """Each group's name and room, and its tiles with theirs, the largest first; tiles without size are left out."""
+    """Each group's name and rectangle, and its tiles with theirs, largest first, without tiles of size zero."""
     sized = [(name, [t for t in tiles if t.size > 0]) for name, tiles in m.groups]
     groups = sorted(((n, t) for n, t in sized if t), key=lambda g: -sum(t.size for t in g[1]))
     rooms = squarified([sum(t.size for t in tiles) for _, tiles in groups], Room(0.0, 0.0, width, height))
@@ -193,13 +193,13 @@ def laid_out(m: TreeMap, width: float, height: float) -> list[tuple[str, Room, l
 
 
 def fitting(text: str, width: float) -> str:
-    """A text cut to a width, '' where not even four letters fit."""
+    """A text cut to a width, '' if fewer than four letters fit."""
     most = int((width - 6) / svg.LETTER)
     return text if len(text) <= most else text[: most - 1] + "…" if most >= 4 else ""
 
 
 def tree_map(m: TreeMap) -> svg.Drawing:
-    """The map, each tile with its text for who points at it."""
+    """The treemap, each tile with a tooltip."""
     body = []
     for name, room, tiles in laid_out(m, *TREE):
         body.append(svg.written(room.x + 3, room.y + 13, fitting(name, room.w), kind="strong"))

@@ -1,4 +1,4 @@
-"""Pages as Markdown, with pictures beside them: fit for a wiki or a merge request."""
+"""Pages as Markdown, with pictures in separate files: for a wiki or a merge request."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from reports.texts import visible
 MARKS = re.compile(r"([\\`*_\[\]#!|~$])")
 STARTS = re.compile(r"^(\d+(?=[.)](?:\s|$))|(?=[-+:](?:\s|$)|=+$|-+$))")
 ADDRESSES = re.compile(r"(?i)\b(?:(https?|ftp|mailto|www)(?=[:.])|(javascript|vbscript|data|file)(?=:\S))")
-"""What turns into a link, or runs where a renderer is careless; a word before a colon and a blank stays."""
+"""Texts that become a link, or that a careless renderer runs; a word before a colon and a space is kept."""
 
 
 def escaped(text: str) -> str:
-    """Text as text: no markup, no HTML, no line breaks, nothing that turns into a link or calls a person."""
+    """Escape a text: no markup, no HTML, no line breaks, no links, no mentions of users."""
     text = visible(" ".join(text.split()))
     text = text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
     text = STARTS.sub(r"\1\\", MARKS.sub(r"\\\1", text))
@@ -28,7 +28,7 @@ def _cell(cell: parts.Cell) -> str:
 
 
 def rows_of_table(head: Sequence[str], rows: Iterable[Iterable[str]], rules: Sequence[str] = ()) -> list[str]:
-    """The lines of a table whose cells are escaped; rules : how each column is aligned, at the left by default."""
+    """The lines of a table with escaped cells; rules : alignment of each column, left by default."""
     drawn = f"|{'|'.join(rules or ['---'] * len(head))}|"
     return [f"| {' | '.join(head)} |", drawn, *(f"| {' | '.join(row)} |" for row in rows)]
 
@@ -79,7 +79,7 @@ def render(page: parts.Page, folder: str = "pictures") -> str:
     ----------
     page : Page
     folder : str
-        Where the pictures lie, relative to the page; '' leaves the pictures out.
+        Folder of the pictures, relative to the page; '' omits the pictures.
     """
     head = [f"# {escaped(page.title)}", "", escaped(page.subtitle), ""]
     body = [line for s in page.sections for line in _section(s, folder)]

@@ -1,6 +1,6 @@
-"""A page as text that a store can keep, and text as a page: computed once, drawn whenever it is asked for.
+"""Conversion of a page to text for a store, and back: computed once, rendered when needed.
 
-Every part is a mapping with its kind under "is"; arrays are base64, numbers that are times in full and others in
+Every part is a mapping with its kind under "is"; arrays are base64, times in double precision and other numbers in
 single precision. Only the kinds of pages.py are known; nothing is executed.
 """
 
@@ -17,9 +17,9 @@ import numpy as np
 from reports import pages
 
 KINDS = {k.__name__: k for k in vars(pages).values() if isinstance(k, type) and dataclasses.is_dataclass(k)}
-"""The parts of which pages are made."""
+"""The classes of page parts."""
 FULL = 1e5
-"""Arrays that reach this are kept in double precision: they are times."""
+"""Arrays with values above this are kept in double precision: they are times."""
 TYPES = {"f4": np.float32, "f8": np.float64, "b1": np.bool_}
 ENDS = {"inf": float("inf"), "-inf": float("-inf"), "nan": float("nan")}
 
@@ -53,7 +53,7 @@ def _array(x: np.ndarray) -> dict[str, Any]:
 
 
 def loads(text: str) -> pages.Page | None:
-    """A page of its text; None where it holds none, or one of another version."""
+    """A page from its text; None if the text is not a page, or one of another version."""
     try:
         found = _part(json.loads(text))
     except (ValueError, KeyError, TypeError, binascii.Error, RecursionError):

@@ -1,7 +1,6 @@
-"""What a page is: frozen data, texts already chosen, numbers already computed; rendered to HTML or Markdown
-elsewhere.
+"""The data of a page: frozen, with final texts and numbers; rendered to HTML or Markdown elsewhere.
 
-Every text may hold anything that a plant writes; the renderers escape it. Arrays are float64, shape as said.
+Any text may contain anything that a plant writes; the renderers escape it. Arrays are float64, shapes as given.
 """
 
 from __future__ import annotations
@@ -20,8 +19,7 @@ Masks = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Sparkline:
-    """A small trend: least and greatest of each bucket [any unit], shape (b,) each; NaN where there is
-    none."""
+    """A small trend: minimum and maximum of each bucket [any unit], shape (b,) each; NaN for none."""
 
     low: Floats
     high: Floats
@@ -29,10 +27,10 @@ class Sparkline:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A cell: its text and, where it is a number, the number itself, for sorting and for CSV.
+    """A cell: its text and, for a number, the number itself, for sorting and for CSV.
 
     kind : name of a colour (better, worse, unclear, incomparable, valve, tuning, load), or ''
-    href : where the text leads, relative to the page, or ''
+    href : target of the text, relative to the page, or ''
     """
 
     text: str
@@ -44,9 +42,9 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A column: its key in CSV, its heading, whether it holds numbers, what it means.
+    """A column: its key in CSV, its heading, whether it contains numbers, and its meaning.
 
-    wide : its texts may wrap; csv_only : it stands in the CSV alone
+    wide : its texts may wrap; csv_only : only in the CSV
     """
 
     key: str
@@ -58,12 +56,12 @@ class Column:
 
 
 MOST_ROWS = 3000
-"""Rows of a table on a page; ours: of a hundred thousand a browser makes a page of minutes, and nobody reads them."""
+"""Maximum rows of a table on a page; ours: with a hundred thousand a browser needs minutes, and nobody reads them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Named:
-    """What a block has that is referred to: its name in files and addresses, and its title."""
+    """Identity of a referenced block: its name in files and addresses, and its title."""
 
     name: str
     title: str
@@ -71,8 +69,8 @@ class Named:
 
 @dataclass(frozen=True, slots=True)
 class Table(Named):
-    """A table; `facets`: keys of columns whose values filter it; `cards`: on a phone a card a row;
-    `beside`: the page on which rows are laid beside each other, '' for none."""
+    """A table; `facets`: keys of columns whose values filter it; `cards`: on a phone one card per row; `beside`: the
+    page on which rows are compared side by side, '' for none."""
 
     columns: tuple[Column, ...]
     rows: tuple[tuple[Cell, ...], ...]
@@ -84,12 +82,12 @@ class Table(Named):
 
     @property
     def shown(self) -> tuple[tuple[Cell, ...], ...]:
-        """The rows that a page shows."""
+        """The rows shown on a page."""
         return self.rows[:MOST_ROWS]
 
     @property
     def more(self) -> str:
-        """What is said where there are more; empty where all are shown."""
+        """Text on the number of further rows; empty if all are shown."""
         if len(self.rows) <= MOST_ROWS:
             return ""
         return f"The first {MOST_ROWS:,} of {len(self.rows):,} rows; its CSV holds all."
@@ -97,7 +95,7 @@ class Table(Named):
 
 @dataclass(frozen=True, slots=True)
 class IntervalBar:
-    """One change with its interval [in the chart's unit]; None where it cannot be told."""
+    """One change with its interval [in the chart's unit]; None if unknown."""
 
     group: str
     label: str
@@ -130,7 +128,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A place on the horizontal axis with its name."""
+    """A position on the horizontal axis with its name."""
 
     x: float
     label: str
@@ -138,7 +136,7 @@ class Mark:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A point of a field with its name; `kind` names its colour."""
+    """A point of a field with its name; `kind` is the name of its colour."""
 
     x: float
     y: float
@@ -148,7 +146,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Area:
-    """What lies between two lines, shape (n,) each; `kind` names its colour."""
+    """The area between two lines, shape (n,) each; `kind` is the name of its colour."""
 
     x: Floats
     low: Floats
@@ -160,9 +158,9 @@ class Area:
 class Plot(Named):
     """Lines and points over two axes, with areas under them and marks.
 
-    log : axes that count in powers of ten, of "x" and "y"; all that lies on them is above zero; reach : values that
-    the vertical axis holds at least, so that small things look small; day : the date of 0 (ISO) where the horizontal
-    axis counts days, which then shows dates
+    log : logarithmic axes, of "x" and "y"; all their values are above zero; reach : values that the vertical axis
+    always includes, so that small changes look small; day : the date of 0 (ISO) if the horizontal axis counts days,
+    which then shows dates
     """
 
     x_label: str
@@ -179,7 +177,7 @@ class Plot(Named):
 
 @dataclass(frozen=True, slots=True)
 class Panels(Named):
-    """Small plots of one figure, side by side as room allows, with one key for all."""
+    """Small plots of one figure, side by side if there is space, with one common key."""
 
     plots: tuple[Plot, ...]
     caption: str = ""
@@ -187,7 +185,7 @@ class Panels(Named):
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """A thinned signal: least and greatest of each bucket, shape (b,), and the panel (0 is the upmost) it is in."""
+    """A decimated signal: minimum and maximum of each bucket, shape (b,), and its panel (0 is the top one)."""
 
     label: str
     kind: str
@@ -200,9 +198,9 @@ class Band:
 class Trend(Named):
     """Signals over time on linked axes.
 
-    time_s : start of each bucket [s since 1970-01-01 UTC], rising, shape (b,); gap : True where nothing is
-    shown; spans : first and last time [s] of spans that are marked; opening : first and last time [s] shown at
-    first, all where None; least : height of each panel's axis at least [its unit], so that small things look small
+    time_s : start of each bucket [s since 1970-01-01 UTC], rising, shape (b,); gap : True where nothing is shown;
+    spans : first and last time [s] of marked spans; opening : first and last time [s] shown initially, all if None;
+    least : minimum height of each panel's axis [its unit], so that small changes look small
     """
 
     time_s: Floats
@@ -218,7 +216,7 @@ class Trend(Named):
 
 @dataclass(frozen=True, slots=True)
 class Beside(Named):
-    """Trends of which a reader shows up to `most` under each other on one time axis; ours: as a screen holds."""
+    """Trends of which a reader shows up to `most` below each other on one time axis; ours: as fit on a screen."""
 
     trends: tuple[Trend, ...]
     caption: str = ""
@@ -227,10 +225,10 @@ class Beside(Named):
 
 @dataclass(frozen=True, slots=True)
 class HeatMap(Named):
-    """Rows of shares as colours over one axis that counts in powers.
+    """Rows of shares as colours over one logarithmic axis.
 
-    x : middle of each column, rising evenly in logarithms, shape (b,); rows : names; shares : 0 (nothing) to 1 (full
-    colour), NaN where there is none, shape (rows, b); marks lie on the axis
+    x : centre of each column, equally spaced in logarithms, shape (b,); rows : names; shares : 0 (nothing) to 1 (full
+    colour), NaN if there is none, shape (rows, b); marks are on the axis
     """
 
     x_label: str
@@ -243,10 +241,10 @@ class HeatMap(Named):
 
 @dataclass(frozen=True, slots=True)
 class Field(Named):
-    """A value over two axes that count in powers.
+    """A value over two logarithmic axes.
 
-    x, shape (n,), and y, shape (m,), rising evenly in logarithms; value, shape (m, n), coloured by its logarithm, 0
-    where there is none; calm and unstable, bool, shape (m, n), with colours of their own; keys names the colours
+    x, shape (n,), and y, shape (m,), equally spaced in logarithms; value, shape (m, n), coloured by its logarithm, 0
+    if there is none; calm and unstable, bool, shape (m, n), with their own colours; keys names the colours
     """
 
     x_label: str
@@ -263,7 +261,7 @@ class Field(Named):
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """A box of a graph: its name, a line under it, its colour, and in which column it stands (0 is the first)."""
+    """A box of a graph: its name, a line under it, its colour, and its column (0 is the first)."""
 
     name: str
     text: str
@@ -273,7 +271,7 @@ class Node:
 
 @dataclass(frozen=True, slots=True)
 class Arrow:
-    """From one box to another, with a text."""
+    """An arrow from one box to another, with a text."""
 
     first: str
     last: str
@@ -291,7 +289,7 @@ class Graph(Named):
 
 @dataclass(frozen=True, slots=True)
 class Tile:
-    """A rectangle of a map: its name, size [any unit] and colour, a text for who points at it, where it leads."""
+    """A rectangle of a treemap: its name, size [any unit] and colour, tooltip, and link."""
 
     name: str
     size: float
@@ -302,8 +300,8 @@ class Tile:
 
 @dataclass(frozen=True, slots=True)
 class TreeMap(Named):
-    """Rectangles as large as what they stand for, those of a group together under its name; `keys` names the colours:
-    (kind, what it is)."""
+    """Rectangles with areas proportional to a value, grouped under the group's name; `keys` names the colours: (kind,
+    meaning)."""
 
     groups: tuple[tuple[str, tuple[Tile, ...]], ...]
     keys: tuple[tuple[str, str], ...] = ()
@@ -312,7 +310,7 @@ class TreeMap(Named):
 
 @dataclass(frozen=True, slots=True)
 class WhatIf(Named):
-    """A loop to be tried with other settings in the page itself.
+    """A loop that the reader can simulate with other settings in the page.
 
     model : process, valve, law, units and named settings as JSON (analyzer.pages.compared); load : what adds to PV at
     each scan [% PV], shape (n,)
@@ -324,17 +322,17 @@ class WhatIf(Named):
 
 
 MOST_LEVEL = 65534
-"""Levels of a signal that a page holds, in 16 bits, one of which says that nothing is known."""
+"""Highest level of a signal on a page, in 16 bits; one further code means unknown."""
 LEVELS = 65000.0
-"""Levels that a signal covers at most: some are left so that one which is held is held again without loss."""
+"""Largest number of levels of a signal: some are kept free so that a stored signal is stored again without loss."""
 
 
 def levels(low: float, high: float) -> tuple[float, float]:
-    """The lowest level and the step in which a page holds a signal between two values, in its own unit.
+    """The lowest level and the step with which a page stores a signal between two values, in its own unit.
 
-    The step is a power of two and the lowest level a multiple of it: then each level is exact in binary, and a signal
-    that has been held once is the same to the last digit when it is held again. A stem at the edge of its play makes
-    travel of a last digit.
+    The step is a power of two and the lowest level a multiple of it: then each level is exact in binary, and a stored
+    signal is identical when it is stored again. At the edge of the backlash, a difference in the last digit can cause
+    stem travel.
     """
     if not high > low:
         return low, 1.0
@@ -343,7 +341,7 @@ def levels(low: float, high: float) -> tuple[float, float]:
 
 
 def as_held(x: Floats) -> Floats:
-    """A signal, shape (n,), as a page holds it, so that what is told of it is what the page computes."""
+    """A signal, shape (n,), as stored on a page, so that reported figures are those that the page computes."""
     if x.size == 0:
         return x
     low, step = levels(float(x.min()), float(x.max()))
@@ -367,14 +365,14 @@ class Listing:
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """Terms and what is known of them."""
+    """Terms and their values."""
 
     items: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Tiles:
-    """A few figures that sum a page up: (figure, what it is, colour)."""
+    """Key figures of a page: (figure, meaning, colour)."""
 
     items: tuple[tuple[str, str, str], ...]
 
@@ -394,23 +392,22 @@ class Section:
 
 
 def there(*parts: T | None) -> tuple[T, ...]:
-    """The parts of a page that there are: those that are None are left out."""
+    """The given parts of a page, without those that are None."""
     return tuple(part for part in parts if part is not None)
 
 
 def section(title: str, *blocks: Block | None, closed: bool = False) -> Section | None:
-    """A section of the blocks that there are; None without any."""
+    """A section of the given blocks, without those that are None; None if empty."""
     shown: tuple[Block, ...] = there(*blocks)
     return Section(title, shown, closed) if shown else None
 
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A page: its file name without ending, its title, one line under it, sections, and links (text,
-    href).
+    """A page: its file name without ending, its title, one line under it, sections, and links (text, href).
 
-    made : what it was made of and when, shown small in its head; zone : time zone of the times on its axes;
-    choices : pages of the same kind, one of which is chosen (text, href), '' being this one
+    made : source and time of its content, shown small in its head; zone : time zone of the times on its axes; choices
+    : pages of the same kind to choose from (text, href), '' being this one
     """
 
     name: str

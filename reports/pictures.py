@@ -1,4 +1,4 @@
-"""Blocks of a page as pictures: which drawings they are, what their colours mean, and each as a file of its own."""
+"""Pictures of page blocks: their drawings, keys of their colours, and files with one picture each."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from reports.svg import LETTER, Drawing, digits, written
 from reports.texts import visible_parts
 
 ROOM = 1060.0
-"""Width of a file that holds several drawings."""
+"""Width of a file with several drawings."""
 SPACE, RIM = 14.0, 8.0
-"""Between two drawings, and beside all of them."""
+"""Space between two drawings, and around all of them."""
 LINE = 18.0
 """Height of a line of text."""
 FONT = "system-ui, 'Segoe UI', 'Liberation Sans', 'DejaVu Sans', sans-serif"
@@ -26,7 +26,7 @@ OWN = (
     "svg text { font-family: %s; } .span { fill: var(--worse); opacity: .12; } "
     ".line.stem { stroke-dasharray: 2 3; stroke-width: 1.8; }"
 )
-"""What the style sheet does not say, for pages draw their trends by a script."""
+"""Rules that are missing in the style sheet, because pages draw their trends by a script."""
 
 
 @cache
@@ -36,9 +36,9 @@ def asset(name: str) -> str:
 
 
 def drawings(block: Picture, zone: str = "UTC", alone: bool = False) -> list[tuple[str, Drawing]]:
-    """The drawings of a block, each with a title where there are several; times stand on the clock of a zone.
+    """The drawings of a block, each with a title if there are several; times are in the given time zone.
 
-    alone : whether they are drawn for a file of its own.
+    alone : whether they are drawn for a separate file.
     """
     match block:
         case Panels():
@@ -60,7 +60,7 @@ def drawings(block: Picture, zone: str = "UTC", alone: bool = False) -> list[tup
 
 
 def _swatches(block: Picture) -> list[tuple[str, str]]:
-    """Each name with its colour drawn, 22 wide and 12 high; none where there is one line alone."""
+    """Each name with its colour sample, 22 wide and 12 high; none for a single line."""
     if isinstance(block, Field | TreeMap):
         kind = "cell" if isinstance(block, Field) else "tile"
         return [(text, f'<rect class="{kind} {k}" width="22" height="12"/>') for k, text in block.keys]
@@ -79,7 +79,7 @@ def _swatches(block: Picture) -> list[tuple[str, str]]:
 
 
 def keys(block: Picture) -> Markup:
-    """What each colour means, as a list for a page; nothing where there is one alone."""
+    """The key of the colours, as a list for a page; empty for a single one."""
     parts = [
         f'<li><svg class="swatch" viewBox="0 0 22 12" aria-hidden="true">{drawn}</svg>{escape(text)}</li>'
         for text, drawn in _swatches(block)
@@ -88,14 +88,14 @@ def keys(block: Picture) -> Markup:
 
 
 def as_file(block: Picture, zone: str = "UTC") -> str:
-    """A picture as an SVG file that needs no other: title, keys, drawings, and the colours of the style sheet."""
+    """A picture as a self-contained SVG file: title, keys, drawings, and the colours of the style sheet."""
     block = visible_parts(block)
     shown = drawings(block, zone, alone=True)
     width = max([plots.PLOT[0], *(d.width for _, d in shown)])
     wide = ROOM if len(shown) > 1 else width
     body, top = _headed(block, wide)
     drawn, foot = _laid(shown, top, wide)
-    inner = re.sub(r"</?a\b[^>]*>", "", "".join([*body, *drawn]))  # a picture beside a text leads nowhere
+    inner = re.sub(r"</?a\b[^>]*>", "", "".join([*body, *drawn]))  # a picture beside a text has no links
     box = f"{digits(-RIM)} 0 {digits(wide + 2 * RIM)} {digits(foot)}"
     size = f'width="{digits(wide + 2 * RIM)}" height="{digits(foot)}" viewBox="{box}"'
     head = f'<svg xmlns="http://www.w3.org/2000/svg" {size} role="img" aria-label="{escape(block.title)}">'
@@ -104,7 +104,7 @@ def as_file(block: Picture, zone: str = "UTC") -> str:
 
 
 def _headed(block: Picture, width: float) -> tuple[list[str], float]:
-    """Title and keys, and how far down they reach."""
+    """Title and keys, and the vertical position of their end."""
     y, x, out = 0.0, 0.0, []
     for line in textwrap.wrap(block.title, int(width / LETTER / 1.15)):
         y += LINE
@@ -122,7 +122,7 @@ def _headed(block: Picture, width: float) -> tuple[list[str], float]:
 
 
 def _laid(shown: Sequence[tuple[str, Drawing]], top: float, width: float) -> tuple[list[str], float]:
-    """Drawings in rows from the left, and how far down they reach."""
+    """Drawings in rows from the left, and the vertical position of their end."""
     out, x, foot = [], 0.0, top
     for title, d in shown:
         if x > 0 and x + d.width > width:
@@ -138,7 +138,7 @@ def _laid(shown: Sequence[tuple[str, Drawing]], top: float, width: float) -> tup
 
 @cache
 def _rules() -> tuple[dict[str, str], list[tuple[str, str]]]:
-    """Colours in light by their names, and the style sheet's rules as selector and declarations."""
+    """Light-mode colours by name, and the style sheet's rules as selector and declarations."""
     sheet = re.sub(r"@media[^{]*\{(?:[^{}]*\{[^{}]*\})*[^{}]*\}", "", asset("page.css"))
     rules = [(s.strip(), d.strip()) for s, d in re.findall(r"([^{}]+)\{([^{}]*)\}", sheet)]
     colours = dict(re.findall(r"--([\w-]+): ([^;]+);", rules[0][1]))
@@ -148,7 +148,7 @@ def _rules() -> tuple[dict[str, str], list[tuple[str, str]]]:
 
 
 def _style(drawn: str) -> str:
-    """The rules that what is drawn makes use of, with their colours in light."""
+    """The rules used by a drawing, with light-mode colours."""
     colours, rules = _rules()
     used = {name for held in re.findall(r'class="([^"]*)"', drawn) for name in held.split()}
 

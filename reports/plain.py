@@ -1,4 +1,4 @@
-"""Pages and tables without markup: text for a terminal or a mail, and CSV; pictures are left out."""
+"""Pages and tables without markup: text for a terminal or a mail, and CSV; without pictures."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from reports.texts import harmless, visible, visible_parts
 WIDTH = 100
 """Characters of a line."""
 GAP = "  "
-"""Between two columns."""
+"""Separator of two columns."""
 LEAST = 20
-"""Characters of a line of a wrapped cell at least, however narrow the terminal."""
+"""Minimum characters per line of a wrapped cell, however narrow the terminal."""
 
 
 def _wrapped(text: str, first: str = "", then: str = "") -> list[str]:
@@ -28,7 +28,7 @@ def _wrapped(text: str, first: str = "", then: str = "") -> list[str]:
 
 
 def _told(table: Table) -> list[str]:
-    """A row as its first cell and, indented below, the others that say something."""
+    """A row as its first cell and, indented below, the other cells that are not empty."""
     out = []
     for row in table.rows:
         head, *rest = (cell.text for cell in row)
@@ -65,7 +65,7 @@ def render(page: Page) -> str:
 
 
 def csv_text(names: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """Rows as CSV, empty where nothing is known, texts harmless to spreadsheets."""
+    """Rows as CSV, empty cells for unknown values, texts safe for spreadsheets."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(map(harmless, names))
@@ -74,7 +74,7 @@ def csv_text(names: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
 
 
 def as_csv(table: Table) -> str:
-    """A table as CSV: full numbers, empty where not known, texts harmless."""
+    """A table as CSV: full numbers, empty cells for unknown values, safe texts."""
     rows = [
         [_held(c, column.numeric) for c, column in zip(row, table.columns, strict=True)] for row in table.rows
     ]
@@ -90,12 +90,12 @@ def _held(cell: Cell, numeric: bool) -> str | float | None:
 def table(
     columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int
 ) -> tuple[str, list[list[str]]]:
-    """The line of headings, and of each row its lines.
+    """The line of headings, and the lines of each row.
 
     Parameters
     ----------
     columns : sequence of Column
-        Numbers stand at the right, and the cells of a wide one (one at most) are wrapped.
+        Numbers are right-aligned, and the cells of a wide one (at most one) are wrapped.
     rows : sequence of rows
         A cell for each column.
     width : int
@@ -120,7 +120,7 @@ def _lines(row: Sequence[str], columns: Sequence[Column], sizes: Sequence[int], 
 
 
 def _folded(text: str, width: int) -> list[str]:
-    """The lines of a wrapped cell, by what they take on the screen; a word longer than a line is parted."""
+    """The lines of a wrapped cell, by display width; a word longer than a line is split."""
     if cell_len(text) <= width:
         return [text]
     lines = [""]
@@ -134,7 +134,7 @@ def _folded(text: str, width: int) -> list[str]:
 
 
 def _line(cells: Sequence[str], columns: Sequence[Column], sizes: Sequence[int]) -> str:
-    """Cells side by side, each filled up to its column's size on the screen."""
+    """Cells side by side, each padded to its column's display width."""
     filled = []
     for text, column, size in zip(cells, columns, sizes, strict=True):
         space = " " * (size - cell_len(text))
@@ -143,7 +143,7 @@ def _line(cells: Sequence[str], columns: Sequence[Column], sizes: Sequence[int])
 
 
 def json_ready(x: Any) -> Any:
-    """The same with numbers that JSON knows: no NaN, no infinity, no numpy types."""
+    """The same value with JSON-compatible numbers: no NaN, no infinity, no numpy types."""
     if isinstance(x, dict):
         return {str(k): json_ready(v) for k, v in x.items()}
     if isinstance(x, list | tuple):

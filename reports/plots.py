@@ -1,4 +1,4 @@
-"""Curves, changes with their intervals and trends, as SVG."""
+"""Curves, changes with intervals, and trends, as SVG."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ from reports.pages import Band, Floats, IntervalBar, IntervalChart, Line, Mark, 
 
 PLOT = (520.0, 300.0)
 MARGIN = (56.0, 12.0, 12.0, 42.0)
-"""Left, right, above and below what is drawn."""
+"""Margins left, right, above and below a drawing."""
 MOST_POINTS = 1500
 ROW = 24.0
 LABELS = 110.0
 PANEL = (150.0, 56.0, 14.0)
-"""Width of a panel's bars, of the figures right of them, and of the space to the next."""
+"""Width of a panel's bars, of the figures right of them, and of the distance to the next."""
 RIM = 150.0
-"""Changes are drawn to this [%]; the text beside says more."""
+"""Changes are drawn up to this [%]; the adjacent text gives the exact value."""
 TREND, FIRST, OTHER = 1040.0, 200.0, 130.0
 """Width of a trend, and heights of its first panel and of the others."""
 BUCKETS = 1040
-"""Buckets of a trend that are drawn at most: one a pixel."""
+"""Largest number of drawn buckets of a trend: one per pixel."""
 DAY_S = 86400
 STEPS_S = (
     *(1, 2, 5, 10, 30, 60, 300, 900, 1800, 3600, 7200, 21600, 43200),
     *(days * DAY_S for days in (1, 2, 7, 28)),
 )
-"""Distances of a time axis's ticks [s]."""
+"""Possible tick distances of a time axis [s]."""
 MOST_TIMES = 9
-"""Ticks of a time axis at most."""
+"""Largest number of ticks of a time axis."""
 
 
 def _extent(values: list[Floats], pad: float) -> tuple[float, float]:
-    """Least and greatest of all finite values, with some room beside them."""
+    """Minimum and maximum of all finite values, with some margin."""
     joined = np.concatenate(values) if values else np.zeros(1)
     joined = joined[np.isfinite(joined)]
     if joined.size == 0:
@@ -48,7 +48,7 @@ def _extent(values: list[Floats], pad: float) -> tuple[float, float]:
 
 
 def _axes(p: Plot) -> tuple[svg.Axis, svg.Axis]:
-    """Both axes of a plot, with room around points but none beside lines."""
+    """Both axes of a plot, with a margin around points but none around lines."""
     joined = any(line.joined for line in p.lines)
     x = [line.x for line in p.lines] + [a.x for a in p.areas]
     y = [line.y for line in p.lines] + [e for a in p.areas for e in (a.low, a.high)]
@@ -61,7 +61,7 @@ def _axes(p: Plot) -> tuple[svg.Axis, svg.Axis]:
 
 
 def _few(values: Floats) -> Floats:
-    """At most MOST_POINTS of the values of a line, evenly."""
+    """At most MOST_POINTS values of a line, equally spaced."""
     return values[:: max(math.ceil(values.size / MOST_POINTS), 1)]
 
 
@@ -73,7 +73,7 @@ def _line(line: Line, x: Floats, y: Floats) -> str:
 
 
 def _mark(mark: Mark, x: svg.Axis, ends: tuple[float, float]) -> str:
-    """A marked place with its name, on the side where there is room."""
+    """A marked position with its name, on the side with enough space."""
     at = x.at(mark.x)
     anchor, aside = ("start", 4) if at < PLOT[0] * 0.6 else ("end", -4)
     return svg.upright(at, ends, "mark") + svg.written(at + aside, ends[0] + 12, mark.label, anchor, "marked")
@@ -106,12 +106,12 @@ def plot(p: Plot) -> svg.Drawing:
 
 
 def _is_day(value: float, day: str) -> bool:
-    """Whether a tick stands at a whole day, where its axis counts days."""
+    """Whether a tick is at a whole day, if its axis counts days."""
     return not day or value == round(value)
 
 
 def _number_or_date(value: float, day: str) -> str:
-    """What stands at a tick: a number, or the date so many days after a day."""
+    """Label of a tick: a number, or the date so many days after a day."""
     if not day:
         return f"{value:.6g}"
     at = date.fromisoformat(day) + timedelta(days=round(value))
@@ -119,8 +119,8 @@ def _number_or_date(value: float, day: str) -> str:
 
 
 def intervals(chart: IntervalChart) -> list[svg.Drawing]:
-    """Changes as bars with intervals: a picture for each label, side by side as room allows, a row for each group;
-    labels of which nothing is known are left out."""
+    """Changes as bars with intervals: a picture for each label, side by side if there is space, a row for each group,
+    without labels whose values are all unknown."""
     rows = list(dict.fromkeys(b.group for b in chart.bars))
     known = [b.label for b in chart.bars if b.value is not None]
     names = "".join(svg.written(0, 42 + ROW * i, row) for i, row in enumerate(rows))
@@ -143,7 +143,7 @@ def _panel(chart: IntervalChart, label: str, rows: list[str]) -> str:
 
 
 def _interval(bar: IntervalBar, y: float, x: svg.Axis) -> str:
-    """A bar from zero to the change, its interval as a line, both cut at the ends; the figure beside it."""
+    """A bar from zero to the change, its interval as a line, both cut at the ends; the figure next to it."""
     if bar.value is None or bar.low is None or bar.high is None:
         return svg.written(x.last + PANEL[1], y + 4, "–", "end", "quiet")
     zero, value, low, high = x.places(np.clip([0.0, bar.value, bar.low, bar.high], x.low, x.high))
@@ -155,8 +155,8 @@ def _interval(bar: IntervalBar, y: float, x: svg.Axis) -> str:
 
 
 def trend(t: Trend, zone: str) -> svg.Drawing:
-    """Panels over one time axis on the clock of a zone, each signal as the band between least and greatest; of a
-    trend that opens on a span, that span."""
+    """Panels over one time axis in a time zone, each signal as the band between minimum and maximum; if a trend opens
+    on a span, only that span."""
     if t.opening is not None:
         part = slice(*np.searchsorted(t.time_s, t.opening))
         bands = tuple(replace(b, low=b.low[part], high=b.high[part]) for b in t.bands)
@@ -185,7 +185,7 @@ def trend(t: Trend, zone: str) -> svg.Drawing:
 
 
 def _held(t: Trend, panel: int) -> tuple[float, float]:
-    """Ends of a panel's axis, as far apart at least as the trend says."""
+    """Ends of a panel's axis, at least as far apart as the trend requires."""
     shown = [np.where(t.gap, np.nan, e) for b in t.bands if b.panel == panel for e in (b.low, b.high)]
     low, high = _extent(shown, 0.04)
     more = 0.5 * max((t.least[panel] if panel < len(t.least) else 0.0) - (high - low), 0.0)
@@ -193,7 +193,7 @@ def _held(t: Trend, panel: int) -> tuple[float, float]:
 
 
 def _band(band: Band, t: Trend, x: svg.Axis, y: svg.Axis) -> str:
-    """A signal's outlines, one between two gaps; neighbouring buckets are joined where there are too many."""
+    """A signal's outlines, one between two gaps; neighbouring buckets are merged if there are too many."""
     n = t.time_s.size
     edges = np.unique(np.arange(min(BUCKETS, n)) * n // max(min(BUCKETS, n), 1))
     low, high = (np.where(t.gap, np.nan, v) for v in (band.low, band.high))
@@ -204,7 +204,7 @@ def _band(band: Band, t: Trend, x: svg.Axis, y: svg.Axis) -> str:
 
 
 def _times(start: float, end: float, zone: str) -> list[tuple[float, str]]:
-    """Ticks of a time axis on the clock of a zone, and what stands at them."""
+    """Ticks of a time axis in a time zone, and their labels."""
     step = next((s for s in STEPS_S if (end - start) / s <= MOST_TIMES), STEPS_S[-1])
     clock = ZoneInfo(zone)
     ahead = datetime.fromtimestamp(start, UTC).astimezone(clock).utcoffset()

@@ -1,4 +1,4 @@
-"""What every picture is drawn with: texts, axes with their ticks, paths, and the finished drawing, all as SVG.
+"""Elements of all pictures: texts, axes with their ticks, paths, and the finished drawing, as SVG.
 
 Colours come from the style sheet by class, so that light, dark and print need one picture. Texts are escaped.
 """
@@ -16,7 +16,7 @@ from reports.pages import Floats, Place, Sparkline
 
 SPARK = (120.0, 26.0)
 LETTER = 6.6
-"""Width of a letter at the size of a tick's figure, about."""
+"""Approximate width of a letter of a tick label."""
 POINT = 4.5
 """Radius of a named point."""
 BESIDE = tuple(
@@ -25,19 +25,19 @@ BESIDE = tuple(
     for across, side in ((8.0, "start"), (-8.0, "end"), (0.0, "middle"))
     if (down, side) != (4.0, "middle")
 )
-"""Where the name of a point may stand from it: down, across, and how it is anchored; the first that is free."""
+"""Possible positions of a point's name: down, across, and its anchor; the first free one is used."""
 ANCHORED = {"start": 0.0, "middle": 0.5, "end": 1.0}
-"""Part of a text's width that stands left of its place."""
+"""Part of a text's width that is left of its position."""
 Corners = tuple[float, float, float, float]
-"""Left, top, right and foot of a rectangle."""
+"""Left, top, right and bottom of a rectangle."""
 
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """Drawn parts as a picture, with a text for who cannot see it.
+    """A picture of drawn parts, with an alternative text.
 
-    kind : class of the style sheet; natural : it does not grow with the page; role : img, or group for one whose
-    parts are links
+    kind : class of the style sheet; natural : it does not grow with the page; role : img, or group if its parts are
+    links
     """
 
     width: float
@@ -57,7 +57,7 @@ class Drawing:
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """Where values lie: `low` at place `first`, `high` at `last`; of a logarithmic axis both are logarithms."""
+    """Mapping of values to positions: `low` at `first`, `high` at `last`; both as logarithms on a log axis."""
 
     low: float
     high: float
@@ -67,18 +67,18 @@ class Axis:
 
     @classmethod
     def of_cells(cls, values: Floats, first: float, last: float) -> Axis:
-        """The axis of cells as wide as each other, centred on values that rise evenly in logarithms."""
+        """The axis of cells of equal width, centred on values equally spaced in logarithms."""
         low, high = (float(v) for v in np.log10(values[[0, -1]]))
         half = 0.5 * (high - low) / (values.size - 1) if values.size > 1 else 0.5
         return cls(low - half, high + half, first, last, True)
 
     def places(self, values: Floats) -> Floats:
-        """Where values lie, shape as given."""
+        """Positions of values, shape as given."""
         scaled = np.log10(np.maximum(values, 1e-300)) if self.log else values
         return self.first + (scaled - self.low) / (self.high - self.low) * (self.last - self.first)
 
     def at(self, value: float) -> float:
-        """Where one value lies."""
+        """Position of one value."""
         return float(self.places(np.array(value)))
 
     def ticks(self, most: int) -> list[float]:
@@ -89,7 +89,7 @@ class Axis:
 
 
 def digits(x: float) -> str:
-    """A place in the picture, with as many digits as are seen."""
+    """A coordinate in the picture, with the visible number of digits."""
     return f"{x:.1f}".rstrip("0").rstrip(".")
 
 
@@ -100,41 +100,41 @@ def written(x: float, y: float, text: str, anchor: str = "start", kind: str = ""
 
 
 def box(x: float, y: float, width: float, height: float) -> str:
-    """Place and size of a rectangle, as attributes."""
+    """Position and size of a rectangle, as attributes."""
     return f'x="{digits(x)}" y="{digits(y)}" width="{digits(width)}" height="{digits(height)}"'
 
 
 def upright(x: float, ends: tuple[float, float], kind: str = "grid") -> str:
-    """A line from the top to the foot of a picture."""
+    """A line from the top to the bottom of a picture."""
     return f'<path class="{kind}" d="M{digits(x)},{digits(ends[0])}V{digits(ends[1])}"/>'
 
 
 def tick_x(x: float, ends: tuple[float, float], text: str, below: float = 15.0, kind: str = "grid") -> str:
-    """A line of the grid with its figure below it."""
+    """A grid line with its figure below it."""
     return upright(x, ends, kind) + written(x, ends[1] + below, text, "middle", "tick")
 
 
 def tick_y(y: float, ends: tuple[float, float], text: str) -> str:
-    """A line of the grid with its figure at its left."""
+    """A grid line with its figure at its left."""
     line = f'<path class="grid" d="M{digits(ends[0])},{digits(y)}H{digits(ends[1])}"/>'
     return line + written(ends[0] - 6, y + 4, text, "end", "tick")
 
 
 def points(x: Iterable[float], y: Iterable[float]) -> list[str]:
-    """Places of a path; those that are not finite are left out."""
+    """Points of a path, without those that are not finite."""
     pairs = zip(x, y, strict=True)
     return [f"{digits(a)},{digits(b)}" for a, b in pairs if math.isfinite(a) and math.isfinite(b)]
 
 
 def between(x: Floats, low: Floats, high: Floats) -> str:
-    """The outline of what lies between two lines, '' where nothing is known."""
+    """The outline of the area between two lines, '' if nothing is known."""
     known = np.isfinite(x) & np.isfinite(low) & np.isfinite(high)
     there, back = points(x[known], high[known]), points(x[known], low[known])
     return f"M{'L'.join(there)}L{'L'.join(reversed(back))}Z" if there else ""
 
 
 def named_places(points: Sequence[tuple[Place, float, float]], room: Corners) -> list[str]:
-    """Points with their names beside them, each where it covers no other name or point and leaves no room it has."""
+    """Points with their names, each name where it covers no other name or point and stays inside `room`."""
     taken = [(x - POINT, y - POINT, x + POINT, y + POINT) for _, x, y in points]
     out = []
     for place, x, y in points:
@@ -169,8 +169,8 @@ def nice_ticks(low: float, high: float, most: int = 6) -> list[float]:
 
 
 def log_ticks(low: float, high: float, fine: bool = True) -> list[float]:
-    """Ones, twos and fives of every power of ten between two values; powers alone where there are many, or where a
-    coarse axis holds two of them."""
+    """Ones, twos and fives of every power of ten between two values; only powers if there are many, or if a coarse
+    axis includes two of them."""
     low, high = low * (1 - 1e-9), high * (1 + 1e-9)
     exponents = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     powers = [10.0**k for k in exponents if low <= 10.0**k <= high]

@@ -1,4 +1,4 @@
-"""What a plant writes, made fit for where it goes: a screen, a spreadsheet, a file's name."""
+"""Plant texts made safe for a screen, a spreadsheet, or a file name."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
-"""First characters by which spreadsheets take a text for a formula (OWASP, CSV injection)."""
+"""First characters by which spreadsheets recognize a formula (OWASP, CSV injection)."""
 LONGEST = 40
 """Characters of a tag that are kept in a file name; ours: readable, and far below any file system's limit."""
 
 
 def visible(text: str) -> str:
-    """The text with characters that steer a terminal or turn the direction of writing as escapes such as \\u202e,
+    """The text with characters that control a terminal or reverse the text direction as escapes such as \\u202e, and
     blanks of any kind as blanks."""
     if text.isprintable():
         return text
@@ -25,14 +25,14 @@ def visible(text: str) -> str:
 
 
 def visible_lines(text: str) -> str:
-    """The same of a text of several lines."""
+    """The same for a text of several lines."""
     if text.isprintable():
         return text
     return "\n".join(map(visible, text.split("\n")))
 
 
 def visible_parts(part: T) -> T:
-    """A page, or a part of one, with all its texts visible; the same object where they are."""
+    """A page, or a part of one, with all its texts visible; the same object if they already are."""
     shown: Any = part
     if type(part) is str:
         shown = visible_lines(shown)
@@ -47,15 +47,14 @@ def visible_parts(part: T) -> T:
 
 
 def harmless(text: str) -> str:
-    """A text that no spreadsheet takes for a formula: an apostrophe goes before those that it would."""
+    """A text that no spreadsheet treats as a formula: an apostrophe is added if necessary."""
     return f"'{text}" if text.lstrip(" ").startswith(FORMULA) or text.startswith(FORMULA) else text
 
 
 def slug(tag: str) -> str:
-    """A file name without ending: letters, digits and '-' of the tag, and a hash that keeps different tags
-    apart.
+    """A file name without ending: letters, digits and '-' of the tag, and a hash that keeps different tags apart.
 
-    It holds no dot, slash or space and begins with a letter, digit or '-', so it stays inside its folder.
+    It contains no dot, slash or space and begins with a letter, digit or '-', so it stays inside its folder.
     """
     plain = unicodedata.normalize("NFKD", tag).encode("ascii", "ignore").decode()
     kept = re.sub(r"[^A-Za-z0-9]+", "-", plain).strip("-")[:LONGEST].strip("-")

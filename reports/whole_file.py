@@ -1,4 +1,4 @@
-"""Files that a reader sees whole or not at all."""
+"""Atomic writing of files: a reader sees a complete file or none."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from pathlib import Path
 from typing import Any
 
 FULL = frozenset(getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG") if hasattr(errno, name))
-"""What the system says where a disk, a quota or the largest size of a file ends."""
+"""System errors for a full disk, an exceeded quota or the largest file size."""
 
 
 def is_full(error: OSError) -> bool:
-    """Whether there was no room to write."""
+    """Whether there was no space to write."""
     return error.errno in FULL
 
 
 SUFFIX = ".tmp"
-"""Ending of what is being written; such files of a process that died may be deleted."""
+"""Ending of a file being written; such files of a process that died may be deleted."""
 
 
 @contextmanager
 def whole_file(path: Path, kept: bool = False) -> Iterator[Path]:
-    """A path to write to that takes the place of `path` at the end, and is gone where an error came first.
+    """A temporary path whose file replaces `path` at the end, and is deleted after an error.
 
     Parameters
     ----------
     path : Path
-        Its folder is made where there is none. Where it is one of shared storage, an object takes its place when
-        it is closed, whole.
+        Its folder is created if necessary. If it is on shared storage, the object is replaced as a whole when the
+        file is closed.
     kept : bool
-        Wait until the disk has it, so that it is whole after a loss of power too.
+        Wait until the file is on the disk, so that it is complete after a loss of power too.
     """
     if not isinstance(path, Path):
         with _uploaded(path) as begun:
@@ -42,7 +42,7 @@ def whole_file(path: Path, kept: bool = False) -> Iterator[Path]:
         return
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name[:80]}.{secrets.token_hex(8)}{SUFFIX}")
-    flags = os.O_CREAT | os.O_EXCL | os.O_WRONLY  # a link laid in the way is not followed
+    flags = os.O_CREAT | os.O_EXCL | os.O_WRONLY  # a link placed there is not followed
     os.close(os.open(temporary, flags, 0o666))
     try:
         yield temporary
@@ -63,7 +63,7 @@ def whole_file(path: Path, kept: bool = False) -> Iterator[Path]:
 
 @contextmanager
 def _uploaded(path: Any) -> Iterator[Path]:
-    """A path of this machine whose file is put in the place of an object of shared storage."""
+    """A local path whose file replaces an object of shared storage."""
     with tempfile.TemporaryDirectory(prefix="triage-") as folder:
         temporary = Path(folder) / path.name
         temporary.touch()

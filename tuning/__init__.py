@@ -1,4 +1,4 @@
-"""What to change: describing functions, limit cycles, rules, recommendations; the words of question and answer."""
+"""Tuning advice: describing functions, limit cycles, rules, recommendations; the names of causes and actions."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class Cause(StrEnum):
-    """Why a loop oscillates, or is in trouble without."""
+    """Why a loop oscillates, or has a problem without an oscillation."""
 
     VALVE = "valve"
     TUNING = "tuning"

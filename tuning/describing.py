@@ -1,6 +1,6 @@
-"""Describing functions of play and stick-slip: what a valve does to a sine, as gain and phase.
+"""Describing functions of backlash and stick-slip: gain and phase of a valve for a sine.
 
-A sine A sin(wt) of OP comes out as the fundamental N(A) A sin(wt); N is complex, its angle is negative.
+A sine A sin(wt) of OP gives the fundamental N(A) A sin(wt); N is complex, its angle is negative.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from tuning.limits import METHOD
 Complexes = NDArray[np.complex128]
 
 TABLE_SIZE, CURVE_POINTS = 4000, 400
-"""Points of each part of a branch's table, whose interpolation is then better than 1e-5 in amplitude and gain; and of
-a curve that is drawn."""
+"""Points of each part of a branch's table, which make its interpolation better than 1e-5 in amplitude and gain; and
+of a drawn curve."""
 
 
 def backlash(amplitude: ArrayLike, width: float) -> Complexes:
-    """Describing function of play of full width `width` [% OP] at amplitudes > 0 of OP [% OP], of any shape.
+    """Describing function of backlash of full width `width` [% OP] at amplitudes > 0 of OP [% OP], of any shape.
 
-    Johansson et al. (2012), the source study's Eq. (1), with d = width/2. Zero up to A = d, where the stem
-    does not move.
+    Johansson et al. (2012), the source study's Eq. (1), with d = width/2. Zero up to A = d, where the stem does not
+    move.
     """
     share = np.minimum(0.5 * width / np.asarray(amplitude, dtype=np.float64), 1.0)
     u = 1.0 - 2.0 * share
@@ -36,10 +36,10 @@ def backlash(amplitude: ArrayLike, width: float) -> Complexes:
 
 
 def jump_range(valve: Stiction, jumps: int) -> tuple[float, float]:
-    """Amplitudes of OP [% OP] between which a symmetric cycle of `jumps` jumps per half cycle can stand.
+    """Range of OP amplitudes [% OP] of a symmetric cycle with `jumps` jumps per half cycle.
 
-    The stem travels jumps*J; the last jump must still be reached and no further one: X + f_d <= A <= X + f_s
-    with X = jumps*J/2 and the thresholds f_s, f_d of identification.simulation.valve.
+    The stem travels jumps*J; it must reach the last jump and no further one: X + f_d <= A <= X + f_s with X =
+    jumps*J/2 and the thresholds f_s, f_d of identification.simulation.valve.
     """
     breakaway, sliding = thresholds(valve.stickband, valve.slip_jump)
     reach = 0.5 * jumps * valve.slip_jump
@@ -47,7 +47,7 @@ def jump_range(valve: Stiction, jumps: int) -> tuple[float, float]:
 
 
 def jumps_at(amplitude: float, valve: Stiction) -> int:
-    """Fewest jumps per half cycle of a symmetric cycle at this amplitude [% OP]; 0 where the stem rests."""
+    """Fewest jumps per half cycle of a symmetric cycle at this amplitude [% OP]; 0 where the stem does not move."""
     breakaway, sliding = thresholds(valve.stickband, valve.slip_jump)
     if amplitude < sliding + 0.5 * valve.slip_jump:
         return 0
@@ -57,10 +57,10 @@ def jumps_at(amplitude: float, valve: Stiction) -> int:
 def stick_slip(amplitude: ArrayLike, stickband: float, slip_jump: float, jumps: int = 1) -> Complexes:
     """Describing function of two-parameter stick-slip with a given number of jumps per half cycle, at least one.
 
-    A cycle with n jumps is the sum of n relays of height J/2 that switch at h_k = S/2 + J(k - (n+1)/2),
-    k = 1..n, each of which has the textbook describing function (Atherton 1982). One jump with S = J = 2d is
-    the source study's Eq. (2). Derived here; the tests hold it against the projection of the operator. The amplitude
-    [% OP], of any shape, lies within `jump_range`; nan outside the switching levels.
+    A cycle with n jumps is the sum of n relays of height J/2 that switch at h_k = S/2 + J(k - (n+1)/2), k = 1..n,
+    each of which has the textbook describing function (Atherton 1982). One jump with S = J = 2d is the source study's
+    Eq. (2). Derived here; tests compare it with the projection of the operator. The amplitude [% OP], of any shape,
+    lies within `jump_range`; nan outside the switching levels.
     """
     a = np.asarray(amplitude, dtype=np.float64)
     level = 0.5 * stickband + slip_jump * (np.arange(1, jumps + 1) - 0.5 * (jumps + 1))
@@ -73,9 +73,9 @@ def stick_slip(amplitude: ArrayLike, stickband: float, slip_jump: float, jumps: 
 def sliding(amplitude: ArrayLike, stickband: float, slip_jump: float) -> Complexes:
     """Describing function of stick-slip whose stem follows OP after its jump.
 
-    From OP's trough the stem rests at -(A - f_d) up to the angle p with cos p = 1 - S/A, then follows at the
-    distance f_d = (S - J)/2 (Choudhury, Thornhill, Shah 2005); the half cycle's integral is derived here.
-    J = 0 is play of width S. At amplitudes [% OP] of any shape; up to S/2 the stem rests and N is 0.
+    From OP's minimum the stem rests at -(A - f_d) up to the angle p with cos p = 1 - S/A, then follows at the
+    distance f_d = (S - J)/2 (Choudhury, Thornhill, Shah 2005); the half cycle's integral is derived here. J = 0 is
+    backlash of width S. At amplitudes [% OP] of any shape; up to S/2 the stem rests and N is 0.
     """
     a = np.asarray(amplitude, dtype=np.float64)
     gap = thresholds(stickband, slip_jump)[1]
@@ -87,21 +87,21 @@ def sliding(amplitude: ArrayLike, stickband: float, slip_jump: float) -> Complex
 
 
 def is_play(valve: Valve) -> bool:
-    """Whether the valve is play, or stick-slip with a jump too small to tell from it."""
+    """Whether the valve has backlash, or stick-slip with a negligible jump."""
     return isinstance(valve, Backlash) or (
         isinstance(valve, Stiction) and valve.slip_jump <= METHOD.play_jump_share * valve.stickband
     )
 
 
 def band(valve: Valve) -> float:
-    """Full width [% OP] of what OP must travel after a reversal: play's width or the stickband; 0 without."""
+    """Full width [% OP] of OP travel after a reversal without stem motion: backlash or stickband; 0 without."""
     if valve is None:
         return 0.0
     return valve.width if isinstance(valve, Backlash) else valve.stickband
 
 
 def scaled_valve(valve: Valve, factor: float) -> Valve:
-    """The valve with play, or stickband and slip jump, times a factor [-]."""
+    """The valve with backlash, or stickband and slip jump, times a factor [-]."""
     if valve is None:
         return None
     if isinstance(valve, Backlash):
@@ -110,12 +110,12 @@ def scaled_valve(valve: Valve, factor: float) -> Valve:
 
 
 def moves_by_jumps(valve: Valve) -> bool:
-    """Whether the stem moves by whole jumps alone, and so has a describing function for each number of them."""
+    """Whether the stem moves only by whole jumps, and so has a describing function for each number of them."""
     return isinstance(valve, Stiction) and valve.motion is Motion.RESTS and not is_play(valve)
 
 
 def describing_function(valve: Backlash | Stiction, amplitude: ArrayLike, jumps: int = 1) -> Complexes:
-    """N(A) of a faulty valve at amplitudes [% OP] of any shape; `jumps` a half cycle where it moves by jumps."""
+    """N(A) of a faulty valve at amplitudes [% OP] of any shape; `jumps` per half cycle if it moves by jumps."""
     if isinstance(valve, Backlash) or is_play(valve):
         return backlash(amplitude, band(valve))
     if valve.motion is not Motion.RESTS:
@@ -124,7 +124,7 @@ def describing_function(valve: Backlash | Stiction, amplitude: ArrayLike, jumps:
 
 
 def describe(valve: Valve, amplitude: float) -> complex:
-    """N(A) of any valve at one amplitude [% OP]; with several cycles possible, that of fewest jumps."""
+    """N(A) of any valve at one amplitude [% OP]; if several cycles are possible, that of fewest jumps."""
     if valve is None or band(valve) <= 0.0:
         return 1.0 + 0.0j
     jumps = jumps_at(amplitude, valve) if isinstance(valve, Stiction) and moves_by_jumps(valve) else 1
@@ -143,10 +143,10 @@ def curve(valve: Valve) -> tuple[Floats, Complexes]:
 
 @dataclass(frozen=True, slots=True)
 class Branch:
-    """One smooth piece of N(A), tabulated by its phase, which rises with A on every piece.
+    """One smooth piece of N(A), tabulated by its phase, which increases with A on every piece.
 
-    jumps per half cycle (0: play), root shape (m,): sqrt(-phase) descending, log_amplitude [ln % OP] and
-    log_gain (m,). The square root makes the table smooth where play's phase goes to zero.
+    jumps per half cycle (0: backlash), root shape (m,): sqrt(-phase) descending, log_amplitude [ln % OP] and log_gain
+    (m,). The square root makes the table smooth where the phase of backlash goes to zero.
     """
 
     jumps: int
@@ -155,7 +155,7 @@ class Branch:
     log_gain: Floats
 
     def at_phase(self, phase: Floats) -> tuple[Floats, Floats]:
-        """ln A and ln abs(N) where N has this phase [rad], shaped as `phase`; nan where it never has."""
+        """ln A and ln abs(N) where N has this phase [rad], shaped as `phase`; nan where it has no such phase."""
         known = (phase < 0.0) & (phase > -np.pi)
         root = np.sqrt(np.where(known, -phase, np.nan))
         amplitude = np.interp(root, self.root[::-1], self.log_amplitude[::-1], left=np.nan, right=np.nan)
@@ -168,9 +168,9 @@ def _branch(jumps: int, amplitude: Floats, n: Complexes) -> Branch:
 
 
 def _play_branch(width: float) -> Branch:
-    """Play's table over the angle x = acos(2d/A - 1) in which the stem moves.
+    """Backlash table over the angle x = acos(2d/A - 1) in which the stem moves.
 
-    N = (x - sin(2x)/2 - i sin(x)^2)/pi, Eq. (1) rewritten so that nothing cancels as A tends to d.
+    N = (x - sin(2x)/2 - i sin(x)^2)/pi, Eq. (1) rewritten without cancellation as A tends to d.
     """
     nearly_stuck = np.geomspace(1e-5, 0.5, TABLE_SIZE, endpoint=False)
     moving = np.concatenate((nearly_stuck, np.linspace(0.5, np.pi, TABLE_SIZE + 1)[:-1]))
@@ -186,7 +186,7 @@ def _jump_branch(valve: Stiction, jumps: int) -> Branch:
 
 @lru_cache(maxsize=64)
 def branches(valve: Valve) -> tuple[Branch, ...]:
-    """The pieces of N(A): one for play, one per number of jumps for stick-slip, none for a healthy valve."""
+    """The pieces of N(A): one for backlash, one per number of jumps for stick-slip, none for an ideal valve."""
     width = band(valve)
     if valve is None or width <= 0.0:
         return ()

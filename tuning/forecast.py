@@ -1,4 +1,4 @@
-"""What settings would do: each pair simulated on the same load, a change of tuning with intervals."""
+"""Simulated effect of settings: all on the same load, and a change of tuning with intervals."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from tuning.limits import METHOD
 from tuning.rules import backlash_rule, lambda_settings, simc
 
 DIGITS = 6
-"""Digits of a model's constants, and decimals of a load [% PV], that are simulated: a cycle behind a play or a
-stem that sticks carries a rounding error on, and between settings as good as each other a thirteenth digit would
-choose."""
+"""Digits of a model's constants, and decimals of a load [% PV], used in simulation: a cycle behind backlash or
+stick-slip amplifies a rounding error, and otherwise the thirteenth digit would choose between equally good
+settings."""
 SEED = 0
 NOW, RECOMMENDED, SIMC, LAMBDA, LONGER = "now", "recommended", "SIMC", "lambda", "Ti not below T"
 CALMER, SMALLER, DERIVATIVE, REPAIRED = (
@@ -31,7 +31,7 @@ CALMER, SMALLER, DERIVATIVE, REPAIRED = (
     "with derivative",
     "now, valve repaired",
 )
-"""Names of the settings compared; the last is what a repair would bring."""
+"""Names of the compared settings; the last is the result of a repair."""
 
 
 class Assessed(NamedTuple):
@@ -57,8 +57,8 @@ NAMES = Assessed._fields
 class Forecast:
     """Both tunings on the same load, by assessment name.
 
-    before, after [unit of the assessment], and change = after/before - 1 [-], each with its 90 % interval
-    over blocks of the load and over the uncertainty samples.
+    before, after [unit of the assessment], and change = after/before - 1 [-], each with its 90 % interval over blocks
+    of the load and over the uncertainty samples.
     """
 
     before: dict[str, Estimate]
@@ -67,12 +67,12 @@ class Forecast:
 
 
 def in_digits(load: Floats) -> Floats:
-    """A load as it is simulated, shape (n,) [% PV]."""
+    """A load rounded for simulation, shape (n,) [% PV]."""
     return np.ascontiguousarray(np.round(load, DIGITS))
 
 
 def loop_in_digits(loop: Loop) -> Loop:
-    """The loop with its constants to so many digits as they are ever known."""
+    """The loop with its constants rounded to the digits that are known."""
 
     def rounded(x: float) -> float:
         return float(f"{x:.{DIGITS}g}")
@@ -88,9 +88,9 @@ def loop_in_digits(loop: Loop) -> Loop:
 def run(loop: Loop, load: Floats) -> LoopRecord:
     """The loop at a constant set point of 0 under a load on the controller's clock, shape (n,) [% PV].
 
-    OP rests in the middle of the controller's range. A loop with play is kicked once before the record begins: from
-    rest a small load would leave it inside its play, where a plant that cycles is not. Stick-slip needs no kick, for
-    integral action drives it off.
+    OP rests in the middle of the controller's range. A loop with backlash gets one kick before the record begins:
+    from rest a small load would not leave the backlash, unlike in a cycling plant. Stick-slip needs no kick, because
+    integral action moves it.
     """
     c, before = loop.controller, _prelude(loop, load)
     whole = np.concatenate((before, load))
@@ -99,7 +99,7 @@ def run(loop: Loop, load: Floats) -> LoopRecord:
 
 
 def _prelude(loop: Loop, load: Floats) -> Floats:
-    """The load's first value, a kick for a while, and the first value again [% PV]; empty without play."""
+    """The load's first value, a kick for a while, and the first value again [% PV]; empty without backlash."""
     width = band(loop.valve)
     if not is_play(loop.valve) or width <= 0.0 or load.size == 0:
         return np.empty(0)
@@ -109,7 +109,7 @@ def _prelude(loop: Loop, load: Floats) -> Floats:
 
 
 def autocorrelation_peak(error: Floats) -> float:
-    """Height of the first peak of the autocorrelation beyond its first zero, at least 0; constants have 0.
+    """Height of the first peak of the autocorrelation after its first zero, at least 0; 0 for constants.
 
     error of shape (n,) [% PV]; the estimate is biased towards 0 at long lags, which favours several periods.
     """
@@ -166,7 +166,7 @@ def predict(loop: Loop, controller: Pid, load: Floats, uncertainty: Sequence[Loo
     """The present and a new controller on the same load, on the identified loop and on its uncertainty samples.
 
     The load, shape (n,), and noise add to PV on the controller's clock [% PV]; ValueError for fewer than ten scans a
-    block. Of `uncertainty`, other loops that the data allow, the controllers are not used. Blocks do not overlap
+    block. The controllers of `uncertainty`, other loops consistent with the data, are not used. Blocks do not overlap
     (Kunsch 1989).
     """
     if load.size < 10 * METHOD.blocks:
@@ -190,7 +190,7 @@ def predict(loop: Loop, controller: Pid, load: Floats, uncertainty: Sequence[Loo
 
 
 def _change(before: Floats, after: Floats) -> Floats:
-    """after/before - 1, 0 where both are nothing; any shape."""
+    """after/before - 1, 0 where both are zero; any shape."""
     nothing = before <= 1e-12
     ratio = after / np.where(nothing, 1.0, before) - 1.0
     return np.where(nothing, 0.0, ratio)
@@ -201,8 +201,8 @@ class Tried:
     """One pair of settings on the load.
 
     controller; ms, maximum sensitivity [-], inf where the linear loop is unstable; stem_travel [%/h]; error, average
-    of its absolute value [% PV]; peak, largest of it [% PV]; integral_s, Ti/|Kp| [s], integral of the error that a
-    step of the load at OP leaves, inf without integral action; record, what was simulated, without its warm-up.
+    absolute error [% PV]; peak, its maximum [% PV]; integral_s, Ti/|Kp| [s], integral of the error after a step of
+    the load at OP, inf without integral action; record, the simulation without its warm-up.
     """
 
     name: str
@@ -216,8 +216,8 @@ class Tried:
 
 
 def alternatives(loop: Loop, new: Pid | None, chosen: Mapping[str, Pid] | None = None) -> dict[str, Pid]:
-    """Settings to compare: the present ones, the recommended if any, those chosen between, and the rules'; those that
-    equal earlier ones are left out. A derivative is the present one in all but those that are chosen for theirs."""
+    """Settings to compare: the present ones, the recommended ones if any, those of `chosen`, and those of the rules,
+    without duplicates. All have the present derivative, except chosen settings with their own."""
     now, h = loop.controller, scan_step(loop)
     found = {NOW: now} | ({} if new is None else {RECOMMENDED: new}) | dict(chosen or {})
     rules = {SIMC: simc(loop.process, scan_s=h), LAMBDA: lambda_settings(loop.process, h)}
@@ -231,7 +231,7 @@ def alternatives(loop: Loop, new: Pid | None, chosen: Mapping[str, Pid] | None =
 
 
 def tried(loop: Loop, load: Floats, settings: Mapping[str, Pid]) -> tuple[Tried, ...]:
-    """Settings one by one, in their order, on a loop under a load on the controller's clock [% PV], shape (n,)."""
+    """Simulate settings in order on a loop under a load on the controller's clock [% PV], shape (n,)."""
     found = []
     for name, pid in settings.items():
         one = replace(loop, controller=pid)

@@ -1,4 +1,4 @@
-"""The loop without its valve: frequency response, stability, sensitivity; dead time and scan exact."""
+"""The loop without its valve: frequency response, stability, sensitivity; dead time and scan are exact."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from identification.simulation.pi import kept
 from tuning.describing import Complexes
 
 LOWEST = 1e-6
-"""Lowest frequency looked at, over that of the slowest of time constant, integral time and dead time."""
+"""Lowest frequency of the grid, relative to that of the slowest of time constant, integral time and dead time."""
 POINTS, LOOKED_AT = 900, 400
-"""Frequencies of a grid, and of that on which the sensitivity is looked at."""
+"""Frequencies of a grid, and of the grid for the sensitivity."""
 CIRCLE = 500
-"""Points of the half circle on which stability is judged, besides eight for each scan of dead time."""
+"""Points of the half circle for the stability test, besides eight for each scan of dead time."""
 MOST_DELAY = 4000
-"""Scans of dead time that stability is judged with at most [-]; ours: beyond it the loop is judged at a scan of that
-share of the dead time, which shifts its phase by 1/8000 of the dead time's own, so that no grid grows with the data.
+"""Largest number of scans of dead time in the stability test [-]; ours: above it a scan of that share of the dead
+time is used, which shifts the phase by 1/8000 of the dead time's own, so that no grid grows with the data.
 """
 
 
 def integral_s(controller: Pid) -> float:
-    """Integral time [s], inf where the integral is off (stated as 0 or inf)."""
+    """Integral time [s], inf where the integral is off (given as 0 or inf)."""
     return controller.ti_s if controller.ti_s > 0 else math.inf
 
 
@@ -96,8 +96,8 @@ def frequencies(loop: Loop, points: int = POINTS, lowest: float = LOWEST) -> Flo
 Scanned = tuple[float, float, float, int]
 """Pole, now, before and delay of a process on its scan."""
 Acting = tuple[float, float, float, float]
-"""Of a controller on its scan: gains of integral and derivative over its gain, and what the filters of slope and of
-PV keep of their last value [-]."""
+"""A controller at its scan: gains of integral and derivative over its gain, and shares of their last value kept by
+the filters of slope and of PV [-]."""
 
 
 def _acting(c: Pid, h: float) -> Acting:
@@ -108,11 +108,11 @@ def _acting(c: Pid, h: float) -> Acting:
 
 @njit(cache=True)
 def _half_turns(process: Scanned, kp: float, law: Acting, low: float, points: int) -> int:
-    """Half turns about 0 that the characteristic polynomial in 1/z makes along the upper unit circle, from one real
-    value to another: how often it crosses the imaginary axis to the left, less how often to the right.
+    """Net half turns about 0 of the characteristic polynomial in 1/z along the upper unit circle, between real
+    values: number of crossings of the imaginary axis to the left less those to the right.
 
-    Its points are `points` even ones and as many in even ratios from `low` [rad] on. A controller without integral
-    leaves a factor 1 - 1/z on the circle, which is taken out.
+    The grid has `points` equidistant points and as many in geometric steps from `low` [rad] on. A controller without
+    integral leaves a factor 1 - 1/z on the circle, which is removed.
     """
     pole, now, before, delay = process
     rate, td, slope_keep, pv_keep = law
@@ -149,8 +149,8 @@ def _backwards(angle: float) -> complex:
 def stable_gains(loop: Loop, kp: Floats) -> Mask:
     """True for each gain [% OP / % PV], shape (n,), at which the sampled linear loop is stable.
 
-    A continuous controller is taken at the step that the simulator gives it. The polynomial in 1/z has its
-    unstable roots inside the unit circle; their number is the winding of its values along the circle.
+    A continuous controller gets the step of the simulator. The polynomial in 1/z has its unstable roots inside the
+    unit circle; their number is the winding number along the circle.
     """
     h = max(scan_step(loop), loop.process.dead_time_s / MOST_DELAY)
     d, c = discretize(loop.process, h), loop.controller
@@ -160,13 +160,13 @@ def stable_gains(loop: Loop, kp: Floats) -> Mask:
 
 
 def is_stable(loop: Loop) -> bool:
-    """Whether the sampled linear loop, its valve left out, is stable."""
+    """Whether the sampled linear loop, without its valve, is stable."""
     return bool(stable_gains(loop, np.array([loop.controller.kp]))[0])
 
 
 def maximum_sensitivity(loop: Loop) -> float:
-    """Ms of the loop's linear part, max abs(1/(1 + L)) (Astrom, Hagglund 2006), its valve left out; inf where it is
-    not stable."""
+    """Ms of the loop's linear part without its valve, max abs(1/(1 + L)) (Astrom, Hagglund 2006); inf where it is not
+    stable."""
     if not is_stable(loop):
         return math.inf
     omega, c = frequencies(loop, LOOKED_AT, lowest=1e-2), loop.controller
@@ -178,8 +178,8 @@ def maximum_sensitivity(loop: Loop) -> float:
 
 
 def resonance_s(loop: Loop) -> float:
-    """Period [s] at which the loop's linear part amplifies loads most: of the largest abs(1/(1 + L)) that is a
-    peak, or of the largest where none is."""
+    """Period [s] of the largest amplification of loads by the linear part: of the largest peak of abs(1/(1 + L)), or
+    of its maximum if there is no peak."""
     omega = frequencies(loop, LOOKED_AT, lowest=1e-2)
     size = 1.0 / np.abs(1.0 + loop_response(loop, omega))
     return float(2.0 * math.pi / omega[int(np.argmax(size))])
@@ -187,7 +187,7 @@ def resonance_s(loop: Loop) -> float:
 
 @njit(cache=True)
 def _least_distance(process: Scanned, kp: float, law: Acting, angles: Floats) -> float:
-    """Least distance of the sampled loop's response to -1 over some angles [rad] of z, shape (m,)."""
+    """Smallest distance of the sampled loop's response from -1 over some angles [rad] of z, shape (m,)."""
     pole, now, before, delay = process
     rate, td, slope_keep, pv_keep = law
     kp *= 1.0 - pv_keep

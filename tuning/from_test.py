@@ -1,5 +1,5 @@
-"""Settings of a PI controller from a process that a test has told: SIMC's, and the strongest that are robust within
-the test's intervals."""
+"""Settings of a PI controller from a process identified in a test: SIMC's, and the fastest that are robust within the
+test's intervals."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from tuning.limits import METHOD
 from tuning.rules import effective_delay, simc
 
 HALVINGS = 14
-"""Halvings of the search for a gain; the last is of .01 %."""
+"""Halvings of the search for a gain; the last step is .01 %."""
 
 
 @dataclass(frozen=True, slots=True)
 class FromTest:
-    """SIMC's settings with tau_c = L, the strongest whose maximum sensitivity stays within a limit wherever the
-    process lies in its intervals, and the sensitivity of each on the process itself [-]."""
+    """SIMC's settings with tau_c = L, the settings of highest gain whose maximum sensitivity stays within a limit for
+    all processes in the intervals, and the sensitivity of each on the process itself [-]."""
 
     simc: Pid
     robust: Pid
@@ -43,7 +43,7 @@ def corners(process: Process, e: dict[str, Estimate]) -> tuple[Process, ...]:
 def settings_from(process: Process, among: Sequence[Process], scan_s: float) -> FromTest:
     """Settings for a process that may be any of `among`, the process itself the first; scan_s [s], 0: continuous.
 
-    Raises ValueError where the process has no gain, or no delay to speak of.
+    Raises ValueError where the process has no gain, or negligible delay.
     """
     fastest = max(effective_delay(p, scan_s) for p in among)
     plain = simc(process, max(effective_delay(process, scan_s), 1e-9), scan_s)
@@ -60,7 +60,7 @@ def settings_from(process: Process, among: Sequence[Process], scan_s: float) -> 
 
 
 def _strongest(pid: Pid, among: Sequence[Process]) -> Pid | None:
-    """The controller with the largest gain whose sensitivity stays within the limit on all of some processes."""
+    """The controller with the largest gain whose sensitivity stays within the limit on all given processes."""
 
     def holds(kp: float) -> bool:
         trial = replace(pid, kp=kp)

@@ -1,7 +1,7 @@
-"""Harmonic balance: the limit cycles that describing functions predict for a loop with play or stick-slip.
+"""Harmonic balance: the limit cycles that describing functions predict for a loop with backlash or stick-slip.
 
-G(iw) C(iw) N(A) = -1 (the source study's Eq. 3) has its phase in w alone once A is chosen to fit, so all
-solutions are the zeros of one function of w. Its Figures 3, 4, 5 and 7 as arrays stand here too: curves, and travel
+In G(iw) C(iw) N(A) = -1 (the source study's Eq. 3) the phase depends only on w once A is chosen to fit it, so all
+solutions are the zeros of one function of w. Its Figures 3, 4, 5 and 7 are also here as arrays: curves, and travel
 over Kp and Ti.
 """
 
@@ -19,12 +19,12 @@ from tuning.describing import Branch, Complexes, band, branches, curve, is_play
 from tuning.frequency_response import controller_response, frequencies, loop_response, spaced, stable_gains
 
 POLISH_STEPS = 6
-"""Eightfold bracketings that polish a root found on the grid."""
+"""Eightfold bracketing steps that refine a root found on the grid."""
 END_STEPS, FINER = 2, 40
-"""Refinements, and points of each, of the frequencies at which a branch begins and ends."""
+"""Refinements, and points of each, of the first and last frequency of a branch."""
 REACH_POINTS, MAP_POINTS = 600, 300
-"""Frequencies at which a branch is looked at: no pair of solutions further apart than 2 % is missed; and those of a
-map's row, whose periods are then within 0.1 %."""
+"""Frequencies of the grid on a branch: pairs of solutions more than 2 % apart are found; and those of a map's row,
+whose periods are then within 0.1 %."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +32,8 @@ class Balance:
     """One solution of the harmonic balance.
 
     period_s [s], op_amplitude [% OP] and pv_amplitude [% PV] (half of peak to peak), stable: whether the loop
-    returns to it (a limit cycle) or leaves it (the border between two fates); jumps of the stem per half
-    cycle (0: play).
+    returns to it (a limit cycle) or leaves it (the boundary between two outcomes); jumps of the stem per
+    half cycle (0: backlash).
     """
 
     period_s: float
@@ -51,10 +51,10 @@ def _roots_of_phase(loop: Loop) -> tuple[Floats, Floats]:
 
 
 def _reach(loop: Loop, branch: Branch, points: int) -> Floats:
-    """Grid [rad/s] of the frequencies at which some amplitude of a branch closes the phase.
+    """Grid [rad/s] of the frequencies at which some amplitude of a branch satisfies the phase condition.
 
-    `points` for each stretch of them, shape (k,), dense towards the ends, where the amplitude runs away;
-    empty where there is none. The phase of G C does not depend on the gain, and so neither does the grid.
+    `points` for each stretch of them, shape (k,), dense towards the ends, where the amplitude diverges; empty where
+    there is none. The phase of G C does not depend on the gain, and so neither does the grid.
     """
     omega, root = _roots_of_phase(loop)
     inside = (root <= branch.root[0]) & (root >= branch.root[-1])
@@ -67,7 +67,7 @@ def _reach(loop: Loop, branch: Branch, points: int) -> Floats:
 
 
 def _ends(loop: Loop, branch: Branch, omega: Floats) -> tuple[float, float]:
-    """The frequencies [rad/s] between which a branch closes the phase, within omega of shape (m,), m >= 2."""
+    """First and last frequency [rad/s] at which a branch satisfies the phase, within omega of shape (m,), m >= 2."""
     low, high = omega[:2], omega[-2:]
     for _ in range(END_STEPS):
         up, down = spaced(low[0], low[1], FINER), spaced(high[0], high[1], FINER)
@@ -80,17 +80,17 @@ def _ends(loop: Loop, branch: Branch, omega: Floats) -> tuple[float, float]:
 
 
 def _excess(loop: Loop, branch: Branch, omega: Floats) -> Floats:
-    """ln abs(G C N) at the amplitude whose N closes the phase, shape (m,); nan where no amplitude does."""
+    """ln abs(G C N) at the amplitude whose N satisfies the phase, shape (m,); nan where no amplitude does."""
     response = loop_response(loop, omega)
     phase = np.angle(-1.0 / response)
     return np.log(np.abs(response)) + branch.at_phase(phase)[1]
 
 
 def _roots(loop: Loop, branch: Branch) -> list[tuple[float, bool]]:
-    """Frequencies [rad/s] of all solutions on a branch, bracketed on the grid and polished, and which are stable.
+    """Frequencies [rad/s] of all solutions on a branch, bracketed on the grid and refined, and which are stable.
 
-    Loeb's criterion (Atherton 1982) asks that with A a little larger the oscillation decays. As N's phase rises with
-    A on every branch, that is where abs(G C N), at the amplitude that closes the phase, falls with frequency.
+    Loeb's criterion (Atherton 1982): with slightly larger A the oscillation must decay. As N's phase increases with A
+    on every branch, that is where abs(G C N), at the amplitude that satisfies the phase, decreases with frequency.
     """
     omega = _reach(loop, branch, REACH_POINTS)
     excess = _excess(loop, branch, omega)
@@ -125,9 +125,9 @@ def _solution(loop: Loop, branch: Branch, omega: float, stable: bool) -> Balance
 
 
 def harmonic_balance(loop: Loop) -> tuple[Balance, ...]:
-    """All solutions of G C N(A) = -1, dead time and scan exact, from the fastest to the slowest.
+    """All solutions of G C N(A) = -1, with exact dead time and scan, from the highest to the lowest frequency.
 
-    Empty where the curves do not meet. With scan_s = 0 the controller is continuous, as in the study.
+    Empty where the curves do not intersect. With scan_s = 0 the controller is continuous, as in the study.
     """
     found = [_solution(loop, b, *root) for b in branches(loop.valve) for root in _roots(loop, b)]
     return tuple(sorted(found, key=lambda s: s.period_s))
@@ -141,7 +141,7 @@ def predicted_cycle(loop: Loop) -> Balance | None:
 
 @dataclass(frozen=True, slots=True)
 class Curves:
-    """Figure 3: N(A) and -1/(G C) in the complex plane, and where they meet.
+    """Figure 3: N(A) and -1/(G C) in the complex plane, and their intersections.
 
     valve has its amplitudes [% OP] in `amplitude`, shape (m,); linear its frequencies [rad/s] in `omega`, shape (k,).
     """
@@ -181,8 +181,8 @@ def curves(loop: Loop) -> Curves:
 def _map_row(loop: Loop, branch: Branch, kp: Floats) -> tuple[Floats, Floats]:
     """Frequency [rad/s] and ln A of the stable solution on a branch per gain, shape (n,); nan where none.
 
-    The phase of G C does not depend on Kp, so the gain that closes the balance is a function of frequency
-    alone, and all gains of a row are read from one curve; a solution is stable where that gain rises.
+    The phase of G C does not depend on Kp, so the gain that satisfies the balance is a function of frequency alone,
+    and all gains of a row follow from one curve; a solution is stable where that gain increases.
     """
     unit = replace(loop, controller=replace(loop.controller, kp=math.copysign(1.0, loop.controller.kp)))
     omega = _reach(unit, branch, MAP_POINTS)
@@ -211,8 +211,8 @@ def _largest(loop: Loop, kp: Floats) -> tuple[Floats, Floats]:
 def travel_map(loop: Loop, kp: Floats, ti_s: Floats) -> TravelMap:
     """Valve travel over gains kp, shape (n,), all of the controller's sign, and integral times ti_s > 0, shape (m,).
 
-    The loop's own Kp and Ti do not count. For stick-slip no solution of the balance does not mean rest: with
-    integral action OP ramps until the stem slips; `rests` is then False and simulation must tell.
+    The loop's own Kp and Ti are ignored. For stick-slip, no solution of the balance does not imply rest: with
+    integral action OP ramps until the stem slips; `rests` is then False and only simulation gives the result.
     """
     rows = [
         replace(loop, controller=replace(loop.controller, kp=float(kp[0]), ti_s=float(ti))) for ti in ti_s

@@ -1,6 +1,6 @@
-"""The limit cycle of a loop with play or stick-slip, confirmed by simulation.
+"""The limit cycle of a loop with backlash or stick-slip, confirmed by simulation.
 
-Where the harmonic balance predicts another, simulation counts.
+If the harmonic balance predicts another cycle, the simulation decides.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from tuning.harmonic_balance import Balance, predicted_cycle
 from tuning.limits import METHOD
 
 KICK = 1.0 + math.sqrt(5.0)
-"""Kick in widths of the play, seen at OP; irrational, lest the stem's travel meet it exactly."""
+"""Kick in backlash widths at OP; irrational, so that the stem's travel never matches it exactly."""
 KICKS = (1.0, 1.37, 1.83)
-"""Kicks over the first; further ones are for a stem that moves by jumps and rests on the set point by chance."""
+"""Further kicks relative to the first, for a stem that moves by jumps and happens to rest on the set point."""
 NO_LIMIT = 1e9
-"""Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
+"""Output limits [% OP] without effect: a cycle scales with the backlash and must not reach a limit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,9 +41,9 @@ class Cycle:
 
 @dataclass(frozen=True, slots=True)
 class Confirmed:
-    """What simulation says: a cycle, none, or no answer.
+    """Result of the simulation: a cycle, none, or undecided.
 
-    settled is False where neither a steady cycle nor rest was reached, and `cycle` the last one seen; predicted is
+    settled is False if neither a steady cycle nor rest was reached; `cycle` is then the last one found; predicted is
     the largest stable solution of the harmonic balance.
     """
 
@@ -53,7 +53,7 @@ class Confirmed:
 
 
 def _measured(r: LoopRecord) -> Cycle | None:
-    """The cycle in a stretch of a settled loop; None where the stem rests or fewer than two periods are seen."""
+    """The cycle in a stretch of a settled loop; None if the stem rests or there are fewer than two periods."""
     x = r.pv - 0.5 * (r.pv.max() + r.pv.min())
     k = np.flatnonzero((x[:-1] < 0) & (x[1:] >= 0))
     at = k + x[k] / (x[k] - x[k + 1])  # crosses its middle upwards, between samples
@@ -70,11 +70,11 @@ def _measured(r: LoopRecord) -> Cycle | None:
 
 
 def _kicked(loop: Loop, steps: int, kick: float) -> LoopRecord:
-    """The loop at rest, its output limits out of the way, after a step of PV by `kick` [% PV].
+    """The loop at rest, without output limits, after a step of PV by `kick` [% PV].
 
-    Halfway the load of a stem that moves by whole jumps is trimmed so that rest would lie midway between two
-    of its places. The share of a jump that a load asks for sets how lopsided and slow the cycle is; half a
-    jump gives the symmetric and fastest one, which is also what the balance describes.
+    Halfway the load of a stem that moves by whole jumps is adjusted so that equilibrium is midway between two of its
+    positions. The share of a jump that the load requires determines the asymmetry and period of the cycle; half a
+    jump gives the symmetric and fastest one, which is also that of the balance.
     """
     free = replace(loop, controller=replace(loop.controller, op_lo=-NO_LIMIT, op_hi=NO_LIMIT))
     valve, half = loop.valve, steps // 2
@@ -99,7 +99,7 @@ def _verdict(op: Floats, width: float) -> str:
 
 
 def confirm(loop: Loop) -> Confirmed:
-    """The limit cycle that simulation finds after a kick, without noise."""
+    """The limit cycle in a simulation after a kick, without noise."""
     predicted = predicted_cycle(loop)
     width = band(loop.valve)
     if width <= 0.0:
@@ -120,7 +120,7 @@ def confirm(loop: Loop) -> Confirmed:
 
 
 def _ramp_s(loop: Loop) -> float:
-    """Time [s] in which integral action drives OP four times across a stickband at half a band's error."""
+    """Time [s] in which integral action moves OP by four stickbands at an error of half a band."""
     c = loop.controller
     if isinstance(loop.process, Integrator) or math.isinf(integral_s(c)):
         return 0.0
@@ -128,7 +128,7 @@ def _ramp_s(loop: Loop) -> float:
 
 
 def _settle(loop: Loop, steps: int, kick: float, width: float, predicted: Balance | None) -> Confirmed:
-    """Simulate ever longer until the loop rests or cycles steadily with four periods in the last quarter."""
+    """Extend the simulation until the loop rests or cycles steadily with four periods in the last quarter."""
     while True:
         record = _kicked(loop, steps, kick)
         verdict = _verdict(record.op, width)

@@ -1,6 +1,6 @@
-"""What to type into the controller, or why to leave it alone: a proposal for a loop in trouble.
+"""Recommended controller settings, or the reason for none, for a loop with a problem.
 
-Its sentences stand in reasons.toml; what is put into them is worded here.
+Its sentences are in reasons.toml; the texts inserted in them are made here.
 """
 
 from __future__ import annotations
@@ -37,32 +37,32 @@ from tuning.search import (
 )
 
 WHY: Mapping[str, str] = tomllib.loads((files("tuning") / "reasons.toml").read_text("utf-8"))
-"""Why settings are proposed or none, by the cause or by what decided it."""
+"""Reasons for settings or for none, by the cause or by the deciding condition."""
 
 
 INTEGRAL_TIMES = 5
-"""Integral times tried from the longest to the shortest lag that the record allows: neighbours differ by less than
-two where the ends differ by ten."""
+"""Number of integral times tried, from the longest to the shortest lag consistent with the record: neighbours differ
+by less than two if the ends differ by ten."""
 SHARES_KEPT, CALM_MS = (0.5, 0.6, 0.67, 0.75, 0.8), 7.0
-"""Parts of a ringing loop's response at its ringing that a first step keeps, the calmest whose error is within the
-price, and the maximum sensitivity of the process that rings so up to which it is calm: with four fifths of the
-response the integrator with dead time has 5 to 7, true plants about 3.5 (benchmarks.world, seeds 1, 2, 3, 16, 61)."""
+"""Shares of the response at the ringing period that a first step keeps; the most robust with an error within the
+price is chosen. Maximum sensitivity of the fitted process up to which it is robust: with four fifths of the response
+the integrator with dead time has 5 to 7, true plants about 3.5 (benchmarks.world, seeds 1, 2, 3, 16, 61)."""
 WITHOUT_SETTINGS = {
     Cause.LOAD: Action.FIND_DISTURBANCE,
     Cause.UNDECIDED: Action.UNDECIDED,
     Cause.NONE: Action.NONE,
 }
-"""What to do about a loop whose cause asks for no settings."""
+"""Action for a loop whose cause requires no new settings."""
 
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """What to do about a loop.
+    """The recommendation for a loop.
 
-    reason, why, with figures; controller, the new settings, None unless action is retune; meanwhile, with the action
-    to repair the valve, settings that are better than the present ones until then; before and after, the simulated
-    limit cycle without noise at the present and at the new settings; ms_before and ms, their maximum sensitivity [-],
-    inf where unstable; candidates, what was considered, best first.
+    reason, with figures; controller, the new settings, None unless action is retune; meanwhile, if the action is to
+    repair the valve, settings better than the present ones until then; before and after, the simulated limit cycle
+    without noise at the present and at the new settings; ms_before and ms, their maximum sensitivity [-], inf where
+    unstable; candidates, those considered, best first.
     """
 
     action: Action
@@ -77,12 +77,12 @@ class Proposal:
 
     @property
     def new(self) -> Pid | None:
-        """The settings proposed, or those until a repair; None where there are none."""
+        """The proposed settings, or those until a repair; None where there are none."""
         return self.controller or self.meanwhile
 
 
 def _check(cause: str, load: Floats | None) -> None:
-    """Raise ValueError for what `recommend` cannot take."""
+    """Raise ValueError for invalid arguments of `recommend`."""
     if cause not in tuple(Cause):
         raise ValueError(f"cause is one of {', '.join(Cause)}, got {cause!r}")
     if load is not None and not np.all(np.isfinite(load)):
@@ -103,12 +103,12 @@ def recommend(
 ) -> Proposal:
     """The proposal for one loop: identified process and valve with the present controller.
 
-    cause, why the loop is in trouble, one of tuning.Cause, ValueError for any other; uncertainty, other loops that
-    the data allow; load, load and noise as they add to PV, on the controller's clock, shape (n,) [% PV], ValueError
-    where it is not finite; None, or one too short to tell (tuning.limits): steps at the valve; error, the recorded
-    average absolute error [% PV], which a loop that is hardly stable is simulated too badly to tell, None:
-    simulated; halfway, whether the record leaves the dead time of a loop that rings unsure, so that a first step is
-    proposed; seen, what was seen of the ringing of such a loop, None: what the model does by itself.
+    cause, the cause of the problem, one of tuning.Cause, ValueError for any other; uncertainty, other loops
+    consistent with the data; load, load and noise as they add to PV, on the controller's clock, shape (n,) [% PV],
+    ValueError where it is not finite; None, or too short a load (tuning.limits): steps at the valve; error, the
+    recorded average absolute error [% PV], because the simulation of a barely stable loop is too inaccurate, None:
+    simulated; halfway, whether the dead time of a ringing loop is uncertain, so that a first step is proposed; seen,
+    the observed ringing of such a loop, None: that of the model.
     """
     _check(cause, load)
     if cause not in (Cause.VALVE, Cause.TUNING):
@@ -131,11 +131,10 @@ def _tight(
     limits: TuningLimits,
     halfway: bool,
 ) -> Proposal:
-    """SIMC for a loop that rings by its tuning: the nominal, or on a known load the one of least error.
+    """SIMC for a loop that rings because of its tuning: nominal, or under a known load the one of least error.
 
-    The aim is robustness, and a rise of the error up to tight_price is its price, on the models and by the recorded
-    error's spectrum; where robust settings cost more, or the model does not tell them, a first step follows from the
-    ringing alone.
+    The aim is robustness. The error may rise up to tight_price, by the models and by the recorded error's spectrum.
+    If robust settings cost more, or the model does not determine them, a first step follows from the ringing alone.
     """
     now, old = maximum_sensitivity(loop), loop.controller
     if now <= limits.ms_most:
@@ -157,14 +156,14 @@ def _tight(
 
 
 def _is_allowed(old: Pid, new: Pid, seen: ObservedRinging, limits: TuningLimits) -> bool:
-    """Whether new settings calm the observed ringing, within the price by the recorded error's spectrum."""
+    """Whether new settings reduce the observed ringing, within the price by the recorded error's spectrum."""
     calm = sensitivity_at(old, new, seen.period_s) <= limits.step_ms
     return calm and error_ratio(old, new, seen) <= limits.tight_price
 
 
 def _first_step(old: Pid, now: float, seen: ObservedRinging, limits: TuningLimits) -> Proposal:
-    """The calmest step from the observed ringing alone whose error is within the price, of equally calm ones that of
-    least error; with a higher gain only where no other is; none where there is none."""
+    """The most robust step from the observed ringing alone with an error within the price; among equals the one of
+    least error; with a higher gain only if there is no other; none if there is none."""
     tried = _steps(old, seen)
     within = [x for x in tried if x.error <= limits.tight_price]
     known: dict[str, object] = {"period": _seconds(seen.period_s)}
@@ -182,8 +181,8 @@ def _first_step(old: Pid, now: float, seen: ObservedRinging, limits: TuningLimit
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """Settings from the ringing alone, the maximum sensitivity of the process that rings so with them [-], and their
-    error over the present one by the recorded error's spectrum [-]."""
+    """Settings from the ringing alone, their maximum sensitivity on the process fitted to the ringing [-], and their
+    error relative to the present one by the recorded error's spectrum [-]."""
 
     new: Pid
     ms: float
@@ -191,7 +190,7 @@ class _Step:
 
 
 def _steps(old: Pid, seen: ObservedRinging) -> list[_Step]:
-    """The steps from the ringing alone that leave the process that rings so calm enough."""
+    """The steps from the ringing alone that make the fitted process robust enough."""
     process, made = process_of(old, seen.period_s), []
     for share in SHARES_KEPT:
         for one in from_ringing(old, seen.period_s, share):
@@ -203,15 +202,15 @@ def _steps(old: Pid, seen: ObservedRinging) -> list[_Step]:
 
 
 def _alone(loop: Loop) -> ObservedRinging:
-    """The ringing of a loop of which nothing but the model is known."""
+    """The ringing of a loop according to its model alone."""
     period_s = resonance_s(loop)
     return ObservedRinging(period_s, np.array([2.0 * math.pi / period_s]), np.ones(1))
 
 
 @dataclass(frozen=True, slots=True)
 class _Cases:
-    """What settings are tried on: loops that the data allow, the cautious one among them, one load in digits [% PV],
-    and the present error on it [% PV], None: as simulated."""
+    """Test cases of settings: loops consistent with the data, including the cautious one, one rounded load [% PV],
+    and the present error under it [% PV], None: simulated."""
 
     loops: tuple[Loop, ...]
     cautious: Loop
@@ -223,7 +222,7 @@ class _Cases:
         return mean_error(self.loops, new, self.load)
 
     def worst(self, new: Pid) -> float:
-        """Error with a controller over the present one, on the loop on which it is largest [-]."""
+        """Largest error with a controller over the present one, on any loop [-]."""
         return max(
             mean_error((one,), new, self.load)
             / max(self.error or mean_error((one,), one.controller, self.load), 1e-9)
@@ -232,17 +231,17 @@ class _Cases:
 
 
 def _cases(loop: Loop, others: Sequence[Loop], load: Floats, error: float | None) -> _Cases:
-    """What settings of a loop are tried on; the cautious loop itself counts where no others are known."""
+    """Test cases for settings of a loop; without others, the cautious loop itself."""
     return _Cases((*others, loop)[: max(len(others), 1)], loop, in_digits(load), error)
 
 
 def _simc_settings(
     loop: Loop, others: Sequence[Loop], first: int, limits: TuningLimits
 ) -> list[tuple[Pid, float]]:
-    """SIMC settings with their Ms from the `first` step of the closed-loop time constant on, all samples robust.
+    """Robust SIMC settings with their Ms, from the `first` closed-loop time constant on, for all samples.
 
-    Integral times lie between the loop's own time constant and the shortest of its samples'. The gain of a loop
-    that rings is not raised. A derivative stays as it is, for nobody is told to switch it off.
+    Integral times are between the loop's own time constant and the shortest of its samples'. The gain of a ringing
+    loop is not raised. The derivative is not changed.
     """
     h = scan_step(loop)
     tau_c = METHOD.tau_c_per_delay * effective_delay(loop.process, h)
@@ -262,7 +261,7 @@ def _simc_settings(
 
 
 def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: TuningLimits) -> Proposal:
-    """The least travel and error that the limits allow, for a loop with play or stick-slip."""
+    """Settings with the least travel and error within the limits, for a loop with backlash or stick-slip."""
     if band(loop.valve) <= 0.0:
         return Proposal(Action.UNDECIDED, WHY["no_size"])
     before, fault = confirm(loop), fault_told(loop)
@@ -298,15 +297,15 @@ def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
 
 
 def _is_short_and_sticks(loop: Loop, limits: TuningLimits) -> bool:
-    """Whether a stem that sticks sits before a lag that is no more than a few dead times long."""
+    """Whether the valve sticks and the lag is at most a few dead times long."""
     if is_play(loop.valve) or not isinstance(loop.process, Fopdt):
         return False
     return loop.process.time_constant_s < limits.stick_ratio * effective_delay(loop.process, scan_step(loop))
 
 
 def _worth(candidate: Candidate, now: Pid, limits: TuningLimits) -> bool:
-    """Whether a candidate cuts travel by enough for a change; by more where it differs from the present settings by
-    no more than one night's advice from another's."""
+    """Whether a candidate reduces travel enough for a change; the threshold is higher if it differs from the present
+    settings by no more than the advice of two nights does."""
     new = candidate.controller
     gain, time = abs(math.log(new.kp / now.kp)), abs(math.log(integral_s(new) / integral_s(now)))
     near = gain <= math.log(limits.near_gain) and time <= math.log(limits.near_time)
@@ -314,7 +313,7 @@ def _worth(candidate: Candidate, now: Pid, limits: TuningLimits) -> bool:
 
 
 def _smaller(after: Confirmed, before: Confirmed, most_growth: float) -> bool:
-    """Whether the new limit cycle is none, or has less travel than the old one and has not grown in PV."""
+    """Whether there is no new limit cycle, or one with less travel and without growth in PV."""
     if after.cycle is None:
         return after.settled
     if before.cycle is None:
@@ -324,7 +323,7 @@ def _smaller(after: Confirmed, before: Confirmed, most_growth: float) -> bool:
 
 
 def _apart(candidates: list[Candidate], apart: float) -> list[Candidate]:
-    """Those that differ from every better one by more than `apart`: the rest would share its fate."""
+    """Candidates that differ from every better one by more than `apart`; the others would behave alike."""
     kept: list[Candidate] = []
     for c in candidates:
         here = np.log([abs(c.controller.kp), c.controller.ti_s])
@@ -337,7 +336,7 @@ def _apart(candidates: list[Candidate], apart: float) -> list[Candidate]:
 def _confirmed(
     table: Bench, candidates: tuple[Candidate, ...], before: Confirmed
 ) -> tuple[Candidate, Confirmed] | None:
-    """The best candidate worth a change whose simulated limit cycle is none or smaller, on samples too."""
+    """The best worthwhile candidate whose simulated limit cycle is none or smaller, on samples too."""
     first, limits = table.loops[0], table.limits
     worth = [c for c in candidates if _worth(c, first.controller, limits)]
     worthy = _apart(worth, limits.apart)[: limits.confirmed]
@@ -354,7 +353,7 @@ def _confirmed(
 
 
 def robustness(ms: float) -> str:
-    """A maximum sensitivity in words; a loop that has none is unstable."""
+    """Text for a maximum sensitivity; infinite means unstable."""
     return f"Ms {ms:.2f}" if math.isfinite(ms) else "unstable"
 
 
@@ -364,13 +363,13 @@ def _seconds(x: float) -> str:
 
 
 def settings(controller: Pid) -> str:
-    """Kp and Ti in words, in percent of spans and seconds."""
+    """Text for Kp and Ti, in percent of spans and seconds."""
     ti = integral_s(controller)
     return f"Kp {controller.kp:.3g} %/%, Ti {f'{_seconds(ti)} s' if math.isfinite(ti) else 'off'}"
 
 
 def fault_told(loop: Loop) -> str:
-    """A valve's fault with its size."""
+    """Text for a valve fault with its size."""
     width = band(loop.valve)
     return (
         f"play of {width:.2g} %" if is_play(loop.valve) else f"stick-slip with a stickband of {width:.2g} %"
@@ -378,7 +377,7 @@ def fault_told(loop: Loop) -> str:
 
 
 def swings(cycle: Cycle | None) -> str:
-    """A limit cycle with its period and amplitude."""
+    """Text for a limit cycle with its period and amplitude."""
     if cycle is None:
         return "no limit cycle"
     return f"a cycle of {_seconds(cycle.period_s)} s and ±{cycle.pv_amplitude:.2g} % PV"
@@ -389,7 +388,7 @@ def _percent(ratio: float) -> str:
 
 
 def _why_calmer(best: Candidate, before: Confirmed, after: Confirmed, ms_before: float, table: Bench) -> str:
-    """Why settings for a loop with a faulty valve are proposed, and what they leave to be done."""
+    """Reason for the settings of a loop with a faulty valve, and the remaining work."""
     loop, new = table.loops[0], best.controller
     peaks = [rejection(loop.process, pid).peak for pid in (new, loop.controller)]
     why = WHY["calmer"].format(
@@ -409,7 +408,7 @@ def _why_calmer(best: Candidate, before: Confirmed, after: Confirmed, ms_before:
 
 
 def _nothing_better(loop: Loop, before: Confirmed, considered: bool) -> str:
-    """Why a faulty valve's loop gets no settings."""
+    """Reason for no settings for a loop with a faulty valve."""
     known = {"fault": fault_told(loop), "cycle": swings(before.cycle)}
     kind = "play" if isinstance(loop.valve, Backlash) else "stick-slip"
     return WHY["none_worth_it" if considered else "none_kept"].format(kind=kind, **known)

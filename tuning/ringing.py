@@ -1,7 +1,7 @@
-"""What a ringing loop tells of its settings by itself: at the period at which it rings its response is nearly -1.
+"""Settings from the ringing of a loop alone: at the ringing period the loop response is nearly -1.
 
-Ziegler and Nichols (1942) take settings from that point alone. It holds whatever the process is, also where a filter,
-a slow scan or a limit that nobody stated makes an identified model wrong.
+Ziegler and Nichols (1942) derive settings from that point alone. It is valid for any process, also where an unstated
+filter, slow scan or limit makes an identified model wrong.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from tuning.frequency_response import controller_response, integral_s, loop_resp
 PER_INTEGRAL = 1.2
 """Period of the ringing over the integral time of a PI controller (Ziegler, Nichols 1942)."""
 TIMES, RAISED = 9, 2.0
-"""Integral times that are tried, and factor by which the gain may rise at most [-]; of a level Kp
-and Ti doubled together double the damping, and leave Ti/Kp, with which the error under a slow load goes, as it is."""
+"""Number of integral times tried, and factor by which the gain may rise at most [-]; for a level, doubling both Kp
+and Ti doubles the damping and keeps Ti/Kp, to which the error under a slow load is proportional."""
 BINS = 300
-"""Bins of the error's spectrum, of equal ratio; ours: over five decades they are 4 % wide."""
+"""Bins of the error's spectrum, of equal ratio; ours: over five decades their width is 4 %."""
 
 
 @dataclass(frozen=True, slots=True)
 class ObservedRinging:
-    """What was seen of a ringing loop: its period [s], and the power of its error [% PV squared, to a factor] at some
-    frequencies omega [rad/s], shape (m,) each."""
+    """Observed ringing: its period [s], and the power of the error [% PV squared, to a factor] at some frequencies
+    omega [rad/s], shape (m,) each."""
 
     period_s: float
     omega: Floats
@@ -36,7 +36,7 @@ class ObservedRinging:
 
 
 def observed_ringing(period_s: float, error: Spectrum) -> ObservedRinging:
-    """What the spectrum of the error shows of a loop that rings at a period [s]."""
+    """The observed ringing from the spectrum of the error and the period [s]."""
     power = tapered_power(error)[1:]
     omega = 2.0 * math.pi / error.duration_s * np.arange(1, power.size + 1)
     bins = (BINS * np.log(omega / omega[0]) / max(math.log(omega[-1] / omega[0]), 1e-9)).astype(np.int64)
@@ -51,24 +51,24 @@ def at_period(controller: Pid, period_s: float) -> complex:
 
 
 def sensitivity_at(old: Pid, new: Pid, period_s: float) -> float:
-    """Sensitivity that new settings leave at the period at which the loop rings with the old ones [-]."""
+    """Sensitivity under new settings at the period of the ringing with the old ones [-]."""
     return 1.0 / max(abs(1.0 - at_period(new, period_s) / at_period(old, period_s)), 1e-9)
 
 
 def process_of(old: Pid, period_s: float) -> Integrator:
-    """The integrator with dead time that rings at a period [s] with these settings: above
-    that frequency its phase falls further than that of a lag with dead time through the same point."""
+    """The integrator with dead time that rings at a period [s] with these settings: above that frequency its phase
+    decreases faster than that of a lag with dead time through the same point."""
     there, ringing = at_period(old, period_s), 2.0 * math.pi / period_s
-    way = math.copysign(1.0, old.kp)  # of a controller that acts the other way the process does, too
+    way = math.copysign(1.0, old.kp)  # a direct-acting controller has a process of the opposite sign
     dead_time_s = max(0.5 * math.pi + float(np.angle(way * there)), 0.0) / ringing
     return Integrator(way * ringing / abs(there), dead_time_s)
 
 
 def from_ringing(old: Pid, period_s: float, share: float) -> list[Pid]:
-    """Settings that keep a share of the loop's present response at the period at which it rings [s].
+    """Settings that keep a share of the loop's present response at the ringing period [s].
 
-    The integral time grows up to that period over 1.2; it stays where it is longer, or off. Kp follows; it rises by
-    RAISED at most, where the integral time was what makes the loop ring.
+    The integral time is raised up to that period over 1.2, unless it is longer or off. Kp follows; it rises by at
+    most RAISED if the integral time caused the ringing.
     """
     longest = max(integral_s(old), period_s / PER_INTEGRAL)
     times = np.geomspace(integral_s(old), longest, TIMES) if longest > integral_s(old) else [old.ti_s]
@@ -80,9 +80,9 @@ def from_ringing(old: Pid, period_s: float, share: float) -> list[Pid]:
 def error_ratio(old: Pid, new: Pid, seen: ObservedRinging) -> float:
     """Error of new settings over the present one [-], by the spectrum of the recorded error.
 
-    The error is the load or the set point times 1/(1 + L), so that each of its frequencies changes by
-    (1 + L)/(1 + L'). Well below the ringing both responses are large and the ratio is that of the controllers; at the
-    ringing L is -1. Between, the process counts as the integrator with dead time that gives -1 there.
+    The error is the load or the set point times 1/(1 + L), so each of its frequencies changes by (1 + L)/(1 + L').
+    Well below the ringing both responses are large and the ratio is that of the controllers; at the ringing L is -1.
+    In between, the process is taken as the integrator with dead time that gives -1 there.
     """
     laws = [replace(c, scan_s=0.0) for c in (old, new)]
     process = process_of(laws[0], seen.period_s)

@@ -1,4 +1,4 @@
-"""Tuning rules in closed form: SIMC for a process without valve trouble, the source study's for play."""
+"""Closed-form tuning rules: SIMC for a process with a fault-free valve, the source study's for backlash."""
 
 from __future__ import annotations
 
@@ -57,9 +57,9 @@ def lambda_settings(process: Process, scan_s: float = 0.0) -> Pid:
 
 
 def backlash_rule(process: Process, controller: Pid) -> Pid:
-    """The source study's Eq. (6): Ti at least the time constant, gain kept.
+    """The source study's Eq. (6): Ti at least the time constant, gain unchanged.
 
-    On an integrator, where the rule has no meaning, the controller comes back as it was.
+    For an integrator, where the rule does not apply, the controller is unchanged.
     """
     if isinstance(process, Integrator):
         return controller

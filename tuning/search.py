@@ -1,6 +1,6 @@
-"""The search over the Kp-Ti plane: candidates that keep robustness and load rejection, scored on a load.
+"""Search over the Kp-Ti plane: candidates that keep robustness and load rejection, scored under a load.
 
-They are tried on a bench: the loops that the data allow, each with a load, and the present figures beside.
+They are tested on a bench: the loops consistent with the data, each with a load, and the present figures.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ FINE = 5
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A pair of settings and what the model says of it.
+    """A pair of settings and its results in the model.
 
-    ms [-]; travel and error: stem travel and average absolute error over those of the present tuning [-],
-    means over the loops simulated; worst_travel and worst_error the largest of these; score: lower is better.
+    ms [-]; travel and error: stem travel and average absolute error over those of the present tuning [-], means over
+    the loops simulated; worst_travel and worst_error the largest of these; score: lower is better.
     """
 
     controller: Pid
@@ -47,12 +47,12 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Bench:
-    """What candidates are tried on: loops with the present controller, loads, and the present figures.
+    """Test bench of candidates: loops with the present controller, loads, and the present figures.
 
-    Every other loop gets the load backwards: a second record of the same kind, for a sticking stem's fate
-    hangs on the load's very course.
+    Every other loop gets the load in reverse: a second record of the same kind, because the motion of a sticking stem
+    depends on the exact load.
 
-    travel [%/h] and error [% PV] of shape (number of loops,); most_ms, the Ms that each loop may have [-].
+    travel [%/h] and error [% PV] of shape (number of loops,); most_ms, the highest allowed Ms of each loop [-].
     """
 
     loops: tuple[Loop, ...]
@@ -64,7 +64,7 @@ class Bench:
 
 
 def standard_load(loop: Loop, steps: int) -> Floats:
-    """A load for when none is known, shape (steps,) [% PV]: steps at the valve, half the play high."""
+    """A load if none is known, shape (steps,) [% PV]: steps at the valve of half the backlash."""
     h = scan_step(loop)
     hold = max(int(15.0 * slowest_s(loop) / h), 50)
     height = 0.5 * max(band(loop.valve), 0.5)
@@ -75,7 +75,7 @@ def standard_load(loop: Loop, steps: int) -> Floats:
 
 
 def _as_simulated(loop: Loop) -> Loop:
-    """The loop in digits, its controller's gain above 0: mirrored about OP's middle, it travels and errs alike."""
+    """The rounded loop with positive controller gain: mirrored about OP's middle, travel and error are the same."""
     p, c = loop.process, loop.controller
     gain, *times = astuple(p)
     mirrored = type(p)(math.copysign(1.0, c.kp) * gain, *times)
@@ -83,19 +83,19 @@ def _as_simulated(loop: Loop) -> Loop:
 
 
 def _figures(loop: Loop, load: Floats) -> tuple[float, float]:
-    """Stem travel [%/h] and average absolute error [% PV] on a load in digits, without the warm-up."""
+    """Stem travel [%/h] and average absolute error [% PV] under a rounded load, without the warm-up."""
     r = settled(run(_as_simulated(loop), load))
     travel = float(np.abs(np.diff(r.stem)).sum())
     return travel / r.duration_s * 3600.0, float(np.mean(np.abs(r.pv)))
 
 
 def mean_error(loops: Sequence[Loop], controller: Pid, load: Floats) -> float:
-    """Average absolute error [% PV] on a load in digits, shape (n,), mean over the loops with one controller."""
+    """Average absolute error [% PV] under a rounded load, shape (n,), mean over the loops with one controller."""
     return float(np.mean([_figures(replace(one, controller=controller), load)[1] for one in loops]))
 
 
 def bench(loop: Loop, others: Sequence[Loop], load: Floats, limits: TuningLimits) -> Bench:
-    """The present tuning on every loop, so that candidates can be compared with it."""
+    """The present tuning on every loop, as a reference for candidates."""
     cut = in_digits(load[-limits.most_steps :])
     loops = tuple(replace(one, controller=loop.controller) for one in (loop, *others))
     loads = tuple(cut if k % 2 == 0 else np.ascontiguousarray(cut[::-1]) for k in range(len(loops)))
@@ -104,7 +104,7 @@ def bench(loop: Loop, others: Sequence[Loop], load: Floats, limits: TuningLimits
 
 
 def try_out(table: Bench, controller: Pid, ms: float | None = None, loops: int | None = None) -> Candidate:
-    """Score a candidate, whose Ms on the first loop may be known, on the first `loops` of the bench (None: all)."""
+    """Score a candidate, with its Ms on the first loop if known, on the first `loops` of the bench (None: all)."""
     if ms is None:
         ms = maximum_sensitivity(replace(table.loops[0], controller=controller))
     some = table.loops[:loops]
@@ -120,7 +120,7 @@ def try_out(table: Bench, controller: Pid, ms: float | None = None, loops: int |
 
 
 def _score(travel: Floats, error: Floats, aim: float, limits: TuningLimits) -> float:
-    """Log of the mean travel, and of the error, which weighs more once above its aim; lower is better."""
+    """Log of the mean travel plus that of the error, weighted more above its aim; lower is better."""
     mean_error = max(float(error.mean()), float(error[0]), 1e-9)
     above = max(math.log(mean_error / aim), 0.0)
     mean_travel = float(travel.mean()) + limits.travel_floor
@@ -128,7 +128,7 @@ def _score(travel: Floats, error: Floats, aim: float, limits: TuningLimits) -> f
 
 
 def is_harmless(c: Candidate, table: Bench) -> bool:
-    """Whether a candidate is worse on none of the loops that the data allow."""
+    """Whether a candidate is worse on none of the loops consistent with the data."""
     limits = table.limits
     most = limits.error_growth_play if is_play(table.loops[0].valve) else limits.error_growth_sample
     return (
@@ -140,7 +140,7 @@ def is_harmless(c: Candidate, table: Bench) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Rejection:
-    """Answer of the linear loop to a unit step of load at the valve.
+    """Response of the linear loop to a unit step of load at the valve.
 
     peak [% PV / % OP]: largest deviation; integral [s % PV / % OP]: Ti/abs(Kp), the integral of the error.
     """
@@ -150,7 +150,7 @@ class Rejection:
 
 
 def rejection(process: Process, controller: Pid) -> Rejection:
-    """Peak and integral of the error after a unit load step at the process's input, valve left out."""
+    """Peak and integral of the error after a unit load step at the process input, without the valve."""
     loop = Loop(process, replace(controller, op_lo=-1e9, op_hi=1e9))
     h = scan_step(loop)
     ti = integral_s(controller)
@@ -163,11 +163,11 @@ def rejection(process: Process, controller: Pid) -> Rejection:
 
 
 def allowed(loop: Loop, limits: TuningLimits) -> Rejection:
-    """The slowest rejection that a proposal may have: stated factors of the nominal, or the present one's.
+    """The slowest load rejection of a proposal: stated factors of the nominal, or the present one's.
 
-    The integral's reference is nominal gain with Ti of at least T, for that is what play asks for. Beyond
-    `integral_factor_ramp` times SIMC's own integral a longer Ti hardly slows the cycle further, so there only the
-    rule itself, Ti = T at the present gain, goes on.
+    The integral's reference is nominal gain with Ti of at least T, as backlash requires. Above `integral_factor_ramp`
+    times SIMC's own integral a longer Ti hardly slows the cycle further, so there only the rule itself, Ti = T at the
+    present gain, is allowed.
     """
     nominal = simc(loop.process, scan_s=scan_step(loop))
     best = rejection(loop.process, nominal)
@@ -185,12 +185,12 @@ def allowed(loop: Loop, limits: TuningLimits) -> Rejection:
 
 
 def rounded(x: float) -> float:
-    """Three significant digits: what one types into a controller."""
+    """Round to three significant digits for entry in a controller."""
     return float(f"{x:.3g}")
 
 
 def pairs(loop: Loop, gains: Floats, times: Floats) -> list[Pid]:
-    """Settings of every gain [% OP / % PV] with every integral time [s], with the sign that the loop has now."""
+    """Settings of every gain [% OP / % PV] with every integral time [s], with the loop's present sign."""
     now, sign = loop.controller, math.copysign(1.0, loop.controller.kp)
     return [
         replace(now, kp=rounded(sign * float(k)), ti_s=rounded(float(t))) for k, t in product(gains, times)
@@ -198,7 +198,7 @@ def pairs(loop: Loop, gains: Floats, times: Floats) -> list[Pid]:
 
 
 def robust(loops: Sequence[Loop], controller: Pid, most: Sequence[float]) -> float | None:
-    """Ms on the first of the loops where that of each is at most its own of `most`, else None."""
+    """Ms on the first loop if each loop's is at most its limit in `most`, else None."""
     first = None
     for one, bound in zip(loops, most, strict=True):
         ms = maximum_sensitivity(replace(one, controller=controller))
@@ -209,10 +209,10 @@ def robust(loops: Sequence[Loop], controller: Pid, most: Sequence[float]) -> flo
 
 
 def most_ms(loops: Sequence[Loop], limits: TuningLimits) -> tuple[float, ...]:
-    """The limits of Ms, or the present tuning's own where that is larger, the first loop's up to the samples' limit.
+    """The limits of Ms, or the present tuning's own if larger, the first loop's up to the samples' limit.
 
-    A loop that has run for years at its present Ms is not made less robust by settings with no more; a valve model
-    that takes a jump for play asks for twice the gain of the process, and its Ms is then too high by as much.
+    A loop that has run for years at its present Ms is not made less robust by settings with the same; a valve model
+    that confuses a jump with backlash gives twice the process gain, and then too high an Ms.
     """
     most = limits.ms_most_sample
     now = [maximum_sensitivity(one) for one in loops]
@@ -221,7 +221,7 @@ def most_ms(loops: Sequence[Loop], limits: TuningLimits) -> tuple[float, ...]:
 
 
 def _kept(table: Bench, most: Rejection, settings: list[Pid]) -> list[Candidate]:
-    """Those of some settings that keep robustness, load rejection and error, tried on every loop."""
+    """The settings that keep robustness, load rejection and error, tested on every loop."""
     process, found = table.loops[0].process, []
     for pid in settings:
         if pid.ti_s / abs(pid.kp) > most.integral:
@@ -235,8 +235,8 @@ def _kept(table: Bench, most: Rejection, settings: list[Pid]) -> list[Candidate]
 
 
 def _grid(loop: Loop, most: Rejection, limits: TuningLimits) -> tuple[Floats, Floats]:
-    """Gains [% OP / % PV] and integral times [s] of the coarse grid. With play before a lag the best is often at the
-    time constant (the source study's Eq. 6), but not always: the simulation decides."""
+    """Gains [% OP / % PV] and integral times [s] of the coarse grid. With backlash before a lag the best is often at
+    the time constant (the source study's Eq. 6), but not always: the simulation decides."""
     nominal, now = simc(loop.process, scan_s=scan_step(loop)), loop.controller
     high = min(limits.gain_up * abs(now.kp), 2.0 * abs(nominal.kp))
     down = limits.gain_down_play if is_play(loop.valve) else limits.gain_down_stick
@@ -247,7 +247,7 @@ def _grid(loop: Loop, most: Rejection, limits: TuningLimits) -> tuple[Floats, Fl
 
 
 def search(table: Bench) -> tuple[Candidate, ...]:
-    """Candidates from best to worst, tried on all loops of the bench; empty where none keeps the limits.
+    """Candidates from best to worst, tested on all loops of the bench; empty if none is within the limits.
 
     A logarithmic grid over Kp and Ti, then a finer one around its best.
     """

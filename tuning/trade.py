@@ -1,4 +1,4 @@
-"""Settings on one curve: where nothing is won for nothing, what an engineer may choose between, each at its price."""
+"""Trade-off between settings: where no settings are better in everything, the curve to choose from."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from tuning.search import Bench, Candidate, pairs, robust, rounded, try_out
 POINTS = 11
 """Gains and integral times of the curve's grid."""
 SHARES, MORE = (0.25, 0.5), (1.0, 1.3)
-"""Derivative times that are tried, over the delay, and gains over those of the curve; ours: half the delay is what
-Ziegler and Nichols (1942) set."""
+"""Derivative times tried, over the delay, and gains over those of the curve; ours: half the delay is the value of
+Ziegler and Nichols (1942)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trade:
-    """What settings win and cost.
+    """Gains and losses of settings.
 
-    curve, robust settings that no others beat in travel and in error, the calmest first, figures on the first loop;
-    chosen, the two ends that hold on every loop of the bench, and one with a derivative where that pays, by name,
-    figures over all loops.
+    curve, robust settings that are not inferior to others in both travel and error, least travel first, figures on
+    the first loop; chosen, the two ends that are valid on every loop of the bench, and one with a derivative if
+    useful, by name, figures over all loops.
     """
 
     curve: tuple[Candidate, ...]
@@ -37,8 +37,8 @@ class Trade:
 
 
 def trade(table: Bench) -> Trade:
-    """The curve of a bench and the settings chosen on it, which hold on every loop that the data allow: the calmest
-    valve for a stated price in error, and the least error for no more travel."""
+    """The curve of a bench and the settings chosen on it, valid on every loop consistent with the data: the least
+    travel for a stated increase of error, and the least error without more travel."""
     curve, limits = _front(table), table.limits
     calm = (c for c in curve if c.error <= limits.trade_error)
     exact = (c for c in reversed(curve) if c.travel <= 1.0)
@@ -56,8 +56,8 @@ def trade(table: Bench) -> Trade:
 
 
 def _with_derivative(table: Bench, curve: Sequence[Candidate], without: Candidate | None) -> Candidate | None:
-    """Settings of the curve with a derivative, and some more gain, that on every loop take off far more error than
-    the best without one, for no more travel than now; None where none does, or the loop has a derivative."""
+    """Settings of the curve with a derivative, and some more gain, that reduce the error far more than the best
+    without one on every loop, without more travel than now; None if none, or if the loop has a derivative."""
     loop, limits = table.loops[0], table.limits
     if loop.controller.td_s > 0.0:
         return None
@@ -76,7 +76,7 @@ def _with_derivative(table: Bench, curve: Sequence[Candidate], without: Candidat
 
 
 def _front(table: Bench) -> tuple[Candidate, ...]:
-    """Robust settings of a wide grid that no others beat in travel and in error, the calmest first."""
+    """Robust settings of a wide grid not inferior to others in both travel and error, least travel first."""
     tried = ((pid, robust(table.loops, pid, table.most_ms)) for pid in pairs(table.loops[0], *_grid(table)))
     found = [try_out(table, pid, ms, 1) for pid, ms in tried if ms is not None]
     front: list[Candidate] = []
@@ -87,7 +87,7 @@ def _front(table: Bench) -> tuple[Candidate, ...]:
 
 
 def _grid(table: Bench) -> tuple[Floats, Floats]:
-    """Gains [% OP / % PV] and integral times [s] about the present and SIMC's, up to the time constant."""
+    """Gains [% OP / % PV] and integral times [s] about the present ones and SIMC's, up to the time constant."""
     loop, limits = table.loops[0], table.limits
     nominal = simc(loop.process, scan_s=scan_step(loop))
     gains = sorted((abs(loop.controller.kp), abs(nominal.kp)))

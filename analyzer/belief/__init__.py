@@ -1,1 +1,1 @@
-"""What the nights of a store together say of each loop: Findings of many nights in, beliefs out."""
+"""Joint results of the nights of a store for each loop: Findings of many nights in, beliefs out."""

@@ -1,8 +1,8 @@
-"""The belief in one loop: a step from what was believed the night before, and what is told of it.
+"""The belief about one loop: its update from the previous night, and the decision that follows from it.
 
-A settings change begins the cycle's part anew, for it is the settings that make cycle and advice; a repair begins the
-valve's. What is told contradicts no sure sign of the night itself: a loop that did not oscillate has no cause but a
-worn valve.
+A settings change restarts the part on the cycle, because settings determine cycle and advice; a repair restarts that
+on the valve. The decision contradicts no certain result of the night itself: a loop that did not oscillate has no
+cause except a worn valve.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, Status, c
 from identification.estimation.backlash_stiction import WIDTHS
 
 NEEDED, EARLIER = 10.0, 0.1
-"""Evidence needed [nat], and standard deviation of a width's logarithm, of nights that earlier versions kept."""
+"""Required evidence [nat], and standard deviation of a width's logarithm, of nights stored by earlier versions."""
 CONSTANTS = ("slope", "time_constant_s", "gain", "dead_time_s", "width", "slip_jump")
-"""Constants that nights pool."""
+"""Constants that are pooled over nights."""
 OF_VALVE = ("width", "slip_jump")
-"""Those of them that a repair changes."""
+"""Those that a repair changes."""
 GIST = attrgetter("cause", "fault", "action", "source")
-"""What makes a difference between what two tell."""
+"""Attributes in which two decisions differ."""
 
 
 @dataclass(frozen=True, slots=True)
 class NightDecision:
-    """What is told of a loop in a night: cause and confidence [%] of each, fault of the valve, the loop that it
-    follows, what to do and by when, the pair of settings, and whether that is other than what the night says by
-    itself."""
+    """The decision on a loop in a night: cause and confidence [%] of each, fault of the valve, the loop that it
+    follows, action and due time, the pair of settings, and whether it differs from the decision by the night
+    alone."""
 
     cause: Cause = Cause.UNDECIDED
     confidence: Mapping[Cause, float] = field(default_factory=dict)
@@ -58,7 +58,7 @@ class NightDecision:
 
 @dataclass(frozen=True, slots=True)
 class Calm:
-    """What a loop did in its last night under some settings: significance [% h], share [%] and period [s] of its
+    """Figures of a loop in its last night under some settings: significance [% h], share [%] and period [s] of its
     oscillation, amplitude of PV and average absolute error [% of span]."""
 
     night: str
@@ -71,11 +71,12 @@ class Calm:
 
 @dataclass(frozen=True, slots=True)
 class Belief:
-    """What is believed of a loop after a night.
+    """The belief about a loop after a night.
 
-    night, the last that counted; end_s, when its record ended; kp, ti, the settings in force; before, what the
-    loop did under those before; straight_pct, how much of its PV was on straight segments [%], and recorder, the
-    first night that was recorded so, '' where all were; phases of its programme."""
+    night, the last that counted; end_s, the end of its record; kp, ti, the settings in force; before, figures under
+    the settings before; straight_pct, share of its PV on straight segments [%], and recorder, the first night
+    recorded in this way, '' if all were; phases of its programme.
+    """
 
     loop: str
     night: str
@@ -95,7 +96,7 @@ class Belief:
     phases: tuple[PhaseKnown, ...] = ()
 
     def is_calmed(self, limits: BeliefLimits) -> bool:
-        """Whether the last change of settings took most of a cycle away."""
+        """Whether the last change of settings removed most of a cycle."""
         then, now = self.before, self.last
         if then is None or now is None or not counts(then.oscillating_pct):
             return False
@@ -106,7 +107,7 @@ _types: Callable[[Any], dict[str, Any]] = cache(get_type_hints)
 
 
 def kept_as(belief: Belief) -> str:
-    """A belief as the store keeps it (JSON): what the belief of the next night goes on from."""
+    """A belief as stored (JSON), from which that of the next night continues."""
     return json.dumps(belief, separators=(",", ":"), default=_as_fields)
 
 
@@ -115,12 +116,12 @@ def _as_fields(value: Any) -> dict[str, Any]:
 
 
 def belief_of(text: str) -> Belief:
-    """A belief as the store kept it; KeyError, TypeError or ValueError where another version wrote it."""
+    """A stored belief; KeyError, TypeError or ValueError for one of another version."""
     return _read_as(Belief, {"phases": []} | json.loads(text))  # type: ignore[no-any-return]
 
 
 def _read_as(kind: Any, kept: Any) -> Any:
-    """What JSON kept of a value, as a value of its declared type again."""
+    """A value from JSON converted to its declared type."""
     if kind in (float, int, str, bool):
         return kept
     if hasattr(kind, "__dataclass_fields__"):
@@ -136,10 +137,10 @@ def _read_as(kind: Any, kept: Any) -> Any:
 
 
 def step(before: Belief | None, row: Row, repaired_s: Sequence[float], config: Config) -> Belief | None:
-    """The belief after a night: as it was where the night tells nothing, None where no night has told anything.
+    """The belief after a night: unchanged if the night gives no result, None if no night has.
 
-    before : that of the night before, None where there is none; row : the loop's of the night; repaired_s : when
-    notes say that its valve was repaired [s since 1970-01-01 UTC].
+    before : that of the previous night, None if there is none; row : the loop's of the night; repaired_s : times of
+    valve repairs from notes [s since 1970-01-01 UTC].
     """
     if row["status"] == Status.OK and row["oscillating_pct"] is None and row.get("experiment"):
         return _with_constants(before or Belief(row["loop"], ""), row, config.belief)
@@ -161,7 +162,7 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], config: C
 
 
 def _with_constants(now: Belief, row: Row, limits: BeliefLimits) -> Belief:
-    """The belief with the constants of an experiment, in a night that tells nothing else: not that it was one."""
+    """The belief with the constants of an experiment, from a night without other results."""
     share = valve.faded_over(now.night, row["night"], limits) if now.night else 1.0
     constants = {k: pool.faded(share) for k, pool in now.constants.items()}
     said = said_of(row) or {}
@@ -173,14 +174,14 @@ def _with_constants(now: Belief, row: Row, limits: BeliefLimits) -> Belief:
 
 
 def _span(row: Row) -> tuple[float, float]:
-    """When a night's record began and ended [s since 1970-01-01 UTC]."""
+    """Start and end of a night's record [s since 1970-01-01 UTC]."""
     start_s = row["start_s"] or 0.0
     return start_s, start_s + (row["duration_s"] or 0.0)
 
 
 def _recorded_anew(now: Belief, row: Row, limits: BeliefLimits) -> Belief:
-    """The belief with what only one recorder shows begun anew, where another one, or its compression, is at work:
-    sizes and constants; the valve is the same."""
+    """The belief without sizes and constants, which depend on the recorder, if another recorder or compression is in
+    use; the valve is the same."""
     then, straight = now.straight_pct, row["straight_pct"]
     now = replace(now, straight_pct=straight)
     if then is None or straight is None or abs(straight - then) <= limits.recorder:
@@ -190,14 +191,14 @@ def _recorded_anew(now: Belief, row: Row, limits: BeliefLimits) -> Belief:
 
 
 def _after_changes(now: Belief, row: Row, repaired_s: Sequence[float]) -> Belief:
-    """The belief with what a change of settings, stated or seen in OP, or a repair since the night before has ended
-    begun anew."""
+    """The belief without the parts ended by a change of settings, stated or detected in OP, or by a repair since the
+    previous night."""
     settings, fresh = (row["kp"], row["ti"]), CycleBelief(top=now.cycle.top, loud=now.cycle.loud)
     phases = forgotten(now.phases)
     anew = replace(now, cycle=fresh, remedy=RemedyBelief(), before=now.last, phases=phases)
     listed = now.remedy.action is Action.CHECK_SETTINGS
     if now.night and None not in (now.kp, *settings) and (now.kp, now.ti) != settings:
-        # a list that is put right changes no loop
+        # a corrected loops.csv changes no loop
         now = replace(now, remedy=RemedyBelief()) if listed else anew
     elif now.night and not listed and row["action"] == Action.CHECK_SETTINGS:
         now = anew
@@ -208,8 +209,8 @@ def _after_changes(now: Belief, row: Row, repaired_s: Sequence[float]) -> Belief
 
 
 def _with_witness(now: Belief, share: float, row: Row, repaired_s: Sequence[float], config: Config) -> Belief:
-    """The belief in valve and process with what a night says of them; nothing where it says nothing, or where the
-    valve was repaired within it."""
+    """The belief about valve and process updated with a night; unchanged if the night gives no result, or if the
+    valve was repaired during it."""
     start_s, end_s = _span(row)
     mixed = any(start_s < at < end_s for at in repaired_s)
     constants = {k: pool.faded(share) for k, pool in now.constants.items()}
@@ -233,7 +234,7 @@ def _with_witness(now: Belief, share: float, row: Row, repaired_s: Sequence[floa
 
 
 def said_of(row: Row) -> Witness | None:
-    """What a night says of valve and process; of one that an earlier version kept, what its row tells of a fault."""
+    """Results of a night on valve and process; for a night of an earlier version from the fault in its row."""
     if row["witness"]:
         return json.loads(row["witness"])  # type: ignore[no-any-return]
     width, evidence = row["backlash_pct"] or row["stickband_pct"], row["evidence"]
@@ -246,7 +247,7 @@ def said_of(row: Row) -> Witness | None:
 
 
 def tell(now: Belief, row: Row, limits: BeliefLimits) -> NightDecision:
-    """What is told of a loop in a night, by what is believed of it with that night."""
+    """The decision on a loop in a night, from the belief including that night."""
     own = _own(row)
     alone = now.cycle.nights == 1 and now.valve.nights <= 1
     cycles = counts(row["oscillating_pct"])
@@ -258,15 +259,15 @@ def tell(now: Belief, row: Row, limits: BeliefLimits) -> NightDecision:
 
 
 def _left_alone(told: NightDecision) -> NightDecision:
-    """Of a loop whose worn valve makes far less of a cycle since its settings were changed: no further settings, and
-    the repair at the next shutdown."""
+    """Decision for a loop with a worn valve and far less of a cycle since its settings were changed: no further
+    settings, and the repair at the next shutdown."""
     if not action.is_urgent(told.action, told.due):
         return told
     return replace(told, action=Action.REPAIR_VALVE, due=Due.SHUTDOWN, pair=None, calmed=True)
 
 
 def _own(row: Row) -> NightDecision:
-    """What a night says by itself."""
+    """The decision by a night alone."""
     confidence = {c: row[f"osc_{c}_pct"] for c in CAUSES if row[f"osc_{c}_pct"] is not None}
     advised, due = Action(row["action"]) if row["action"] else None, Due(row["due"]) if row["due"] else None
     cause, fault, source = Cause(row["cause"]), Fault(row["valve_fault"]), row["source_loop"]
@@ -274,7 +275,7 @@ def _own(row: Row) -> NightDecision:
 
 
 def _of_calm(now: Belief, own: NightDecision, limits: BeliefLimits) -> NightDecision:
-    """Of a loop that did not oscillate in the night: a worn valve, or nothing."""
+    """Decision for a loop that did not oscillate in the night: a worn valve, or nothing."""
     if now.valve.is_worn(limits):
         fault = now.valve.fault(now.told.fault)
         confidence = {**own.confidence, Cause.VALVE: now.valve.worn_pct(limits)}
@@ -289,7 +290,7 @@ def _of_calm(now: Belief, own: NightDecision, limits: BeliefLimits) -> NightDeci
 
 
 def _of_cycle(now: Belief, own: NightDecision, limits: BeliefLimits) -> NightDecision:
-    """Of a loop that oscillated in the night: its source, else the cause that the nights name, and the valve."""
+    """Decision for a loop that oscillated: its source, otherwise the cause by all nights, and the valve."""
     source, worn = now.cycle.source, now.valve.is_worn(limits)
     if source is not None:
         if own.source is not None:
@@ -309,7 +310,7 @@ def _of_cycle(now: Belief, own: NightDecision, limits: BeliefLimits) -> NightDec
 
 
 def _with_remedy(now: Belief, own: NightDecision, told: NightDecision) -> NightDecision:
-    """What to do about a cycle of a cause."""
+    """Action for a cycle with a cause."""
     worn, done = told.fault in (Fault.BACKLASH, Fault.STICTION), now.remedy
     voted = None if done.action is Action.RETUNE and done.held is None else done.action
     alone = own.cause, own.action, own.due

@@ -1,12 +1,12 @@
-"""What nights under one pair of settings say: what makes the cycle, whom the loop follows, and what to do about it.
+"""Joint result of the nights under one pair of settings: the cause of the cycle, the loop's source, and the action.
 
-A night's odds err in two ways: by what differs from night to night, and by what the loop does to them every
-night. The mean over nights keeps the second alone, so the pooled odds may go further than one night's, but not on
-and on: k = (b + n) / (b + n / m) of m nights, with b and n the variances of both.
+A night's odds have two errors: one varies from night to night, the other is the same every night. The mean over
+nights keeps the second alone, so the pooled odds may exceed one night's, but not without limit: k = (b + n) / (b + n
+/ m) of m nights, with b and n the variances of both.
 
-What to do is the same night after night until something changes: votes of the nights, and one pair of settings held.
-Every pair that a night advises was proven on that night's model and load. The pair that lies amid those of all nights
-is told, and held until their middle has moved away from it by more than they scatter.
+The action is constant until something changes: by votes of the nights, and one fixed pair of settings. Every pair
+advised by a night was tested on that night's model and load. The pair nearest to the median of all nights is
+reported, and kept until the median has moved away from it by more than the scatter.
 """
 
 from __future__ import annotations
@@ -22,23 +22,24 @@ from analyzer.config import BeliefLimits
 from analyzer.loop.decisions import CAUSES, Action, Cause, counts
 
 WITH_PAIR = ("kp_new", "ti_new", "advice", "expected_period_s", "expected_pv_amplitude_pct")
-"""What a night says of a pair of settings that it advises."""
+"""Columns of a night for an advised pair of settings."""
 CHOICES = (Action.RETUNE, Action.REPAIR_VALVE, Action.CHECK_SETTINGS)
-"""Actions between which nights choose."""
+"""Actions on which nights vote."""
 TOLD_AGAIN = (*CHOICES, Action.NEEDS_DATA, Action.UNDECIDED)
-"""Actions of a loop that oscillates on which nights vote; the others follow from cause and lanes."""
+"""Actions of an oscillating loop on which nights vote; the others follow from cause and lanes."""
 TWO_SIGMA = 2.0 * 1.4826
-"""Two standard deviations of a normal error in terms of its median absolute deviation."""
+"""Two standard deviations of a normal error relative to its median absolute deviation."""
 
 
 @dataclass(frozen=True, slots=True)
 class CycleBelief:
-    """What is believed of a loop's oscillation under the settings in force.
+    """The belief about a loop's oscillation under the settings in force.
 
-    since, the first night under them; nights, those that were assessed; weight, nights that oscillated, older
-    ones counting less; odds, sums of the log confidence of the causes in the order of CAUSES; cause, the one that
-    is named; sources, nights in which it followed each of other loops; loud, whether it oscillates as far as
-    nights tell; top, the largest significance [% h]."""
+    since, the first night under them; nights, those that were assessed; weight, nights that oscillated, older ones
+    with lower weight; odds, sums of the log confidence of the causes in the order of CAUSES; cause, the decided one;
+    sources, nights in which it followed each of other loops; loud, whether it oscillates by all nights; top, the
+    largest significance [% h].
+    """
 
     since: str = ""
     nights: int = 0
@@ -53,7 +54,7 @@ class CycleBelief:
     shift: float = 0.0
 
     def chances(self, between: float) -> dict[Cause, float]:
-        """Confidence in each cause [%]; none without a night that oscillated."""
+        """Confidence in each cause [%]; empty without a night that oscillated."""
         if self.weight <= 0.0:
             return dict.fromkeys(CAUSES, 0.0)
         further = (1.0 + between) / (1.0 + between / max(self.weight, 1.0))
@@ -63,15 +64,15 @@ class CycleBelief:
 
     @property
     def source(self) -> str | None:
-        """The loop that it follows in at least half of the nights that oscillated; None where there is none."""
+        """The loop that it follows in at least half of the nights that oscillated; otherwise None."""
         if not self.sources or sum(self.sources.values()) < 0.5 * self.weight:
             return None
         return max(self.sources, key=lambda loop: (self.sources[loop], loop))
 
 
 def oscillation_state(before: CycleBelief, row: Row, limits: BeliefLimits) -> tuple[bool, float]:
-    """Whether a loop oscillates, with a memory, and the largest significance [% h]: what is small beside what
-    there was neither ends nor begins an oscillation."""
+    """Whether a loop oscillates, with hysteresis, and the largest significance [% h]: a change that is small relative
+    to it neither ends nor starts an oscillation."""
     now = float(row["oscillation_significance"] or 0.0)
     top = max(before.top, now)
     loud = counts(row["oscillating_pct"]) and now >= limits.comes_back * top
@@ -80,7 +81,7 @@ def oscillation_state(before: CycleBelief, row: Row, limits: BeliefLimits) -> tu
 
 
 def cycle_with_night(before: CycleBelief, share: float, row: Row, limits: BeliefLimits) -> CycleBelief:
-    """The belief with one night more, of which what came before counts for a share."""
+    """The belief with one more night; earlier ones count for a share."""
     loud, top = oscillation_state(before, row, limits)
     begun = _usual_size(before, float(row["oscillation_significance"] or 0.0) if loud else 0.0, limits)
     told = replace(begun, since=before.since or row["night"], nights=before.nights + 1, loud=loud, top=top)
@@ -97,8 +98,8 @@ def cycle_with_night(before: CycleBelief, share: float, row: Row, limits: Belief
 
 
 def _usual_size(before: CycleBelief, significance: float, limits: BeliefLimits) -> CycleBelief:
-    """The belief with what is usual after a night of some significance [% h]: another size is told by the
-    second night in a row that has it."""
+    """The belief with the usual significance after a night [% h]: a new level counts from the second consecutive
+    night on."""
     if significance <= 0.0:
         return replace(before, shift=0.0)
     now = math.log(significance)
@@ -114,7 +115,7 @@ def _usual_size(before: CycleBelief, significance: float, limits: BeliefLimits) 
 
 
 def _log_confidence(row: Row, limits: BeliefLimits) -> tuple[float, ...]:
-    """Log confidence of the causes by one night; of one whose record lacks something, none stands out: the next
+    """Log confidence of the causes by one night. If its record lacks data, no cause is preferred, because the next
     record lacks the same."""
     found = [max(row[f"osc_{c}_pct"] or 0.0, limits.least_pct) for c in CAUSES]
     if row["lack"] and row["cause"] not in CAUSES:
@@ -124,8 +125,8 @@ def _log_confidence(row: Row, limits: BeliefLimits) -> tuple[float, ...]:
 
 
 def _cause_named(now: CycleBelief, row: Row, limits: BeliefLimits) -> Cause:
-    """The cause that is named: the first night's own, then the one that the nights have made likely, until they no
-    longer do."""
+    """The decided cause: that of the first night, then the one that the nights make likely, until they no longer
+    do."""
     if now.nights == 1:
         return Cause(row["cause"])
     found = now.chances(limits.between)
@@ -138,7 +139,7 @@ def _cause_named(now: CycleBelief, row: Row, limits: BeliefLimits) -> Cause:
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Settings that a night advised, in the units of loops.csv, and what it said of them."""
+    """Settings advised by a night, in the units of loops.csv, with their expected results."""
 
     night: str
     kp: float
@@ -149,7 +150,7 @@ class Pair:
 
     @property
     def at(self) -> tuple[float, float]:
-        """Its place, where distances are ratios."""
+        """Coordinates in which distances are ratios."""
         return math.log(abs(self.kp)), math.log(abs(self.ti))
 
 
@@ -161,8 +162,7 @@ def advised_pair(row: Row) -> Pair | None:
 
 @dataclass(frozen=True, slots=True)
 class RemedyBelief:
-    """Votes by action, older nights counting less; the pairs advised of late; the action and the pair that are
-    held."""
+    """Votes by action, with lower weight for older nights; recently advised pairs; the current action and pair."""
 
     votes: Mapping[Action, float] = field(default_factory=dict)
     pairs: tuple[Pair, ...] = ()
@@ -173,7 +173,7 @@ class RemedyBelief:
 
 
 def remedy_with_night(before: RemedyBelief, share: float, row: Row, limits: BeliefLimits) -> RemedyBelief:
-    """The belief with one night more, of which what came before counts for a share."""
+    """The belief with one more night; earlier ones count for a share."""
     votes = {a: share * v for a, v in before.votes.items()}
     action = row["action"]
     if action in TOLD_AGAIN:
@@ -186,8 +186,8 @@ def remedy_with_night(before: RemedyBelief, share: float, row: Row, limits: Beli
 
 
 def _voted(now: RemedyBelief, limits: BeliefLimits) -> Action | None:
-    """The action that is held, or one for which clearly more nights speak. A night that lacked something for settings
-    says nothing against those of others."""
+    """The current action, or one with clearly more votes. A night that lacked data for settings does not vote against
+    those of others."""
     lacking = sum(now.votes.get(a, 0.0) for a in (Action.NEEDS_DATA, Action.UNDECIDED))
     known = {a: now.votes.get(a, 0.0) for a in CHOICES}
     if known[Action.RETUNE] < limits.advised_share * (known[Action.RETUNE] + lacking):
@@ -201,8 +201,8 @@ def _voted(now: RemedyBelief, limits: BeliefLimits) -> Action | None:
 
 
 def _settled_pair(now: RemedyBelief, limits: BeliefLimits) -> RemedyBelief:
-    """The belief with the pair that is told: the first until enough nights have advised, then that amid theirs; and
-    again where twice as many have and their middle lies elsewhere by more than a ratio and twice its own error."""
+    """The belief with the reported pair: the first until enough nights have advised, then the one nearest to their
+    median. It is replaced if twice as many have and their median differs by a ratio and twice its standard error."""
     if now.held is None:
         return replace(now, held=now.pairs[-1] if now.pairs else None)
     if now.advised < max(limits.settle_nights, 2 * now.settled):

@@ -1,5 +1,5 @@
-"""Beliefs of a store: each night's follow from those of the night before it and from the night, so that neither the
-order of runs nor a night run twice matters, and one command makes them anew."""
+"""Beliefs of a store: those of each night follow from the previous night's and from the night, so that neither the
+order of runs nor a repeated night matters, and one command recomputes them."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from analyzer.words import belief as words
 from identification.errors import InputError, NotNowError
 
 Held = tuple[tuple[float | None, float | None], tuple[float, float]]
-"""Settings in force, as loops.csv states them, and those that nights have told to type in instead."""
+"""Settings in force, as in loops.csv, and those that nights recommended instead."""
 LOOPS_AT_ONCE = 1000
 """Loops whose beliefs are in memory at a time."""
 UNREADABLE = (InputError, KeyError, TypeError, ValueError)
-"""What says that beliefs are damaged, or of another version."""
+"""Exceptions for beliefs that are damaged, or of another version."""
 READ = (
     *("loop", "night", "status", "start_s", "duration_s"),
     *("kp", "ti", "form", "gain_unit", "ti_unit", "op_unit"),
@@ -41,15 +41,15 @@ READ = (
     *("backlash_pct", "stickband_pct", "slip_jump_pct"),
     *("phases", "pv_lo", "pv_hi", "pv_unit", "timezone"),
 )
-"""What beliefs follow from."""
+"""Columns from which beliefs are computed."""
 
 
 class UnreadableError(Exception):
-    """Beliefs of a night are damaged, gone, or of another version."""
+    """Beliefs of a night are damaged, missing, or of another version."""
 
 
 def settle(store: Store, night: str, config: Config) -> list[str]:
-    """Write the beliefs of a night and of all after it, and of any before that has none; sentences on loops of which
+    """Write the beliefs of a night and of all after it, and of any earlier one without; return sentences on loops
     that failed."""
     names = store.nights()
     first = min([night, *(n for n in names if not store.file("beliefs", n).exists())])
@@ -61,7 +61,7 @@ def settle(store: Store, night: str, config: Config) -> list[str]:
 
 
 def held_pairs(store: Store, night: str) -> dict[str, Held]:
-    """Settings that are told of loops before a night; none where the store has no beliefs before it."""
+    """Recommended settings of loops before a night; empty if the store has no beliefs before it."""
     earlier, out = [n for n in store.nights() if n < night], {}
     try:
         for loop, state in _states(store, earlier[-1]) if earlier else ():
@@ -75,14 +75,14 @@ def held_pairs(store: Store, night: str) -> dict[str, Held]:
 
 
 def settle_anew(store: Store, config: Config) -> list[str]:
-    """Make all beliefs of a store anew from its nights; sentences as of `settle`."""
+    """Recompute all beliefs of a store from its nights; return sentences as in `settle`."""
     names = store.nights()
     return _write_all(store, names, names[0] if names else None, config)
 
 
 def unfounded(store: Store, config: Config) -> list[Problem]:
-    """Beliefs of a store that do not follow from its nights; none where a table of nights is damaged, or an earlier
-    version kept no beliefs."""
+    """Beliefs of a store that do not follow from its nights; empty if a table of nights is damaged, or an earlier
+    version stored no beliefs."""
     if not store.files("beliefs"):
         return []
     names, wrong = store.nights(), set()
@@ -103,8 +103,8 @@ def unfounded(store: Store, config: Config) -> list[Problem]:
 
 
 def _write_all(store: Store, names: Sequence[str], before: str | None, config: Config) -> list[str]:
-    """Write the beliefs of nights, oldest first, from those of the night before them; of a first night that comes
-    before none, from what it knew of nights that have been deleted."""
+    """Write the beliefs of nights, oldest first, each from those of the previous night; a first night without a
+    previous one starts from its own beliefs about deleted nights."""
     lost: list[str] = []
     repaired = _repaired(store)
     for name in names:
@@ -121,7 +121,7 @@ def _believed(
     config: Config,
     lost: list[str],
 ) -> Iterator[pa.Table]:
-    """The beliefs of a night in parts; sentences on loops of which that failed are added to `lost`."""
+    """The beliefs of a night in parts; sentences on loops that failed are added to `lost`."""
     earlier = () if before in (None, name) else _loops(store, before, "beliefs")
     if before == name:
         with suppress(UnreadableError):
@@ -137,7 +137,7 @@ def _believed(
 
 
 def in_parts(loops: Sequence[str]) -> Iterator[Sequence[str]]:
-    """Loops, so many at a time as memory may hold of."""
+    """Parts of the loops, as many at a time as memory allows."""
     return (loops[k : k + LOOPS_AT_ONCE] for k in range(0, len(loops), LOOPS_AT_ONCE))
 
 
@@ -152,7 +152,7 @@ def _loops(store: Store, night: str, table: str) -> list[str]:
 
 
 def _repaired(store: Store) -> dict[str, list[float]]:
-    """When notes say that the valve of each loop was repaired [s since 1970-01-01 UTC]."""
+    """Times of valve repairs of each loop from notes [s since 1970-01-01 UTC]."""
     return {
         loop: [n.time_s for n in own if words.says_repaired(n.text)]
         for loop, own in notes.read_notes(store.path).items()
@@ -160,7 +160,7 @@ def _repaired(store: Store) -> dict[str, list[float]]:
 
 
 def _pruned(store: Store, night: str, loops: Collection[str]) -> dict[str, Belief]:
-    """What the oldest night knew of nights before it, which have been deleted."""
+    """The oldest night's beliefs about earlier nights, which have been deleted."""
     try:
         known = read_beliefs(store, night, loops)
     except UnreadableError:
@@ -173,7 +173,7 @@ def _same(store: Store, night: str, rows: Sequence[Row], loops: Collection[str])
         held = store.own_rows("beliefs", night, names_of(BELIEFS), loops)
     except DamagedError:
         return False
-    except NotNowError:  # said of the table itself
+    except NotNowError:  # reported for the table itself
         return True
     except InputError:
         return not rows
@@ -181,14 +181,14 @@ def _same(store: Store, night: str, rows: Sequence[Row], loops: Collection[str])
 
 
 def _states(store: Store, night: str, loops: Collection[str] | None = None) -> Iterator[tuple[str, str]]:
-    """The beliefs of some loops of a night, or of all, as they are kept."""
+    """The stored beliefs of some loops of a night, or of all."""
     found = store.own_rows("beliefs", night, ("loop", "state"), loops)
     return ((r["loop"], r["state"]) for r in found)
 
 
 def read_beliefs(store: Store, night: str, loops: Collection[str] | None = None) -> dict[str, Belief]:
-    """The beliefs of some loops of a night, or of all. Raises UnreadableError where there are none that this version
-    can read."""
+    """The beliefs of some loops of a night, or of all. Raises UnreadableError if there are none that this version can
+    read."""
     try:
         return {loop: belief_of(state) for loop, state in _states(store, night, loops)}
     except UNREADABLE as error:
@@ -203,14 +203,14 @@ def _with_night(
     repaired: Mapping[str, Sequence[float]],
     config: Config,
 ) -> tuple[list[Row], list[str]]:
-    """The beliefs of some loops with a night, as rows and in place of those before it; and sentences on loops of
-    which they failed."""
+    """Update the beliefs of some loops with a night, in place, and return them as rows; and sentences on loops that
+    failed."""
     rows = {r["loop"]: r for r in store.own_rows("nights", name, READ, loops)}
     out: list[Row] = []
     lost = []
     for loop in loops:
         before, row = beliefs.get(loop), rows.get(loop)
-        # what a pruned store knew of its oldest night is not counted again
+        # a pruned store's beliefs already include its oldest night
         known_already = before is not None and before.night >= name
         try:
             own = repaired.get(loop, ())
@@ -218,7 +218,7 @@ def _with_night(
             if now is not None:
                 out.append(_belief_row(before, now, row, name, config))
                 beliefs[loop] = now
-        except Exception as error:  # a belief that fails is that loop's alone, and never the night's end
+        except Exception as error:  # a failing belief affects that loop alone, never the night
             lost.append(f"{loop}: no belief of night {name} ({type(error).__name__}: {error})")
     return out, lost
 
@@ -226,8 +226,7 @@ def _with_night(
 def _belief_row(
     before: Belief | None, now: Belief, row: Row | None, night: str, config: Config
 ) -> dict[str, Any]:
-    """A belief as a row: what is told where the night tells anything, figures, and what the next night goes on
-    from."""
+    """A belief as a row: the decision if there is one, figures, and the state for the next night."""
     worn = now.valve.worn_pct(config.belief)
     pools = {name: pool.pooled for name, pool in now.constants.items()}
     known: dict[str, Any] = {

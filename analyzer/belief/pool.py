@@ -1,7 +1,7 @@
-"""A constant that each night estimates with an error of its own, pooled over nights that differ by more than that.
+"""Pooling of a constant over nights that differ by more than their own estimation errors.
 
-Random effects by moments (DerSimonian, Laird 1986): what the nights scatter beyond their own errors is their spread,
-and the pooled value is known no better than it allows. Sums are kept, not nights, so that each night costs the same.
+Random effects by moments (DerSimonian, Laird 1986): the scatter of nights beyond their own errors is their spread,
+and it limits the precision of the pooled value. Sums are stored, not nights, so that each night costs the same.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ class Pooled:
 
 @dataclass(frozen=True, slots=True)
 class Pool:
-    """Sums over the logarithm x of a constant's size, older nights counting less.
+    """Sums over the logarithm x of a constant's size, with lower weight for older nights.
 
-    count; total, of x; weight, of w = one over the variance of x; first, of w x; second, of w x squared; squares,
-    of w squared; sign of the constant."""
+    count; total, of x; weight, of w = one over the variance of x; first, of w x; second, of w x squared; squares, of
+    w squared; sign of the constant.
+    """
 
     count: float = 0.0
     total: float = 0.0
@@ -39,12 +40,12 @@ class Pool:
     sign: float = 1.0
 
     def faded(self, share: float) -> Pool:
-        """The same as it counts some nights later."""
+        """The same with the weight reduced for the nights since."""
         return Pool(**{name: share * x for name, x in asdict(self).items()} | {"sign": self.sign})
 
     def plus(self, value: float, deviation: float, least: float, most: float) -> Pool:
-        """With one night more: its value and the standard deviation of its logarithm, no less than `least`; beyond
-        `most` the night does not know it."""
+        """With one more night: its value and the standard deviation of its logarithm, at least `least`; above `most`
+        the night is ignored."""
         if value == 0.0 or not math.isfinite(value) or not deviation <= most:
             return self
         x, w = math.log(abs(value)), 1.0 / max(INTERVALS.wider * deviation, least) ** 2

@@ -1,11 +1,10 @@
-"""Is the valve worn, and how widely: evidence of all nights since its last repair, added up width by width.
+"""Valve wear and its width: evidence of all nights since the last repair, added up for each backlash width.
 
-Each night says of every width how much better a play of it explains PV than an ideal valve (witness.py). The nights
-are added up with forgetting, so that a fault too small for one night is found by several that agree on its width, and
-what one night mistakes for a play of some width the others do not bear out: the best of them is left out, unless it
-would be believed by itself. Where a night and those after it say
-another thing than those before by more than chance (generalized likelihood ratio: Willsky, Jones 1976) the belief
-begins anew there, as it does after a repair.
+For every width each night gives the gain of backlash of that width over an ideal valve in explaining PV (witness.py).
+The nights are added with forgetting, so that a fault too small for one night is found by several that agree on its
+width. A spurious result of one night is not confirmed by the others: the best one is left out, unless it is
+sufficient alone. If a night and those after it differ significantly from those before (generalized likelihood ratio:
+Willsky, Jones 1976), the belief restarts there, as it does after a repair.
 """
 
 from __future__ import annotations
@@ -23,21 +22,21 @@ from identification.estimation.backlash_stiction import WIDTHS
 from identification.record import Floats
 
 Witness = Mapping[str, Any]
-"""What a night says, as analyzer/loop/witness.py puts it."""
+"""Result of a night, from analyzer/loop/witness.py."""
 Doubt = tuple[float, float, float]
-"""What a night may be wrong by: as one of several, by itself, and in what it says against a width."""
+"""Possible error of a night: as one of several, alone, and as evidence against a width."""
 Recent = tuple[str, tuple[float, ...]]
-"""A night and what it said of each width, as it counts today [nat]."""
+"""A night and its evidence for each width, with its present weight [nat]."""
 
 
 @dataclass(frozen=True, slots=True)
 class ValveBelief:
-    """What is believed of a valve.
+    """The belief about a valve.
 
-    since, the first night that counts; nights, how many told something; alone, evidence for each of WIDTHS
-    beyond what a night may be wrong by [nat]; summed, evidence of all nights, and best, that of the best of
-    them; recent, what the last of them said; jump and clear, evidence for a slip jump and what it takes [nat];
-    certain, the night from which on it was believed worn without a break, '' where it is not.
+    since, the first night that counts; nights, number with a result; alone, evidence for each of WIDTHS beyond the
+    possible error of a night [nat]; summed, evidence of all nights, and best, that of the best of them; recent,
+    evidence of the last of them; jump and clear, evidence for a slip jump and its threshold [nat]; certain, the night
+    since which it is continuously believed worn, '' if it is not.
     """
 
     since: str = ""
@@ -52,14 +51,14 @@ class ValveBelief:
 
     @property
     def profile(self) -> Floats:
-        """Evidence for each of WIDTHS [nat], shape of WIDTHS: of all nights but the best, or beyond all doubt."""
+        """Evidence for each of WIDTHS [nat], shape of WIDTHS: of all nights but the best, or of a sufficient one."""
         if not self.summed:
             return np.zeros(WIDTHS.size)
         return np.maximum(np.subtract(self.summed, self.best), self.alone)
 
     @property
     def width(self) -> float:
-        """The likeliest width [% OP], 0 where none is."""
+        """The most likely width [% OP], 0 if there is none."""
         found = self.profile
         return float(WIDTHS[int(np.argmax(found))]) if found.max() > 0.0 else 0.0
 
@@ -72,11 +71,11 @@ class ValveBelief:
         return 100.0 * worn / (worn + float(np.exp(-top)))
 
     def is_worn(self, limits: BeliefLimits) -> bool:
-        """Whether it is believed to be worn; one that was stays so until it is no longer likely."""
+        """Whether it is believed to be worn, with hysteresis: until it is no longer likely."""
         return self.worn_pct(limits) >= (limits.still_worn_pct if self.certain else limits.worn_pct)
 
     def fault(self, before: Fault | None) -> Fault:
-        """Backlash or stiction by what a slip jump adds, as before where that is not clear."""
+        """Backlash or stiction by the gain of a slip jump, as before if that is not clear."""
         if self.jump > self.clear:
             return Fault.STICTION
         if self.clear == 0.0 or self.jump < 0.5 * self.clear:
@@ -85,7 +84,7 @@ class ValveBelief:
 
 
 def recorded_otherwise(before: ValveBelief) -> ValveBelief:
-    """The belief as another recorder may bear it out: it sees the same valve up to a quarter wider or narrower."""
+    """The belief after a change of recorder: the same valve may appear up to a quarter wider or narrower."""
 
     def widened(x: tuple[float, ...]) -> tuple[float, ...]:
         beside = np.pad(np.asarray(x), 1, mode="edge")
@@ -96,17 +95,17 @@ def recorded_otherwise(before: ValveBelief) -> ValveBelief:
 
 
 def faded_over(before: str, night: str, limits: BeliefLimits) -> float:
-    """How much of what was known in one night counts in a later one [-]."""
+    """Weight in a later night of the evidence of an earlier one [-]."""
     gap = (date.fromisoformat(night) - date.fromisoformat(before)).days
     return float(0.5 ** (max(gap, 0) / limits.half_life))
 
 
 def doubt(said: Witness, cause: Cause, oscillates: bool, config: Config) -> Doubt:
-    """What a night's likelihood may be wrong by, in the evidence that a verdict of one night needs [-]: as one of
-    several nights, by itself, and in what it says against a width.
+    """Possible error of a night's likelihood, in units of the evidence required for a verdict of one night [-]: as
+    one of several nights, alone, and as evidence against a width.
 
-    No model is exact, and what it lacks it lacks every night. In a cycle which another cause makes, by all nights, a
-    play is mimicked every night; one that is narrow beside OP's range, in a night now and then.
+    No model is exact, and its error is the same every night. A cycle with another cause, by all nights, imitates
+    backlash every night; backlash that is narrow relative to OP's range is imitated in a night now and then.
     """
     limits = config.belief
     if oscillates and cause is not Cause.VALVE:
@@ -119,8 +118,8 @@ def doubt(said: Witness, cause: Cause, oscillates: bool, config: Config) -> Doub
 
 
 def weighed(said: Witness, wrong_by: float, against: float, limits: BeliefLimits) -> Floats:
-    """What a night says of each width [nat]: beyond what it may be wrong by, what it takes to tell a fault counts
-    `conviction`, and no night counts for more than `most`."""
+    """Evidence of a night for each width [nat]: beyond its possible error, evidence at the threshold of a fault
+    counts `conviction`, and no night counts for more than `most`."""
     found = np.asarray(said["profile"], dtype=np.float64) / max(said["needed"], 1e-9)
     found = np.maximum(found - wrong_by, 0.0) + np.minimum(found + against, 0.0)
     found *= limits.conviction
@@ -133,9 +132,9 @@ def weighed(said: Witness, wrong_by: float, against: float, limits: BeliefLimits
 def valve_with_night(
     before: ValveBelief, share: float, night: str, said: Witness, wrong: Doubt, limits: BeliefLimits
 ) -> ValveBelief:
-    """The belief with one night more, what it was before counting for a share [-].
+    """The belief with one more night; the earlier belief counts for a share [-].
 
-    said : the night's witness; wrong : what it may be wrong by, as `doubt` gives it.
+    said : the night's witness; wrong : its possible error, from `doubt`.
     """
     *each, against = wrong
     own, alone = (weighed(said, x, against, limits) for x in each)
@@ -160,7 +159,7 @@ def valve_with_night(
 
 
 def _begun_anew(recent: Sequence[tuple[str, Floats]], said: Witness) -> ValveBelief:
-    """The belief in another valve, which the recent nights are of."""
+    """The belief about a different valve, from the recent nights."""
     each = np.array([p for _, p in recent])
     summed, best = each.sum(axis=0), np.maximum(each.max(axis=0), 0.0)
     alone, summed, best = map(_kept, (np.minimum(summed, 0.0), summed, best))
@@ -168,7 +167,7 @@ def _begun_anew(recent: Sequence[tuple[str, Floats]], said: Witness) -> ValveBel
 
 
 def _kept(x: Floats) -> tuple[float, ...]:
-    """As the store keeps it."""
+    """As stored."""
     return tuple(np.round(x, 3).tolist())
 
 
@@ -177,11 +176,11 @@ def _nights_kept(recent: Sequence[tuple[str, Floats]]) -> tuple[Recent, ...]:
 
 
 def changed_at(summed: Floats, recent: Sequence[Floats], least: float, nights: int) -> int | None:
-    """The first of the recent nights from which on the valve is another one; None where all nights agree.
+    """The first of the recent nights since which the valve is a different one; None if all nights agree.
 
-    summed : evidence of all nights together [nat], shape (w,); recent : of the last of them, as they count in it,
-    shape (w,) each; least : gain in log likelihood [nat] of two valves over one from which it is told; nights : how
-    many of them that takes at least: one can be odd.
+    summed : evidence of all nights together [nat], shape (w,); recent : that of the last of them, with their weight
+    in it, shape (w,) each; least : required gain in log likelihood [nat] of two valves over one; nights : minimum
+    number of nights for it: one can be an outlier.
     """
     together = max(float(summed.max()), 0.0)
     after, best, gain = np.zeros(summed.size), None, least

@@ -1,9 +1,9 @@
-"""What grows over the nights: the width of a valve, how fast and when it will have grown to a size; and the overshoot
-of a phase of a programme, since which repetition.
+"""Growth over the nights: of a valve's width, with its rate and the time at which it reaches a size; and of the
+overshoot of a phase of a programme, with the repetition at which it began.
 
-A width that stays and then grows (two straight lines, Bai 1997) is asked for first; what grows is then a state-space
-trend whose slope may drift (statsmodels' smooth trend: Harvey 1989, ch. 2), nights without a width left out. All
-widths of one valve may err alike, by what no number of nights shows: the ends know it.
+First a width that is constant and then grows is tested (two straight lines, Bai 1997); a growing width is then a
+state-space trend with a drifting slope (statsmodels' smooth trend: Harvey 1989, ch. 2), without nights that have no
+width. All widths of one valve may have a common error, which no number of nights shows: the interval includes it.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from identification.estimation.descent import NINETY
 from identification.record import Floats
 
 Width = tuple[str, float, float]
-"""A night, the width that it tells [% OP], and the standard deviation of its logarithm."""
+"""A night, its width [% OP], and the standard deviation of its logarithm."""
 MONTH_D = 30.0
-"""Days of a month, as speeds are told."""
+"""Days of a month, as unit of rates."""
 
 
 def wear(widths: Sequence[Width], limits: WearLimits) -> dict[str, Any] | None:
-    """Whether a width grows, by the nights that tell it, oldest first; None where it stays or too few do.
+    """Growth of a width, from the nights with a result, oldest first; None if it is constant or too few have one.
 
     As columns of a belief: the night since which it grows, growth in thirty days with its 90 % interval [% OP], the
-    size that it will reach [% OP], and the days between which it does with 90 %, None where not within sight.
+    next size [% OP], and the days between which it is reached with 90 %, None if too far ahead.
     """
     if len(widths) < limits.nights:
         return None
@@ -47,8 +47,8 @@ def wear(widths: Sequence[Width], limits: WearLimits) -> dict[str, Any] | None:
 
 
 def bend(days: Floats, width: Floats, deviation: Floats, limits: WearLimits) -> float | None:
-    """The day from which on a width, or another figure, grows: the best of all bends, where it is a better story than
-    that it stays; None where it is not. Days, figure and its standard deviation are of shape (n,)."""
+    """The day from which a width, or another figure, grows: the best of all bends, if it fits better than a constant;
+    None otherwise. Days, figure and its standard deviation are of shape (n,)."""
     weight = 1.0 / deviation
     flat = _left(np.ones((days.size, 1)), width, weight)[0]
     best, least, slope = None, math.inf, 0.0
@@ -67,20 +67,20 @@ def bend(days: Floats, width: Floats, deviation: Floats, limits: WearLimits) -> 
 
 
 def _left(design: Floats, width: Floats, weight: Floats) -> tuple[float, Floats]:
-    """Weighted squares left by a straight line or two, and their constants."""
+    """Weighted residual squares of one straight line or two, and their constants."""
     found = np.asarray(np.linalg.lstsq(design * weight[:, None], width * weight, rcond=None)[0], np.float64)
     return float((((width - design @ found) * weight) ** 2).sum()), found
 
 
 def _wear_forecast(days: Floats, width: Floats, limits: WearLimits) -> dict[str, Any] | None:
-    """The trend of what grows, carried on until it reaches the next size."""
+    """The trend of a growing width, extrapolated to the next size."""
     from statsmodels.tsa.statespace.structural import UnobservedComponents
 
     n = int(days[-1] - days[0]) + 1
     observed = np.full(n, np.nan)
     observed[(days - days[0]).astype(int)] = width
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a variance of zero is a straight line, and no failure
+        warnings.simplefilter("ignore")  # a variance of zero is a straight line, not a failure
         fit = UnobservedComponents(observed, level="strend").fit(disp=False, maxiter=200)
         ahead = fit.get_forecast(int(limits.ahead_d))
         mean = np.asarray(ahead.predicted_mean)
@@ -106,15 +106,15 @@ def _wear_forecast(days: Floats, width: Floats, limits: WearLimits) -> dict[str,
 
 
 def _day_reached(path: Floats, size: float, last: date) -> str | None:
-    """The day on which a path reaches a size, None where it does not."""
+    """The day on which a path reaches a size, None if it does not."""
     there = np.flatnonzero(path >= size)
     return (last + timedelta(days=int(there[0]) + 1)).isoformat() if there.size else None
 
 
 @dataclass(frozen=True, slots=True)
 class PhaseKnown:
-    """One kind of move over the nights: set point before and after [% of span], how often it has come, and of the
-    latest repetitions their numbers, starts [s since 1970-01-01 UTC] and overshoots [% of the move]."""
+    """One kind of move over the nights: set point before and after [% of span], number of repetitions, and of the
+    latest ones their numbers, starts [s since 1970-01-01 UTC] and overshoots [% of the move]."""
 
     begin: float
     end: float
@@ -124,8 +124,8 @@ class PhaseKnown:
 
 @dataclass(frozen=True, slots=True)
 class Growth:
-    """That an overshoot grows: since which repetition, begun when [s since 1970-01-01 UTC], from what to what [% of
-    the move]."""
+    """Growth of an overshoot: the repetition since which it grows, its start [s since 1970-01-01 UTC], first and last
+    value [% of the move]."""
 
     number: int
     start_s: float
@@ -136,8 +136,8 @@ class Growth:
 def with_repetitions(
     known: Sequence[PhaseKnown], row: Mapping[str, Any], most: int
 ) -> tuple[PhaseKnown, ...]:
-    """The phases with what a night's row says of them; a repetition that is known already is not counted again, and
-    no more than `most` are remembered."""
+    """The phases with those in a night's row; a known repetition is not counted again, and at most `most` are
+    stored."""
     out = list(known)
     for told in json.loads(row.get("phases") or "[]"):
         ends = told["begin"], told["end"]
@@ -153,12 +153,12 @@ def with_repetitions(
 
 
 def forgotten(known: Sequence[PhaseKnown]) -> tuple[PhaseKnown, ...]:
-    """The phases of a loop whose settings were changed: counted on, their overshoots begun anew."""
+    """The phases of a loop after a change of settings: the count continues, the overshoots restart."""
     return tuple(replace(p, shown=()) for p in known)
 
 
 def growth(phase: PhaseKnown, limits: WearLimits) -> Growth | None:
-    """Whether the overshoot of a phase grows from some repetition on; None where it stays or too few show it."""
+    """Growth of the overshoot of a phase from some repetition on; None if it is constant or too few show it."""
     if len(phase.shown) < limits.nights:
         return None
     number, start, size = (np.array(x, dtype=np.float64) for x in zip(*phase.shown, strict=True))

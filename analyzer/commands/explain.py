@@ -1,4 +1,4 @@
-"""The commands `explain` and `simulate`: what physics a loop's plain model lacks, and the model run elsewhere."""
+"""The commands `explain` and `simulate`: effects outside a loop's baseline model, and simulation of a saved model."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ def explain(
     form: str,
     out: Path | None,
 ) -> None:
-    """What the night decided; where recording and plain simulation differ, which physics was left out, and how much
-    it explains.
+    """The night's decision; the difference between the recording and a simulation, the effects that explain it, and
+    how much they explain.
 
     Example: triage explain export.parquet --loops loops.csv --loop FIC101
     """
@@ -103,7 +103,7 @@ def _show(data: dict[str, Any], page: Callable[[], Page], form: str, out: Path |
         from reports import folder, html, markdown
 
         if out is None and form == "html" and interactive():
-            out = Path()  # nobody reads a thousand lines of HTML on a terminal
+            out = Path()  # a thousand lines of HTML are unreadable on a terminal
         if out is None:
             click.echo(html.render(page(), True) if form == "html" else markdown.render(page(), ""))
             return
@@ -122,7 +122,7 @@ def _show(data: dict[str, Any], page: Callable[[], Page], form: str, out: Path |
     "--closed-loop", is_flag=True, help="Run the stated controller from SP instead of the recorded OP."
 )
 def simulate(model: Path, asked: Asked, tag: str, out: Path, closed_loop: bool) -> None:
-    """Run a saved model over another recording of its loop; a constant bias is freed, nothing else.
+    """Simulate a saved model on another recording of its loop; only a constant bias is fitted.
 
     Example: triage simulate model.json week2.parquet --loops loops.csv --loop FIC101 --out week2-sim.parquet
     """

@@ -1,4 +1,4 @@
-"""The command `loops`: a draft of loops.csv from a bag of tags."""
+"""The command `loops`: a draft of loops.csv from an unordered list of tags."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     help="File that the draft is written to. Default: stdout.",
 )
 def loops(asked: Asked, out: Path | None) -> None:
-    """A draft of loops.csv: the loops of an export, by their tags' names and by what the data show.
+    """Write a draft of loops.csv: the loops of an export, found by their tags' names and by the data.
 
-    What --loops states is kept. A loop that is not sure is written behind a #, with what speaks for it.
+    Loops stated with --loops are kept. A loop with low confidence is written after a #, with the evidence for it.
 
     Example: triage loops export.parquet --out loops.csv
     """

@@ -1,4 +1,4 @@
-"""What all commands share: how errors are told, and the options that several of them take, each declared once."""
+"""Common parts of all commands: the reporting of errors, and shared options, each declared once."""
 
 from __future__ import annotations
 
@@ -29,24 +29,24 @@ if TYPE_CHECKING:
 
 Command = Callable[..., Any]
 SOME_LOST, NOTHING_DONE, AGAIN = 1, 2, 75
-"""Exit status where some loops failed, where nothing could be done, and where shared storage failed for so long that
-a run ended: the same command may succeed later (EX_TEMPFAIL of sysexits)."""
+"""Exit status if some loops failed, if nothing could be done, and if shared storage failed for so long that a run
+ended: the same command may succeed later (EX_TEMPFAIL of sysexits)."""
 MOST_SAID = 600
-"""Characters of a line that says what is wrong."""
+"""Maximum characters of an error line."""
 
 
 class OneLineErrors(click.Group):
-    """Commands whose errors that are ours, or the system's, are one line on stderr and exit status 2."""
+    """Commands whose expected errors, and errors of the system, are one line on stderr with exit status 2."""
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""
         for stream in (sys.stdout, sys.stderr):
-            if isinstance(stream, TextIOWrapper):  # a code page that lacks a character gets its number
+            if isinstance(stream, TextIOWrapper):  # a character missing in a code page is shown as its number
                 stream.reconfigure(errors="backslashreplace")
         try:
             with warnings.catch_warnings():
                 if not sys.warnoptions:
-                    warnings.simplefilter("ignore")  # a library's warning says nothing to an engineer
+                    warnings.simplefilter("ignore")  # a library's warning is useless to an engineer
                 return super().invoke(ctx)
         except (click.ClickException, click.Abort, click.exceptions.Exit):
             raise
@@ -61,7 +61,7 @@ class OneLineErrors(click.Group):
 
 
 def what_went_wrong(error: Exception) -> str | None:
-    """An error as one line with what to do; None of one that nobody foresaw."""
+    """An error as one line with what to do; None for an unexpected one."""
     if isinstance(error, TriageError):
         return one_line(str(error))
     if isinstance(error, MemoryError):
@@ -88,12 +88,12 @@ def unforeseen(error: Exception) -> str:
 
 
 def what_failed(error: OSError) -> str:
-    """What the system says of a file."""
+    """The system's message on a file."""
     return f"{error.filename}: {error.strerror}" if error.filename else str(error)
 
 
 def one_line(text: str) -> str:
-    """A message as one line of printable characters, its middle left out where it is very long."""
+    """A message as one line of printable characters, with its middle left out if it is very long."""
     shown = " ".join(visible(text).split())
     if len(shown) <= MOST_SAID:
         return shown
@@ -101,7 +101,7 @@ def one_line(text: str) -> str:
 
 
 def say(text: str, err: bool = False) -> None:
-    """Print a text in which a plant's names may stand, none of which steers the terminal."""
+    """Print a text that may contain a plant's names, without control characters for the terminal."""
     click.echo(visible_lines(text), err=err)
 
 
@@ -118,7 +118,7 @@ class Place(click.ParamType):
 
 
 class Folder(click.ParamType):
-    """A folder to write into that is no store, whose tables would be lost among pages."""
+    """A folder to write into that is not a store, because its tables would be mixed with pages."""
 
     name = "path"
 
@@ -140,7 +140,7 @@ CONFIG = click.option(
 
 
 def opened_store(path: Path) -> Store:
-    """A store that holds a night. Raises InputError where there is none."""
+    """A store with at least one night. Raises InputError if there is none."""
     from analyzer.store.store import Store
 
     kept = Store(path)
@@ -154,37 +154,37 @@ DECIDED = click.option(
 
 
 def decision(one: PlantLoop, store: Path | None) -> Decided:
-    """What the night of a loop decided of it, by a store or by that night alone."""
+    """The decision of a loop's night, from a store or from that night alone."""
     from analyzer.night.decided import decided
 
-    assert one.night is not None  # asked for by night
+    assert one.night is not None  # called with a night only
     return decided(one.plant, one.night, one.spec.loop, None if store is None else opened_store(store))
 
 
 def decision_of(plant: Plant, loop: str, store: Path | None) -> Row | None:
-    """The row of a loop's last night in an export; None where that night has too little of it."""
+    """The row of a loop's last night in an export; None if that night has too few samples."""
     with suppress(NotAssessedError):
         return decision(plant.last_night(loop), store).row
     return None
 
 
 TIMES = ("%Y-%m-%d", *(f"%Y-%m-%d{between}%H:%M{end}" for between in "T " for end in (":%S", "")))
-"""How --since and --until may be written."""
+"""Formats of --since and --until."""
 
 
 def finding(command: Command) -> Command:
-    """--find-loops, of commands that take their loops from the export where no loops.csv is given."""
+    """--find-loops, for commands that take their loops from the export without a loops.csv."""
     said = "Without --loops: look for loops in the data too, where the tags' names tell none."
     return click.option("--find-loops", "finding", is_flag=True, help=said)(command)
 
 
 def of_loop(text: str) -> Callable[[Command], Command]:
-    """--loop, which names the one loop that a command is about."""
+    """--loop, the loop of a command."""
     return click.option("--loop", "tag", required=True, help=text)
 
 
 def formats(*choices: str, text: str | None = None) -> Callable[[Command], Command]:
-    """--format, the first choice its default."""
+    """--format, with the first choice as default."""
     kinds = click.Choice(choices)
     return click.option("--format", "form", type=kinds, default=choices[0], show_default=True, help=text)
 
@@ -201,7 +201,7 @@ SPAN = (
     _time("--until", "Day or time before which samples are used."),
     CONFIG,
 )
-"""Which samples of which loops are used, and under which limits."""
+"""The samples and loops used, and the limits."""
 READING = {
     "--timezone": "The plant's time zone, e.g. Europe/Helsinki: of stamps that state none, of nights, pages and "
     "the times given here. Default UTC.",
@@ -215,17 +215,17 @@ READING = {
     "--quality-column": "Name of a long export's column of quality codes. Default: detected.",
     "--good-quality": "Quality code or text that means good; may be repeated.",
 }
-"""Options that say how text exports are read."""
+"""Format options for text exports."""
 KINDS: dict[str, dict[str, Any]] = {
     "--decimal": {"type": click.Choice([".", ","])},
     "--day-first/--month-first": {"default": None},
     "--good-quality": {"multiple": True},
 }
-"""What those of them are that are no plain text."""
+"""Those of them that are not plain text."""
 
 
 def export_options(command: Command) -> Command:
-    """EXPORT... and what every command that reads one takes, handed over as one `asked`."""
+    """EXPORT... and the options of every command that reads one, passed as one `asked`."""
     names = [name.split("/")[0].lstrip("-").replace("-", "_") for name in READING]
 
     @wraps(command)
@@ -245,7 +245,7 @@ def export_options(command: Command) -> Command:
 
 
 def age_told(night: str, zone: str) -> str:
-    """How old a night is, in a sentence; '' where it is one of these days."""
+    """Age of a night, in a sentence; '' if it is recent."""
     from datetime import date
 
     from analyzer.history.plant_clock import date_of
@@ -259,12 +259,12 @@ def age_told(night: str, zone: str) -> str:
 
 Report = Callable[[int, int], None]
 QUIET_S = 5.0
-"""Seconds between two lines on what is being tried, where nobody looks at a terminal [s]."""
+"""Seconds between two progress lines if the output is no terminal [s]."""
 
 
 @contextmanager
 def bar(what: str) -> Iterator[Report]:
-    """A callable to be told of things done and things in all."""
+    """A callable that receives the number of finished things and the total."""
     if not sys.stderr.isatty():
         yield _tenths(what)
         return
@@ -278,16 +278,16 @@ def bar(what: str) -> Iterator[Report]:
 
 
 COMPILING_S = 10.0
-"""Seconds without a first thing done after which it is told what may take them [s]; ours: once compiled, a loop takes
-a tenth of a second."""
+"""Seconds without a first result after which a line explains the delay [s]; ours: once compiled, a loop takes a tenth
+of a second."""
 
 
 STILL_S = 60.0
-"""Seconds without a line after which how far it is is said again [s]."""
+"""Seconds after which the progress is printed again [s]."""
 
 
 def _tenths(what: str) -> Report:
-    """A line on stderr at the beginning, at every tenth, where the first thing takes long, and once a minute."""
+    """A line on stderr at the start, at every tenth, if the first result takes long, and once a minute."""
     said, begun = set[int](), time.monotonic()
     said_s = begun
 
@@ -309,8 +309,8 @@ def _tenths(what: str) -> Report:
 
 @contextmanager
 def watched(what: str) -> Iterator[None]:
-    """Say what is done: on a terminal for as long as it is done, elsewhere in a line on stdout: where something goes
-    wrong stderr has one line alone."""
+    """Show the current step: on a terminal while it lasts, otherwise as a line on stdout, so that after an error
+    stderr has one line only."""
     seen = sys.stderr is not None and sys.stderr.isatty()
     if seen:
         click.echo(f"\r\033[K{visible(what)}", nl=False, err=True)
@@ -324,16 +324,16 @@ def watched(what: str) -> Iterator[None]:
 
 
 def _to_stdout(line: str) -> None:
-    """A line that nobody has to read: whoever closed stdout loses it, and nothing else."""
+    """Print an optional line: if stdout is closed, only this line is lost."""
     try:
         click.echo(line)
     except OSError:
-        sys.stdout = None  # which says nothing at the end of the process either
+        sys.stdout = None  # prints nothing at the end of the process either
 
 
 @contextmanager
 def trying() -> Iterator[Callable[[str], None]]:
-    """A callable to be told what is tried."""
+    """A callable that receives the name of each attempt."""
     watched, begun = sys.stderr.isatty(), time.monotonic()
     said_s = begun
     if not watched:

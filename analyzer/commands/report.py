@@ -23,19 +23,18 @@ if TYPE_CHECKING:
     from reports.pages import Page
 
 MOST_DAYS = 3660
-"""Longest span that is compared [d]: ten years."""
+"""Longest compared span [d]: ten years."""
 
 
 def into_folder(single_text: str) -> Callable[[Command], Command]:
-    """--format, --single-file and --out: in which format pages are written, whether each is to stand by itself, and
-    where."""
+    """--format, --single-file and --out: the format of pages, whether each is self-contained, and the folder."""
     single = click.option("--single-file", is_flag=True, help=single_text)
     where = click.option("--out", required=True, type=FOLDER, help="Folder to write into.")
     return lambda command: options.formats("html", "markdown")(single(where(command)))
 
 
 def write(store: Store, pages: Iterable[Page], form: str, single_file: bool, out: Path) -> list[str]:
-    """Write a store's pages and their tables as they come, and say where; the names of their files."""
+    """Write a store's pages and their tables one by one, and print where; return the names of their files."""
     from reports.folder import write_csv, write_html, write_markdown
 
     head, zone = made(store), store.zone()
@@ -53,7 +52,7 @@ def write(store: Store, pages: Iterable[Page], form: str, single_file: bool, out
 
 
 def made(store: Store) -> str:
-    """What pages were made with, of what and when."""
+    """Program version, source and time of the pages."""
     import time
     from importlib.metadata import version
 
@@ -87,7 +86,7 @@ def report(
     out: Path,
     **named: Any,
 ) -> None:
-    """Before and after: what changes of controllers brought, with intervals and verdicts.
+    """Before and after: the effects of controller changes, with intervals and verdicts.
 
     Example: triage report store --changes changes.csv --out report
     """
@@ -96,7 +95,7 @@ def report(
 
     limits, kept = read_config(config), opened_store(store)
     zone = kept.zone()
-    if not days <= MOST_DAYS:  # NaN passes the range that the option states
+    if not days <= MOST_DAYS:  # NaN passes the range check of the option
         raise InputError(f"--days {days}", f"1 to {MOST_DAYS}", "correct it")
     stated = _span_given(before, "--before", zone), _span_given(after, "--after", zone)
     found, missing = change_cases(kept, _changes(kept, limits, **named), days, stated, limits.before_after)
@@ -135,7 +134,7 @@ def _changes(
     changed: str | None,
     find: bool,
 ) -> list[TuningChange]:
-    """The changes that the command line names, or those that the loops' behaviour shows."""
+    """The changes of the command line, or those detected in the loops' behaviour."""
     from analyzer.history.stamps import parse_time
     from analyzer.loops.changes import TuningChange, read_changes
     from analyzer.pages.before_after import detected
@@ -164,7 +163,7 @@ def _changes(
 def pages(
     store: Path, night: str | None, top: int, tag: str | None, form: str, single_file: bool, out: Path
 ) -> None:
-    """The morning page of a night and a page for each of its loops, the worst first.
+    """Write the morning page of a night and a page for each of its loops, worst first.
 
     Example: triage pages store --out pages --top 50
     """

@@ -1,6 +1,6 @@
-"""The command `run`: the nightly batch, what it says of itself, and how it ends when it is stopped.
+"""The command `run`: the nightly batch, its messages, and its end after a signal.
 
-Its log is one that a person can grep and a program can split: one line an event, appended, logfmt.
+Its log can be searched by people and parsed by programs: one line per event, appended, logfmt.
 
 2026-03-03T01:00:02Z triage[4711] lost loop=FIC2101 status="not assessed" reason="no PV tag FIC2101.PV in the export"
 """
@@ -47,15 +47,15 @@ if TYPE_CHECKING:
     from analyzer.store.store import Store
 
 STOPPED = 128
-"""Exit status of a run that a signal has stopped, less the signal's number: what shells and schedulers expect."""
+"""Exit status of a run stopped by a signal, less the signal's number: as shells and schedulers expect."""
 FEW = 10
-"""Notes on what was read that are printed; the rest is counted."""
+"""Notes on the read data that are printed; the others are counted."""
 PLAIN = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._:/+-%")
-"""Characters of values that need no quotes."""
+"""Characters of values without quotes."""
 
 
 def logfmt(value: object) -> str:
-    """A value as one word or one quoted text, in printable characters alone."""
+    """A value as one word or one quoted text, with printable characters only."""
     text = f"{value:.6g}" if isinstance(value, float) else str(value)
     shown = visible(text)
     if shown and set(shown) <= PLAIN:
@@ -64,9 +64,9 @@ def logfmt(value: object) -> str:
 
 
 class RunLog:
-    """Where a run says what it does; nowhere without a path.
+    """Log of a run; no output without a path.
 
-    A log that cannot be written costs one line on stderr, and never the night.
+    A log that cannot be written gives one line on stderr, and never ends the night.
     """
 
     def __init__(self, path: Path | None) -> None:
@@ -89,7 +89,7 @@ class RunLog:
 
 
 class StoppedError(Exception):
-    """A signal asks the run to end."""
+    """A signal requests the end of the run."""
 
     def __init__(self, number: int) -> None:
         self.number = number
@@ -98,9 +98,9 @@ class StoppedError(Exception):
 
 @contextmanager
 def stoppable() -> Iterator[None]:
-    """Turn SIGINT, SIGTERM and SIGHUP into `StoppedError`, once; further ones are ignored while the run ends.
+    """Convert SIGINT, SIGTERM and SIGHUP to `StoppedError`, once; further ones are ignored while the run ends.
 
-    A signal that is ignored, as SIGHUP is under nohup, stays so.
+    An ignored signal, such as SIGHUP under nohup, stays ignored.
     """
     known = (getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
     numbers = [number for number in known if signal.getsignal(number) != signal.SIG_IGN]
@@ -112,7 +112,7 @@ def stoppable() -> Iterator[None]:
 
     try:
         before = {number: signal.signal(number, stop) for number in numbers}
-    except ValueError:  # not the main thread: signals are somebody else's business
+    except ValueError:  # not the main thread, which handles signals
         yield
         return
     try:
@@ -144,8 +144,8 @@ def stoppable() -> Iterator[None]:
 def run(asked: Asked, store: Path, log_file: Path | None, explaining: bool, **how: Any) -> None:
     """The nightly batch: assess every loop and keep the results in a store.
 
-    An export of several days is kept day by day; new settings are advised on for the last of them. A second export of
-    a night adds its loops; of a loop that stands in both the fuller record is kept.
+    An export of several days is split by day; new settings are advised for the last day. A second export of a night
+    adds its loops; of two records of a loop the fuller one is kept.
 
     Exit status: 0 the night was written, 1 some loops failed, 2 nothing could be done, 75 shared storage failed for
     minutes: the same command with --resume may succeed later.
@@ -163,7 +163,7 @@ def run(asked: Asked, store: Path, log_file: Path | None, explaining: bool, **ho
             outcome, loops = _run_night(asked, store, log, explaining, how)
     except StoppedError as stopped:
         log.say("stopped", signal=stopped, status=STOPPED + stopped.number)
-        with suppress(OSError):  # the terminal may be gone
+        with suppress(OSError):  # the terminal may be closed
             say(f"triage: stopped by {stopped}; {_go_on(store)}", err=True)
         sys.exit(STOPPED + stopped.number)
     except Exception as error:
@@ -187,7 +187,7 @@ def run(asked: Asked, store: Path, log_file: Path | None, explaining: bool, **ho
 
 
 def _for_all_workers(asked: Asked, store: Path, scheduler: str | None) -> Asked:
-    """What is asked, as workers elsewhere find it. Raises InputError where their store would be another."""
+    """The request in a form valid for remote workers. Raises InputError if their store would be a different one."""
     from analyzer.places import is_remote
 
     if scheduler is None:
@@ -201,7 +201,7 @@ def _for_all_workers(asked: Asked, store: Path, scheduler: str | None) -> Asked:
 
 
 def _may_answer_again(error: Exception, places: Sequence[Path]) -> bool:
-    """Whether a run ends because shared storage has failed for a while."""
+    """Whether a run ends because shared storage failed temporarily."""
     from analyzer.places import is_outage, is_remote
 
     return any(map(is_remote, places)) and is_outage(error)
@@ -214,8 +214,8 @@ def _go_on(store: Path) -> str:
 def _run_night(
     asked: Asked, place: Path, log: RunLog, explaining: bool, how: Mapping[str, Any]
 ) -> tuple[Outcome, int]:
-    """The export read, assessed as `how` says to analyzer/night/batch.py and, where it is asked for, explained; the
-    outcome and the number of loops."""
+    """Read the export, assess it with the options `how` of analyzer/night/batch.py and, if requested, explain it;
+    return the outcome and the number of loops."""
     from analyzer.store.lock import scratch
     from analyzer.store.store import Store, require_place
 
@@ -241,7 +241,7 @@ def _say(notes: Sequence[str], log: RunLog) -> None:
 
 
 def _assessed(plant: Plant, store: Store, how: Mapping[str, Any], log: RunLog) -> Outcome:
-    """Run the batch with progress and say what came of it: what was lost, how many were assessed, of which night."""
+    """Run the batch with progress and print the result: lost loops, number of assessed loops, night."""
     from analyzer.night import batch
 
     with bar("loops") as progress:
@@ -265,7 +265,7 @@ def _assessed(plant: Plant, store: Store, how: Mapping[str, Any], log: RunLog) -
 
 
 def _explain_night(plant: Plant, store: Store, night: Night, jobs: int, resume: bool) -> None:
-    """Explain the flagged loops of a night, with progress, and say how many."""
+    """Explain the flagged loops of a night, with progress, and print their number."""
     from analyzer.explain.night import explain_flagged
 
     with bar("explained") as progress:

@@ -1,4 +1,4 @@
-"""The commands that look after a store: parse, call, say what was found or done."""
+"""The commands for a store: parse, call, print findings or actions."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from identification.errors import InputError
 
 DAYS = {"d": 1, "w": 7, "y": 365}
 SHOWN = 20
-"""Files that are named; the rest is counted."""
+"""Maximum number of listed files; the others are counted."""
 
 
 def days(text: str, option: str) -> int:
-    """Days that a text such as 400d, 26w or 2y states. Raises InputError where it states none."""
+    """Days in a text such as 400d, 26w or 2y. Raises InputError for other texts."""
     found = re.fullmatch(r"(\d{1,5})([dwy])", text.strip())
     if found is None or int(found[1]) == 0:
         expected = "a number of days, weeks or years such as 400d, 26w or 2y"
@@ -39,7 +39,7 @@ def days(text: str, option: str) -> int:
 
 @click.group()
 def store() -> None:
-    """Look after a store: check it, delete what is old.
+    """Maintain a store: check it, delete old nights.
 
     Example: triage store check store
     """
@@ -49,10 +49,10 @@ def store() -> None:
 @click.argument("path", metavar="STORE", type=PLACE)
 @CONFIG
 def check_store(path: Path, config: Path | None) -> None:
-    """Read every table of a store and say what is damaged, left over or not finished, or does not follow from its
-    nights.
+    """Read every table of a store and report damage, leftover and unfinished files, and beliefs that do not follow
+    from the nights.
 
-    Exit status: 0 nothing is wrong, 1 something is, 2 there is no store.
+    Exit status: 0 no problem, 1 a problem, 2 there is no store.
 
     Example: triage store check store
     """
@@ -76,7 +76,7 @@ def check_store(path: Path, config: Path | None) -> None:
 @click.option("--keep-trends", help="How long trends and hours are kept. Default: as long as nights.")
 @click.option("--dry-run", is_flag=True, help="Only say what would be deleted.")
 def prune(path: Path, keep: str, keep_trends: str | None, dry_run: bool) -> None:
-    """Delete nights older than some time before the latest, and what dead processes left. Notes stay.
+    """Delete nights older than some time before the latest, and files of terminated processes. Notes are kept.
 
     Example: triage store prune store --keep 400d --keep-trends 90d
     """
@@ -99,9 +99,9 @@ def prune(path: Path, keep: str, keep_trends: str | None, dry_run: bool) -> None
 @click.argument("path", metavar="STORE", type=PLACE)
 @CONFIG
 def beliefs(path: Path, config: Path | None) -> None:
-    """Make the beliefs of a store anew from its nights: what they say together of each loop.
+    """Recompute the beliefs of a store, the joint results of its nights for each loop.
 
-    Every run keeps them up to date; this is for limits that have changed, and for notes on repairs that came late.
+    Every run updates them; use this after changed limits, and after late notes on repairs.
 
     Example: triage store beliefs store
     """
@@ -140,10 +140,10 @@ def note(
     state: str | None,
     due: datetime | None,
 ) -> None:
-    """What was seen or done about a loop, kept in the store and shown in lists and on pages.
+    """Add a note on a loop to the store, shown in lists and on pages.
 
     The newest note of a loop counts; without TEXT its notes are printed. Notes make the work list, a page of `triage
-    pages`, with owner, state and due date, and what the nights since say.
+    pages`, with owner, state and due date, and the results of the nights since.
 
     Example: triage note store FIC2110 "stroked, packing tight" --state ordered --due 2026-04-01 --owner Laine
     """
@@ -173,7 +173,7 @@ def note(
 @NIGHT
 @formats("text", "html", "markdown", text="html is one mail without scripts.")
 def summary(store: Path, night: str | None, form: str) -> None:
-    """The morning on one screen, to be mailed: what to do first, what changed, the worst loops.
+    """The morning on one screen, for mail: first actions, changes, the worst loops.
 
     Example: triage summary store --format html > mail.html
     """

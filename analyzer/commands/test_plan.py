@@ -1,4 +1,4 @@
-"""The command `test-plan`: the step test of one loop that settles what is unknown."""
+"""The command `test-plan`: design of a step test for the unknown parameters of one loop."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 @of_loop("The loop to test.")
 @click.option("--store", type=PLACE, help="Store whose nights tell what is known of the loop.")
 def test_plan(asked: Asked, tag: str, store: Path | None) -> None:
-    """The step test that settles what is unknown of a loop: size, levels, times, and what it should tell.
+    """The step test for the unknown parameters of a loop: size, levels, times, and expected precision.
 
     Example: triage test-plan export.parquet --loops loops.csv --loop TIC2106 --store store
     """

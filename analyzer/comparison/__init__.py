@@ -1,1 +1,1 @@
-"""Spans of hours before and after a change, compared."""
+"""Comparison of spans of hours before and after a change."""

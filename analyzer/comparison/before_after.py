@@ -1,9 +1,8 @@
-"""Did it help? Hourly figures of a loop before and after a change, compared with an interval and a verdict.
+"""Effect of a change: hourly figures of a loop before and after it, compared with an interval and a verdict.
 
-A change is called better or worse only where the interval of its own part, widened for drift and for the number of
-figures looked at, leaves zero out. On equal load that part is what was measured, beside what simulation of both loops
-says (equal_load.py); where the weeks differ it is what simulation says alone. All figures are means over usable
-hours.
+A change is called better or worse only if the interval of its own part, widened for drift and for the number of
+figures compared, excludes zero. Under equal load that part combines the measurement and a simulation of both loops
+(equal_load.py); if the weeks differ, it is the simulated change alone. All figures are means over usable hours.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from analyzer.history.plant_clock import HOUR_S
 from identification.signals.robust import robust_deviation
 
 LIMITS = ComparisonLimits()
-"""The limits in force where none are given."""
+"""The default limits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,13 +35,13 @@ class Span:
 
 
 Hours = Mapping[str, Floats]
-"""Columns of the store's hourly table of one loop, shape (h,) each, NaN where not known."""
+"""Columns of the store's hourly table of one loop, shape (h,) each, NaN where unknown."""
 
 
 def spans_around(
     changed_s: float, days: float, others: Sequence[float] = (), limits: ComparisonLimits = LIMITS
 ) -> tuple[Span, Span]:
-    """Spans before and after a change, ended by other changes of the same loop [s]."""
+    """Spans before and after a change, limited by other changes of the same loop [s]."""
     first, last = changed_s - days * 24 * HOUR_S, changed_s + days * 24 * HOUR_S
     earlier = [o + limits.transition_s for o in others if o < changed_s]
     later = [o for o in others if o > changed_s]
@@ -51,7 +50,7 @@ def spans_around(
 
 
 def gridded(hours: Hours, span: Span, column: str) -> Side:
-    """A column on the grid of the whole hours inside a span, each weighted by its usable share."""
+    """A column on the grid of whole hours inside a span, each weighted by its usable share."""
     first, last = np.ceil(span.first_s / HOUR_S), np.floor(span.last_s / HOUR_S)
     n = max(int(last - first), 0)
     value, weight = np.zeros(n), np.zeros(n)
@@ -64,11 +63,11 @@ def gridded(hours: Hours, span: Span, column: str) -> Side:
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """A figure that is compared.
+    """A compared figure.
 
-    name : its column in the table of hours; least : differences below this, in the figure's unit, are none; scale :
-    factor from the hourly mean to the unit shown, which is that of the column where scaled_unit is ''; primary : one
-    of the study's four; lower_is_better : which way is better.
+    name : its column in the table of hours; least : smaller differences, in the figure's unit, count as none; scale :
+    factor from the hourly mean to the displayed unit, which is that of the column if scaled_unit is ''; primary : one
+    of the study's four; lower_is_better : direction of improvement.
     """
 
     name: str
@@ -81,17 +80,17 @@ class Measure:
 
     @property
     def title(self) -> str:
-        """The column's title, where it has none of its own."""
+        """The column's title, unless it has its own."""
         return self.own_title or BY_NAME[self.name].title
 
     @property
     def short_title(self) -> str:
-        """The title without what it says in brackets."""
+        """The title without the part in brackets."""
         return self.title.split(" (")[0]
 
     @property
     def unit(self) -> str:
-        """The unit that it is shown in."""
+        """The displayed unit."""
         return self.scaled_unit or BY_NAME[self.name].unit
 
 
@@ -108,18 +107,18 @@ MEASURES = (
     Measure("service_pct", 1.0, lower_is_better=False),
 )
 """The study's four first (its section 7), then the others of the store. Least differences are ours: about the
-resolution of what a historian keeps."""
+resolution of a historian."""
 
 TRAVEL = next(m for m in MEASURES if m.name == "valve_travel_pct_per_h")
 STEM_TRAVEL = replace(TRAVEL, own_title="Valve travel (stem, simulated)")
 OP_TRAVEL = replace(TRAVEL, primary=False, own_title="Travel of OP")
-"""Behind a valve at fault the stem travels otherwise than OP, and it is the stem that wears."""
+"""Behind a faulty valve the stem travels differently from OP, and the stem wears."""
 SIMULATED = {TRAVEL.name: "valve_travel_pct_per_h", **{m.name: m.name for m in (MEASURES[0], MEASURES[3])}}
-"""Figures that are simulated, and how equal_load.py calls them."""
+"""Simulated figures, and their names in equal_load.py."""
 
 
 class ChangeVerdict(StrEnum):
-    """What became of a figure."""
+    """Verdict on a figure."""
 
     BETTER = "better"
     WORSE = "worse"
@@ -129,12 +128,12 @@ class ChangeVerdict(StrEnum):
 
     @property
     def colour(self) -> str:
-        """The kind under which pages colour it."""
+        """The name of its colour on pages."""
         return ChangeVerdict.UNCLEAR.colour if self is ChangeVerdict.SAME else self.name.lower()
 
 
 class Grade(StrEnum):
-    """What became of a loop, from its four verdicts."""
+    """Verdict on a loop, from its four figures."""
 
     CLEAR = "clear"
     MODEST = "modest"
@@ -148,8 +147,8 @@ class Grade(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What a difference is made of, as logarithms of ratios: due to the change, to load and set point, left over; and
-    what settings promised on the load of before."""
+    """Components of a difference, as logarithms of ratios: the change's own part, that of load and set point, the
+    residual; and the predicted effect of the settings under the load of before."""
 
     change: Part
     load: Part
@@ -159,8 +158,7 @@ class Parts:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One figure before and after; percent of before, None where before is zero; parts, None where nothing was
-    simulated."""
+    """One figure before and after; percent of before, None if before is zero; parts, None without a simulation."""
 
     measure: Measure
     found: Difference
@@ -186,8 +184,8 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class LoopComparison:
-    """A loop before and after: its changes, reasons against comparing, the source loop, and what unchanged loops did
-    meanwhile."""
+    """A loop before and after: its changes, reasons against a comparison, the source loop, and the change in
+    unchanged loops meanwhile."""
 
     loop: str
     before: Span
@@ -209,7 +207,7 @@ def _too_little(hours: tuple[float, float], spans: tuple[Span, Span], limits: Co
     found = []
     for name, usable, span in zip(("before", "after"), hours, spans, strict=True):
         total = max((span.last_s - span.first_s) / HOUR_S, 0.0)
-        if round(usable / 24, 1) < limits.least_days:  # as it is told
+        if round(usable / 24, 1) < limits.least_days:  # rounded as reported
             least = f"{limits.least_days:g} usable days"
             found.append(f"too little time {name}: needs {least}, has {usable / 24:.1f}")
         elif usable < limits.usable_share * total:
@@ -220,10 +218,10 @@ def _too_little(hours: tuple[float, float], spans: tuple[Span, Span], limits: Co
 def reasons_against(
     hours: Hours, before: Span, after: Span, limits: ComparisonLimits = LIMITS
 ) -> tuple[str, ...]:
-    """Why the two spans cannot be compared; empty where they can."""
+    """Reasons why the two spans cannot be compared; empty if they can."""
 
     def pair(column: str) -> list[float | None]:
-        """Means over the usable hours of both spans, None where there are none."""
+        """Means over the usable hours of both spans, None if there are none."""
         sides = (gridded(hours, span, column) for span in (before, after))
         return [side.mean if side.weight.sum() > 0 else None for side in sides]
 
@@ -243,7 +241,7 @@ def reasons_against(
     a, b = (x or 0.0 for x in pair("at_limits_pct"))
     swings = (
         x or 0.0 for x in pair("oscillating_pct")
-    )  # a loop that swings from limit to limit does so itself
+    )  # a loop that oscillates between limits causes this itself
     if max(x * (1.0 - share / 100.0) for x, share in zip((a, b), swings, strict=True)) > limits.limit_points:
         found.append(f"OP at a limit: {a:.0f} % of the time before, {b:.0f} % after")
     return tuple(found)
@@ -252,14 +250,14 @@ def reasons_against(
 def reasons_of_load(
     hours: Hours, spans: tuple[Span, Span], weeks: Weeks, limits: ComparisonLimits
 ) -> list[str]:
-    """What differs between two spans that no tuning of the loop can alter: noise, load, a cycle from outside."""
+    """Differences between two spans that tuning of the loop cannot cause: noise, load, an external oscillation."""
     found, sides = [], (weeks.before, weeks.after)
     if abs(weeks.louder_db) > limits.noise_db:
         found.append(f"different noise: {10 ** (weeks.louder_db / 20):.2g} times as large after")
     a, b = (
         _moves_of_load(*(gridded(hours, span, x) for x in ("op_mean_pct", "sp_mean_pct"))) for span in spans
     )
-    reach = max((n.width for side in sides for n in side), default=0.0)  # a stem hides so much of OP's way
+    reach = max((n.width for side in sides for n in side), default=0.0)  # OP motion hidden by the stem
     if min(a, b) > 0 and max(b / a, a / b) > limits.load_ratio and abs(b * b - a * a) > 0.25 * reach**2:
         found.append(f"different load: {b / a:.2g} times as large after")
     a, b = (sum(n.from_outside for n in side) / len(side) for side in sides)
@@ -269,8 +267,8 @@ def reasons_of_load(
 
 
 def _moves_of_load(op: Side, sp: Side) -> float:
-    """Median over days of the deviation of hourly mean OP, without what goes with the set point [% OP]; 0 where no
-    day holds enough hours."""
+    """Median over days of the deviation of hourly mean OP, without the part from the set point [% OP]; 0 if no day
+    has enough hours."""
     known = op.weight > 0
     if not known.any():
         return 0.0
@@ -282,7 +280,7 @@ def _moves_of_load(op: Side, sp: Side) -> float:
 
 
 def _called(part: tuple[float, float, float], measure: Measure, least: float) -> ChangeVerdict:
-    """The verdict on a value with its interval's ends; below `least` it is none."""
+    """The verdict on a value with its interval's ends; none below `least`."""
     value, low, high = part
     if abs(value) < least or low <= 0 <= high:
         return ChangeVerdict.UNCLEAR
@@ -290,12 +288,12 @@ def _called(part: tuple[float, float, float], measure: Measure, least: float) ->
 
 
 LEAST_DEVIATION = 1e-3
-"""Standard deviation of a measured logarithm of a ratio, at least; ours: figures that stand still are no surer."""
+"""Minimum standard deviation of a measured logarithm of a ratio; ours: constant figures are not more certain."""
 
 
 def _measured(found: Difference, measure: Measure, level: float, reference: Reference | None) -> Part | None:
-    """A difference as the logarithm of a ratio, less what unchanged loops did, its deviation towards zero; None where
-    before or after is nothing."""
+    """A difference as the logarithm of a ratio, less that of unchanged loops, with its deviation towards zero; None
+    if before or after is zero."""
     if min(found.before, found.after) <= measure.least:
         return None
     value = math.log(found.after / found.before)
@@ -308,27 +306,27 @@ def _measured(found: Difference, measure: Measure, level: float, reference: Refe
 
 
 def parts_of(measured: Part, simulated: EqualLoad, name: str, alike: bool, limits: ComparisonLimits) -> Parts:
-    """The parts of a measured change.
+    """The components of a measured change.
 
-    Where nothing changed in loop and valve the change's own part is nothing. In weeks that are alike it is what was
-    measured and what was simulated, each by its precision, or a span over both where they contradict each other; in
-    others what was simulated.
+    Without a change of settings or valve the change's own part is zero. In comparable weeks it combines measurement
+    and simulation by their precision, or covers both if they contradict each other; otherwise it is the simulated
+    change.
     """
     own = simulated.change[name]
-    days = Part(0.0, measured.deviation)  # loads of weeks that are alike differ as days do
+    days = Part(0.0, measured.deviation)  # loads of comparable weeks differ as days do
     if simulated.same:
         left, load = (measured, days) if alike else (NO_PART, measured)
         return Parts(NO_PART, load, left, NO_PART)
     load = days if alike else simulated.load[name]
     if alike:
         most = max(abs(part.value) for part in simulated.change.values())
-        share = min(most / limits.beside_change, 1.0)  # hardly other settings do hardly more
+        share = min(most / limits.beside_change, 1.0)  # nearly equal settings have nearly equal effects
         sure = Part(own.value, math.hypot(own.deviation, share * limits.beside_measured))
         weight = measured.deviation**-2, sure.deviation**-2
         own = Part((measured.value * weight[0] + sure.value * weight[1]) / sum(weight), sum(weight) ** -0.5)
         if abs(measured.value - sure.value) > 2.0 * math.hypot(measured.deviation, sure.deviation):
             far = max(abs(own.value - x.value) for x in (measured, sure))
-            own = Part(own.value, max(own.deviation, far / float(ndtri(0.95))))  # 90 % then holds both
+            own = Part(own.value, max(own.deviation, far / float(ndtri(0.95))))  # 90 % then includes both
     deviation = math.hypot(measured.deviation, own.deviation, 0.0 if alike else load.deviation)
     left = Part(measured.value - own.value - load.value, deviation)
     return Parts(own, load, left, simulated.promised[name])
@@ -336,8 +334,8 @@ def parts_of(measured: Part, simulated: EqualLoad, name: str, alike: bool, limit
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What is known beside the hours of a loop: reasons why the weeks differ, what simulation says, what unchanged
-    loops did, and whether travel is the recorded stem's."""
+    """Evidence besides the hours of a loop: reasons why the weeks differ, the simulation, the change in unchanged
+    loops, and whether travel is that of the recorded stem."""
 
     reasons: tuple[str, ...] = ()
     simulated: EqualLoad | None = None
@@ -348,8 +346,8 @@ class Evidence:
 def change_of(
     hours: Hours, spans: tuple[Span, Span], measure: Measure, evidence: Evidence, limits: ComparisonLimits
 ) -> list[Change]:
-    """The change of one figure, none where it is not known on both sides; of travel behind a valve at fault that of
-    the stem and that of OP."""
+    """The change of one figure, empty if it is unknown on either side; for travel behind a faulty valve those of the
+    stem and of OP."""
     before, after = (gridded(hours, s, measure.name) for s in spans)
     if min(before.weight.sum(), after.weight.sum()) <= 0:
         return []
@@ -366,7 +364,7 @@ def change_of(
 
 
 def _of_stem(op: Difference, level: float, evidence: Evidence, limits: ComparisonLimits) -> Change:
-    """The change of the stem's travel: that of OP times what of it the simulated stems take."""
+    """The change of the stem's travel: that of OP times the ratio of the simulated stems' travel to it."""
     assert evidence.simulated is not None
     share, ratio = evidence.simulated.stem_share, evidence.simulated.stem
     before, factor = op.before * share, share * math.exp(ratio.value)
@@ -418,9 +416,9 @@ def compare(
     limits: ComparisonLimits = LIMITS,
     evidence: Evidence | None = None,
 ) -> LoopComparison:
-    """A loop's hourly figures of two spans; without verdicts, and with the reasons, where they cannot be compared.
+    """Compare a loop's hourly figures of two spans; if not comparable, give the reasons without verdicts.
 
-    source_loop : the loop that this one follows, where the nights name one; evidence : what is known beside them.
+    source_loop : the loop that this one follows, if the nights name one; evidence : further evidence.
     """
     spans, beside = (before, after), evidence or Evidence()
     usable = [gridded(hours, s, "usable_h").weight.sum() for s in spans]
@@ -436,7 +434,7 @@ def compare(
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """What loops without a change did between the same spans: how many, and logs of ratios by figure."""
+    """Change in loops without a change between the same spans: their number, and logs of ratios by figure."""
 
     loops: int
     of: Mapping[str, Part]
@@ -445,8 +443,8 @@ class Reference:
 def reference(
     others: Sequence[Hours], before: Span, after: Span, limits: ComparisonLimits = LIMITS
 ) -> Reference | None:
-    """The common change of unchanged loops, figure by figure: their median ratio where it is clear; None with too few
-    of them (difference in differences, Card and Krueger 1994)."""
+    """The common change of unchanged loops, figure by figure: their median ratio if significant; None with too few of
+    them (difference in differences, Card and Krueger 1994)."""
     of: dict[str, Part] = {}
     for m in (m for m in MEASURES if m.primary):
         ratios = []
@@ -467,7 +465,7 @@ def reference(
 
 
 def grade(found: LoopComparison) -> Grade:
-    """A loop's four verdicts as one."""
+    """A loop's four verdicts combined."""
     verdicts = [c.verdict for c in found.primary]
     better = [c for c in found.primary if c.verdict is ChangeVerdict.BETTER]
     known = [c for c in found.primary if c.verdict is not ChangeVerdict.INCOMPARABLE]
@@ -490,7 +488,7 @@ def grade(found: LoopComparison) -> Grade:
 def follows(
     sources: Sequence[str | None], oscillating: Sequence[bool], limits: ComparisonLimits = LIMITS
 ) -> str:
-    """The source loop that most of the oscillating nights name, or ''."""
+    """The source loop in most of the oscillating nights, or ''."""
     named = [s for s, on in zip(sources, oscillating, strict=True) if s and on]
     if not named or len(named) < limits.source_share * sum(oscillating):
         return ""

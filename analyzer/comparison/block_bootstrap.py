@@ -1,8 +1,8 @@
-"""How sure a difference of two spans of hourly figures is, when hours follow each other.
+"""Interval of a difference of two spans of hourly figures that are correlated in time.
 
-Blocks of 24 h are drawn, so that day and night stay together. Hours of one day are alike and days drift;
-seven days a side are few. The spread between replicates is therefore widened by Student's t and by what slow
-drift adds, as far as the days themselves cannot exclude it.
+Blocks of 24 h are drawn, so that day and night stay together. Hours of one day are similar and days drift; seven days
+per side are few. The spread between replicates is therefore widened by Student's t and by slow drift, as far as the
+days themselves cannot exclude it.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ Floats = NDArray[np.float64]
 BLOCK_H = 24
 """Hours drawn together [h]: a day, so that each replicate holds as many nights as days; ours."""
 REPLICATES = 2000
-"""Replicates a side; the ends of a 95 % interval then move by 3 % of its width from seed to seed; ours."""
+"""Replicates per side; the ends of a 95 % interval then vary by 3 % of its width between seeds; ours."""
 DRIFTS = np.array([0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.97])
-"""Correlations of one day with the next that are weighed, each as likely at first as any other; ours: where nothing
-changed, even a figure that wanders over six weeks is then called changed 4 times in 100, and with 0.8 as the
-highest 14 times; without any, 9 % of the loops of proofs/honesty.py are."""
+"""Candidate correlations of one day with the next, with equal prior weight; ours: without a change, even a figure
+that wanders over six weeks is then called changed 4 times in 100, and with 0.8 as the highest 14 times; without any,
+9 % of the loops of proofs/honesty.py are."""
 PERCENTILES = (2.5, 97.5)
 
 
 @dataclass(frozen=True, slots=True)
 class Side:
     """Hourly figures of one span on a grid of whole hours, shape (h,): the value of each hour, and its usable share
-    as weight [h], 0 where the figure is not known."""
+    as weight [h], 0 where the figure is unknown."""
 
     value: Floats
     weight: Floats
@@ -40,7 +40,7 @@ class Side:
         return float((self.value * self.weight).sum() / self.weight.sum())
 
     def days(self) -> tuple[Floats, Floats]:
-        """Means and numbers of the blocks of 24 h from the span's start, shape (d,) each; empty ones left out."""
+        """Means and indices of the blocks of 24 h from the span's start, shape (d,) each; without empty ones."""
         edges = np.arange(0, self.value.size, BLOCK_H)
         weight = np.add.reduceat(self.weight, edges)
         total = np.add.reduceat(self.value * self.weight, edges)
@@ -59,7 +59,7 @@ class Difference:
 
     @property
     def value(self) -> float:
-        """After less before."""
+        """After minus before."""
         return self.after - self.before
 
 
@@ -74,16 +74,16 @@ def replicates(side: Side, rng: np.random.Generator) -> Floats:
 
 
 def _block_sums(x: Floats, width: int) -> Floats:
-    """Sums of the blocks that begin at each hour, the end joined to the start."""
+    """Sums of the blocks that begin at each hour, with the end joined to the start."""
     total = np.concatenate([[0.0], np.cumsum(np.concatenate([x, x[: width - 1]]))])
     return total[width:] - total[:-width]
 
 
 def drift_factor(before: Side, after: Side) -> float:
-    """How much wider an interval is when the days may drift than when they are independent [-], at least 1.
+    """Factor by which an interval is wider if days may drift than if they are independent [-], at least 1.
 
-    The daily means are two levels and a first-order autoregression; the variance of the difference of means is
-    averaged over its correlation, weighed by the restricted likelihood (Patterson and Thompson 1971).
+    The daily means are two levels plus a first-order autoregression; the variance of the difference of means is
+    averaged over its correlation, weighted by the restricted likelihood (Patterson and Thompson 1971).
     """
     (left, at), (right, then) = before.days(), after.days()
     y = np.concatenate([left, right])
@@ -123,11 +123,11 @@ def student(before: Side, after: Side, spread: tuple[float, float], level: float
 
 
 def difference(before: Side, after: Side, level: float, seed: int = 0, drifting: bool = True) -> Difference:
-    """The difference of two spans with an interval that holds the truth with probability `level`.
+    """The difference of two spans with an interval that contains the true value with probability `level`.
 
-    After begins where before ends, each with some usable hour. The level [-] is already corrected for how many
-    figures are looked at. One seed draws the same hours for every figure of a loop. Not `drifting` are days of which
-    it is known otherwise that their load does not.
+    After begins where before ends, each with some usable hour. The level [-] is already corrected for the number of
+    compared figures. One seed draws the same hours for every figure of a loop. With `drifting` False the days' load
+    is known not to drift.
     """
     rng = np.random.default_rng(seed)
     left, right = replicates(before, rng), replicates(after, rng)

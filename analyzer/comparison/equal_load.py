@@ -1,8 +1,8 @@
-"""What a change did on equal load: the loops of before and after, each simulated on the loads of both weeks.
+"""Effect of a change under equal load: the loops of before and after, each simulated under the loads of both weeks.
 
-A night keeps the spectrum of its error, the process that was identified and the settings in force. The load of a
-night is that spectrum over the loop's sensitivity (e = S d); with it any settings and any valve can be simulated on
-the same load, so that what the settings do parts from what the load does.
+A night stores the spectrum of its error, the identified process and the settings in force. The load of a night is
+that spectrum over the loop's sensitivity (e = S d); with it any settings and any valve can be simulated under the
+same load, which separates the effect of settings from that of the load.
 """
 
 from __future__ import annotations
@@ -30,40 +30,40 @@ from tuning.forecast import in_digits, loop_in_digits, run, settled
 from tuning.frequency_response import loop_response, maximum_sensitivity
 
 DRAWS = 24
-"""Models and loads that are drawn: their spread is then known within 15 %; ours."""
+"""Number of models and loads drawn: their spread is then known within 15 %; ours."""
 MOST_TRIED = 3 * DRAWS
-"""Models that are drawn at most: some are unstable under settings under which the plant was not."""
+"""Maximum number of models drawn: some are unstable under settings with which the plant was stable."""
 LEAST_DEVIATION = np.array([0.07, 0.1, 0.07])
-"""Standard deviations of the logs of slope, time constant and dead time, at least; ours: one lag stands for all."""
+"""Minimum standard deviations of the logs of slope, time constant and dead time; ours: one lag approximates all."""
 MOST_MISFIT_DB, MOST_SPREAD = 1.5, 0.5
-"""Misfit of the spectra of both weeks [dB], and deviation of the slope's log, up to which they tell the process;
-ours: known loops leave 0.4 to 1.1 dB."""
+"""Misfit of the spectra of both weeks [dB], and deviation of the slope's log, up to which they identify the process;
+ours: known loops give 0.4 to 1.1 dB."""
 STEPS = 8192
 """Samples of each simulation; ours: 22 hours at 10 s."""
 WINDOW_POWER = 0.375
-"""Mean square of the Hann window that the kept spectrum has."""
+"""Mean square of the Hann window in the stored spectrum."""
 HARMONICS = (1, 2, 3, 5)
-"""Multiples of a valve's cycle that are taken out of the load, for the simulated valve makes them."""
+"""Multiples of a valve's cycle that are removed from the load, because the simulated valve produces them."""
 BESIDE_OCTAVES = 0.5
-"""How far about each of them [octaves]; ours: a cycle that a load disturbs is as wide."""
+"""Width about each of them [octaves]; ours: a cycle disturbed by a load is as wide."""
 WHOLE = 0.9
-"""Share of a night that a span must hold for the night to be of it; ours: the hour after a change is left out."""
+"""Share of a night inside a span that assigns it to the span; ours: the hour after a change is excluded."""
 CALIBRATED = 3
-"""Times that a load's size is corrected; ours: the error is then within 5 % of the recorded one."""
+"""Number of corrections of a load's size; ours: the error is then within 5 % of the recorded one."""
 FIGURES = ("average_absolute_error_pct", "variability_pct", "stem_travel", "valve_travel_pct_per_h")
-"""What is simulated; stem_travel is that of the stem, valve_travel_pct_per_h that of OP [%/h]."""
+"""Simulated figures; stem_travel is that of the stem, valve_travel_pct_per_h that of OP [%/h]."""
 
 
 @dataclass(frozen=True, slots=True)
 class LoopNight:
-    """What one night says of a loop.
+    """Results of one night for a loop.
 
     constants, logs of slope [%/(% s)], time constant and dead time [s], and deviations of the logs, shape (3,) each,
-    None where nothing was fitted; sign, of the slope; width, jump, of the valve's fault [% OP]; at_fault, whether it
-    has one by all nights, and worn_alone by this one; cycle_s, period of a cycle that the valve makes [s], 0 for
-    none; frequency [Hz] and level [dB of % PV per line], shape (b,), of the error without what the set point
-    explains; duration_s; error [% PV], its recorded average; op_travel [%/h]; moves [1/h] and their size [% PV] of
-    the set point; from_outside, whether a load's cycle was found; cycles, whether the loop cycles at all.
+    None without a fit; sign, of the slope; width, jump, of the valve's fault [% OP]; at_fault, whether it has one by
+    all nights, and worn_alone by this one; cycle_s, period of a cycle caused by the valve [s], 0 for none; frequency
+    [Hz] and level [dB of % PV per line], shape (b,), of the error without the part explained by the set point;
+    duration_s; error [% PV], its recorded average; op_travel [%/h]; moves [1/h] and their size [% PV] of the set
+    point; from_outside, whether a load's cycle was found; cycles, whether the loop cycles at all.
     """
 
     constants: tuple[Floats, Floats] | None
@@ -85,7 +85,7 @@ class LoopNight:
 
     @property
     def noise_db(self) -> float:
-        """Level at the record's highest frequencies, where no control reaches [dB]."""
+        """Level at the record's highest frequencies, above the control bandwidth [dB]."""
         return float(np.mean(self.level[-3:]))
 
     @property
@@ -95,7 +95,7 @@ class LoopNight:
 
 
 def pid_of(row: Mapping[str, Any], kp: float | None = None, ti: float | None = None) -> Pid | None:
-    """The settings of a night's row, or others in its units, in percent and seconds; None where none are known."""
+    """The settings of a night's row, or others in its units, in percent and seconds; None if unknown."""
     spec = LoopSpec(
         row["loop"],
         pv_lo=row["pv_lo"],
@@ -114,7 +114,7 @@ def pid_of(row: Mapping[str, Any], kp: float | None = None, ti: float | None = N
 
 
 def night_of(row: Mapping[str, Any]) -> LoopNight | None:
-    """What a row of the table of nights says; None where it keeps no spectrum or error of the loop."""
+    """Results in a row of the table of nights; None if it has no spectrum or error of the loop."""
     if not row["spectrum"] or not row["average_absolute_error_pct"] or not row["duration_s"]:
         return None
     kept = json.loads(row["spectrum"])
@@ -177,11 +177,11 @@ NO_PART = Part(0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class EqualLoad:
-    """What simulation says of a change, by name of the figure (FIGURES).
+    """Simulated effect of a change, by name of the figure (FIGURES).
 
-    change, on the loads of both weeks, by settings or repair; load, what the loads do on both loops; promised, the
-    change on the load of before; stem, of the stem's travel over OP's, after over before, nothing behind a sound
-    valve, and stem_share, what it was before [-]; same, whether neither settings nor valve changed.
+    change, under the loads of both weeks, by settings or repair; load, effect of the loads on both loops; promised,
+    the change under the load of before; stem, of the stem's travel over OP's, after over before, zero behind a
+    fault-free valve, and stem_share, its value before [-]; same, whether neither settings nor valve changed.
     """
 
     change: Mapping[str, Part]
@@ -209,13 +209,13 @@ class Weeks:
 
     @property
     def louder_db(self) -> float:
-        """How much louder PV's fastest noise is after [dB]."""
+        """Increase of PV's fastest noise after the change [dB]."""
         before, after = (float(np.median([n.noise_db for n in side])) for side in (self.before, self.after))
         return after - before
 
     @property
     def cured(self) -> bool:
-        """Whether a valve at fault shows its fault in few nights after, and did in most before; a loop that still
+        """Whether a faulty valve shows its fault in few nights after, and did in most before; a loop that still
         cycles hides the fault."""
         was = sum(n.worn_alone for n in self.before) / len(self.before)
         is_now = sum(n.worn_alone or n.cycles for n in self.after) / len(self.after)
@@ -223,8 +223,8 @@ class Weeks:
 
 
 def equal_load(weeks: Weeks, limits: ComparisonLimits, figures: FigureLimits) -> EqualLoad | None:
-    """Both loops on both weeks' loads; None where no process was identified, or the simulated present does not have
-    the recorded error."""
+    """Both loops under both weeks' loads; None if no process was identified, or if the simulation with present
+    settings does not reproduce the recorded error."""
     if weeks.same:
         nothing = dict.fromkeys(FIGURES, NO_PART)
         return EqualLoad(nothing, {}, nothing, NO_PART, same=True)
@@ -248,7 +248,7 @@ def equal_load(weeks: Weeks, limits: ComparisonLimits, figures: FigureLimits) ->
     ratio = table[..., 2] - table[..., 3]
     off = np.hypot(*missed)[[0, 0, 1, 1]]
     most = float(np.abs(np.median(change, axis=0)).max())
-    hardly = min(most / limits.beside_change, 1.0)  # of hardly other settings what is missed cancels
+    hardly = min(most / limits.beside_change, 1.0)  # for nearly equal settings errors of the model cancel
     named = [
         {n: _part(x[:, i], share * off[i], limits) for i, n in enumerate(FIGURES)}
         for x, share in ((change, hardly), (load, 1.0), (own[:, 0], hardly))
@@ -263,20 +263,20 @@ def equal_load(weeks: Weeks, limits: ComparisonLimits, figures: FigureLimits) ->
 
 
 def _part(x: Floats, missed: float, limits: ComparisonLimits) -> Part:
-    """The median of draws; their spread, with what the simulation of each loop in force misses of the record, and a
-    share of the part itself for what no draw holds."""
+    """The median of draws; their spread, plus the simulation error of each present loop against the record, and a
+    share of the part itself for unmodelled effects."""
     value = float(np.median(x))
     spread = max(robust_deviation(x - value), 0.5 * float(np.std(np.clip(x, -4, 4))))
     return Part(value, math.hypot(spread, missed, limits.model_share * abs(value), limits.model_floor))
 
 
 Model = tuple[Fopdt, LoopNight | None]
-"""A drawn process, and the night whose valve it has, None for a sound one."""
+"""A drawn process, and the night with its valve, None for a fault-free one."""
 
 
 def _models(weeks: Weeks, rng: np.random.Generator) -> Iterator[Model]:
-    """Models drawn from what is known of the process: nights in which the valve's fault was seen tell it well; of a
-    loop without one, the spectra under both settings; else the nights, each by its precision."""
+    """Models drawn from the knowledge of the process: from nights in which the valve's fault was found; for a loop
+    without a fault from the spectra under both settings; otherwise from the nights, each by its precision."""
     faulty = [n for n in (*weeks.before, *weeks.after) if n.at_fault and n.constants is not None]
     shared = None
     if not faulty and weeks.old != weeks.new:
@@ -307,7 +307,7 @@ def _process(logs: Floats, sign: float) -> Fopdt:
 
 
 def _spectra(side: Sequence[LoopNight], pid: Pid) -> Spectra:
-    """Mean levels of some nights, from the longest period of which eight fit into a night."""
+    """Mean levels of some nights, from the longest period that occurs eight times in a night."""
     f = side[0].frequency[side[0].frequency > 8.0 / side[0].duration_s]
     levels = [np.interp(np.log(f), np.log(n.frequency), n.level) for n in side]
     return Spectra(f, np.mean(levels, axis=0), replace(pid, scan_s=max(n.dt_s for n in side)))
@@ -317,7 +317,7 @@ def _simulated(
     weeks: Weeks, model: Model, k: int, rng: np.random.Generator, figures: FigureLimits
 ) -> tuple[Floats, Floats] | None:
     """Logs of the figures of a drawn model on two drawn nights, shape (2 loops, 2 loads, figures), and of the
-    recorded errors and OP travels, shape (2 nights, 2); None where the model is unstable under settings in force."""
+    recorded errors and OP travels, shape (2 nights, 2); None if the model is unstable under settings in force."""
     process, night = model
     nights = tuple(side[int(rng.integers(len(side)))] for side in (weeks.before, weeks.after))
     h = max(n.dt_s for n in nights)
@@ -345,8 +345,8 @@ def _valve(night: LoopNight) -> Valve:
 def _calibrated(
     night: LoopNight, loop: Loop, h: float, rng: np.random.Generator, figures: FigureLimits
 ) -> Floats:
-    """A load as that of a night, with the moves of its set point [% PV], shape (STEPS,), so large that the loop in
-    force has the recorded error: a valve's own part of the error is no load."""
+    """A load like that of a night, with the moves of its set point [% PV], shape (STEPS,), scaled so that the loop in
+    force has the recorded error: a valve's own part of the error is not load."""
     (load, noise), size = _load(night, loop, h, rng), 1.0
     moved = rng.random(STEPS) < night.moves * h / 3600.0
     rest = noise - np.cumsum(night.size * np.where(np.cumsum(moved) % 2, -1.0, 1.0) * moved)
@@ -357,8 +357,8 @@ def _calibrated(
 
 
 def _load(night: LoopNight, loop: Loop, h: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """A load as that of a night and its noise [% PV], shape (STEPS,) each: the error's spectrum over the sensitivity,
-    less the level at its highest frequencies, and that level; phases drawn."""
+    """A load like that of a night and its noise [% PV], shape (STEPS,) each: the error's spectrum over the
+    sensitivity, less the level at its highest frequencies, and that level; with random phases."""
     level = night.level
     if night.cycle_s > 0.0 and loop.valve is not None:
         level = _without_cycle(night)
@@ -373,7 +373,7 @@ def _load(night: LoopNight, loop: Loop, h: float, rng: np.random.Generator) -> t
 
 
 def _without_cycle(night: LoopNight) -> Floats:
-    """The levels with a straight line across the valve's cycle and its harmonics [dB]."""
+    """The levels interpolated linearly across the valve's cycle and its harmonics [dB]."""
     octave = np.log2(night.frequency * night.cycle_s)
     near = np.min([np.abs(octave - math.log2(k)) for k in HARMONICS], axis=0) < BESIDE_OCTAVES
     if near.all() or not near.any():
@@ -397,8 +397,8 @@ def weeks_of(
     new: tuple[float | None, float | None],
     limits: ComparisonLimits,
 ) -> Weeks | None:
-    """A loop's nights within two spans [s], of which nine tenths must lie in one, with the settings in force: those
-    that a change states, else the nights' own; None where a side has no night, or settings are not known."""
+    """A loop's nights within two spans [s], with nine tenths of each inside one, and the settings in force: those of
+    a stated change, otherwise the nights' own; None if a side has no night, or settings are unknown."""
     sides: list[list[Mapping[str, Any]]] = [[], []]
     for row in rows:
         if row["start_s"] is None or not row["duration_s"] or row["kp"] is None:
@@ -414,5 +414,5 @@ def weeks_of(
     if pids[0] is None or pids[1] is None:
         return None
     weeks = Weeks(nights[0], nights[1], pids[0], pids[1])
-    quiet = abs(weeks.louder_db) <= limits.noise_db  # loud noise moves a stem within its play
+    quiet = abs(weeks.louder_db) <= limits.noise_db  # strong noise moves a stem within its backlash
     return replace(weeks, repaired=pids[0] == pids[1] and quiet and weeks.cured)

@@ -1,7 +1,7 @@
-"""The process behind two weeks of one loop, from the spectra of its error under both settings.
+"""Process identification of one loop from the spectra of its error in two weeks with different settings.
 
-A calm loop under one pair of settings hardly tells process and load apart. Under two it does: the sensitivity
-changes with the settings, and the load is smooth, a lag of white noise before the process and white noise at PV.
+Without a cycle, one pair of settings hardly separates process and load. Two pairs do: the sensitivity changes with
+the settings, and the load is smooth, a lag of white noise before the process and white noise at PV.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from identification.models import Fopdt, Loop, Pid
 from tuning.frequency_response import controller_response, maximum_sensitivity, process_response
 
 ROUGHNESS_DB = 1.0
-"""What a smooth load leaves of a real one at each frequency [dB]; ours: the scatter of seven nights is half of it."""
+"""Difference of a real load from a smooth one per frequency [dB]; ours: the scatter of seven nights is half."""
 STARTS = tuple(product((0.15, 0.5), (0.7, 3.0)))
-"""Dead time and time constant, over the integral time, that the search begins from; ours."""
+"""Start values of dead time and time constant, over the integral time; ours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class Spectra:
 @dataclass(frozen=True, slots=True)
 class SharedProcess:
     """Logs of slope, time constant and dead time, shape (3,), their covariance, shape (3, 3), the slope's sign, and
-    how far the spectra are from a smooth load [dB]."""
+    the deviation of the spectra from a smooth load [dB]."""
 
     mean: Floats
     covariance: Floats
@@ -58,8 +58,8 @@ def _predicted(theta: Floats, sides: Sequence[Spectra], sign: float) -> Iterator
 
 
 def shared_process(sides: Sequence[Spectra]) -> SharedProcess | None:
-    """The process whose loops with both settings have the recorded spectra under smooth loads; None where none that
-    is stable does."""
+    """The process whose loops with both settings reproduce the recorded spectra under smooth loads; None if no stable
+    one does."""
     c = sides[0].controller
     if not math.isfinite(c.ti_s) or c.ti_s <= 0.0 or c.kp == 0.0:
         return None

@@ -1,7 +1,7 @@
-"""From a recording to its explanation, stored and told.
+"""Explanation of a recording, with storage, pages and text.
 
-The package can be called, and then is `analyzer.api.explain`: once any of its modules is imported, it stands where
-`import analyzer as triage` looks for `triage.explain`.
+The package is callable and then is `analyzer.api.explain`: once any of its modules is imported, it occupies the name
+`triage.explain` of `import analyzer as triage`.
 """
 
 import sys

@@ -1,8 +1,8 @@
-"""From an export's loop to the cases that are explained or held out: parts of one setting each, on one clock, the
-telling stretch, controller and neighbours.
+"""Conversion of an export's loop to cases that are explained or held out: parts with one setting each, on one clock,
+the most informative stretch, controller and neighbours.
 
-A controller's law, and a limit cycle, belong to their settings; a valve and a process do not. What is found in one
-part has to hold in the others, or it is not told.
+A controller's law, and a limit cycle, belong to their settings; a valve and a process do not. A finding in one part
+must be confirmed in the others, or it is not reported.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ from identification.record import Floats
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One loop of an export, ready to be explained: its record, the subject made of it, what was left aside, and what
-    its experiments tell."""
+    """One loop of an export, prepared for an explanation: its record, the recording made of it, what was left out,
+    and the results of its experiments."""
 
     spec: LoopSpec
     prepared: Prepared
@@ -56,14 +56,14 @@ class Case:
 
 
 def tags_of(spec: LoopSpec, specs: Sequence[LoopSpec]) -> list[str]:
-    """Tags that explaining a loop reads: its own, its measured load, and the OPs of some other loops."""
+    """Tags for the explanation of a loop: its own, its measured load, and the OPs of some other loops."""
     others = [s.op for s in specs if s.loop != spec.loop and s.op]
     load = [] if spec.load is None else [spec.load]
     return list(dict.fromkeys([*spec.tags, *load, *others[: EXPLAIN.neighbours]]))
 
 
 def stated_law(spec: LoopSpec, prepared: Prepared) -> StatedSettings | None:
-    """The controller as stated, integral time in samples; None where it is not known or is no PI."""
+    """The controller as stated, integral time in samples; None if it is unknown or not a PI."""
     pid = controller(spec, prepared.scale.span)
     if pid is None or pid.td_s > 0 or not math.isfinite(pid.ti_s):
         return None
@@ -74,7 +74,7 @@ def stated_law(spec: LoopSpec, prepared: Prepared) -> StatedSettings | None:
 def ops_beside(
     spec: LoopSpec, specs: tuple[LoopSpec, ...], series: Mapping[str, Series], p: Prepared, config: Config
 ) -> tuple[Floats, ...]:
-    """The measured load that loops.csv states [% of its recorded range], and OPs of the export's other loops, on this
+    """The measured load stated in loops.csv [% of its recorded range], and OPs of the export's other loops, on this
     loop's clock."""
     r = p.record
     clock = r.start_s + r.time_s
@@ -89,14 +89,14 @@ def ops_beside(
 
 
 VALVE_FIGURES = ("backlash_pct", "stickband_pct", "slip_jump_pct")
-"""Figures of a valve at fault, by the names of the columns."""
+"""Figures of a faulty valve, by the names of the columns."""
 
 
 def seen_in_cycles(verdict: Verdict, limits: AdviceLimits) -> SeenInCycles | None:
-    """The faulty valve that a night's verdict on this very recording rests on; None where it blames none.
+    """The faulty valve of a night's verdict on this same recording; None if the verdict names none.
 
-    The verdict asks each stretch between two turns of OP by itself, so it stands where friction changes from slip to
-    slip; what the explanation simulates begins from there.
+    The verdict tests each stretch between two OP reversals separately, so it is valid if friction varies from slip to
+    slip; the simulation of the explanation starts from it.
     """
     m = verdict.measured
     if verdict.cause is not Cause.VALVE or m is None:
@@ -113,8 +113,8 @@ def seen_in_cycles(verdict: Verdict, limits: AdviceLimits) -> SeenInCycles | Non
 
 
 def verdict_on(spec: LoopSpec, prepared: Prepared, config: Config) -> tuple[Verdict, float]:
-    """What a night would say of the whole recording: why it oscillates, or of which valve it rests; and the period of
-    its cycle [s], 0 where it has none."""
+    """The verdict on the whole recording as by a night: the cause of its oscillation, or its valve fault; and the
+    period of its cycle [s], 0 without one."""
     seen, span = detect_where_it_cycles(prepared.record, config.oscillation)
     stated = controller(spec, prepared.scale.span)
     found, said = judged_where(prepared, seen, span, stated, config, spec.type)
@@ -125,8 +125,8 @@ def verdict_on(spec: LoopSpec, prepared: Prepared, config: Config) -> tuple[Verd
 
 
 def as_decided(verdict: Verdict, fault: Fault | None) -> Verdict:
-    """A verdict on the loop by itself with the valve as the night decided, which knows the loops beside it and the
-    nights before."""
+    """A verdict on the loop alone with the valve fault as decided by the night, which includes the other loops and
+    earlier nights."""
     if verdict.cause is not Cause.VALVE or fault in (None, Fault.UNDECIDED):
         return verdict
     cleared = fault is Fault.NONE
@@ -134,8 +134,8 @@ def as_decided(verdict: Verdict, fault: Fault | None) -> Verdict:
 
 
 def as_given(prepared: Prepared) -> Prepared:
-    """A loop that shares a valve with what a select gave it, whoever that was; half a split range without the time in
-    which the other half moves PV."""
+    """A loop that shares a valve with the output of a select, of either controller; half a split range without the
+    time in which the other half moves PV."""
     r, shared = prepared.record, prepared.shared
     if shared is None:
         return prepared
@@ -144,7 +144,7 @@ def as_given(prepared: Prepared) -> Prepared:
 
 
 def telling_stretch(prepared: Prepared, most: int | None) -> tuple[Prepared, str]:
-    """The stretch in which OP travels most of a recording of more than so many samples, and a sentence on it."""
+    """The stretch with the most OP travel of a recording of more than `most` samples, and a sentence on it."""
     r = prepared.record
     if most is None or len(r) <= most:
         return prepared, ""
@@ -164,13 +164,13 @@ def case(
     most: int | None = EXPLAIN.whole_samples,
     fault: Fault | None = None,
 ) -> Case:
-    """Prepare one loop; of a recording of more than `most` samples the most telling stretch, None for all; fault,
-    what the night says of its valve, None where none was assessed.
+    """Prepare one loop; of a recording of more than `most` samples the most informative stretch, None for all;
+    fault, the night's valve fault, None if none was assessed.
 
     Raises
     ------
     NotAssessedError
-        Where PV or OP is missing or never moves.
+        PV or OP is missing or never moves.
     """
     raw = series[spec.pv or ""]
     series = snapped(series, spec.pv or "")
@@ -210,7 +210,7 @@ def case(
 
 
 def coarser(whole: Prepared, taught: Learned | None, config: Config) -> Prepared:
-    """A record that is too fast for what its experiments tell at a coarser step, so that none of them is cut."""
+    """A record that is too fast for its experiments, with a larger step, so that none of them is cut."""
     if taught is None or taught.model is None:
         return whole
     e, record = taught.model.estimates, whole.record
@@ -229,10 +229,10 @@ def subject_of(
     others: tuple[Floats, ...],
     config: Config,
 ) -> Recording:
-    """What is explained of a prepared record, beside what a night says of it, the period of its cycle [s] and the OPs
-    of its neighbours."""
+    """The recording to be explained, from a prepared record, the night's verdict, the period of its cycle [s] and the
+    OPs of its neighbours."""
     r, (verdict, period_s) = prepared.record, night
-    judged = float(r.usable.mean()) >= config.quality.usable_share  # else OP is mostly an operator's
+    judged = float(r.usable.mean()) >= config.quality.usable_share  # otherwise mostly an operator moves OP
     return Recording(
         r.sp if judged and not r.sp_estimated else None,
         r.pv,
@@ -253,7 +253,7 @@ def subject_of(
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One part: the loop with the settings in force there, its trends, and when it was."""
+    """One part: the loop with its settings then, its trends, and its time."""
 
     spec: LoopSpec
     series: dict[str, Series]
@@ -264,9 +264,9 @@ class Part:
 def parts(
     spec: LoopSpec, series: Mapping[str, Series], changes: Sequence[TuningChange], zone: str
 ) -> list[Part]:
-    """The parts of a recording, the one with most samples first; one where nothing changed.
+    """The parts of a recording, the one with most samples first; a single one without a change.
 
-    series : trends by tag, PV's among them; changes : of any loops; zone : the plant's, in which parts are named.
+    series : trends by tag, including PV's; changes : of any loops; zone : the plant's, for the names of parts.
     """
     stamps = series[spec.pv or ""].stamp_s
     first, last = float(stamps[0]), float(stamps[-1])
@@ -286,7 +286,7 @@ def parts(
 
 
 def parts_said(judged: Sequence[Part]) -> str:
-    """On which part an explanation rests and which are held out, as a sentence; empty where there is one."""
+    """A sentence on the part that is explained and those held out; empty for a single part."""
     if len(judged) < 2:
         return ""
     rest = " and ".join(p.name for p in judged[1:])
@@ -294,12 +294,12 @@ def parts_said(judged: Sequence[Part]) -> str:
 
 
 def loop_trends(plant: Plant, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...], dict[str, Series]]:
-    """A loop of an export, all loops of it, and the trends that explaining it reads.
+    """A loop of an export, all its loops, and the trends for its explanation.
 
     Raises
     ------
     InputError
-        The export has no such loop, no PV of it, or no samples of PV in the span that is asked for.
+        The export has no such loop, no PV of it, or no samples of PV in the requested span.
     """
     specs = plant.specs
     spec = spec_of(specs, tag)
@@ -315,7 +315,7 @@ def loop_trends(plant: Plant, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...],
 
 
 def whole(asked: Asked, tag: str) -> tuple[Case, Series]:
-    """A loop's case over all of an export, under its last settings, and its PV."""
+    """A loop's case over a whole export, under its last settings, and its PV."""
     spec, specs, series = loop_trends(guarded(asked), tag)
     pv = series[spec.pv or ""]
     spec = in_force(spec, asked.changes, float(pv.stamp_s[-1]))
@@ -325,13 +325,13 @@ def whole(asked: Asked, tag: str) -> tuple[Case, Series]:
 def asked_cases(
     asked: Asked, plant: Plant, tag: str, held_out: Sequence[Path], fault: Fault | None = None
 ) -> tuple[Case, dict[str, Case]]:
-    """The case to be explained, and those held out by name: parts under other settings, and other exports; plant,
-    what is asked, opened; fault as in `case`."""
+    """The case to be explained, and those held out by name: parts under other settings, and other exports; plant, the
+    opened request; fault as in `case`."""
     spec, specs, series = loop_trends(plant, tag)
     judged = parts(spec, series, asked.changes, asked.zone)
     kept: list[tuple[Part, Case]] = []
     for part in judged:
-        with nullcontext() if len(judged) == 1 else suppress(NotAssessedError):  # OP stands still in it
+        with nullcontext() if len(judged) == 1 else suppress(NotAssessedError):  # OP is constant in it
             most = None if kept else EXPLAIN.whole_samples
             kept.append((part, case(part.spec, specs, part.series, asked.config, most, fault)))
     if not kept:

@@ -1,4 +1,4 @@
-"""What an explanation's page draws: recording and simulations, misfit by feature and period, what was found."""
+"""Drawings of an explanation's page: recording and simulations, misfit by feature and period, findings."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from reports.pages import Area, Band, Line, Mark, Panels, Plot, Trend
 WHOLE = 1500
 """Buckets of the trend over the whole recording: a screen's width."""
 CLOSE, LEAST_CLOSE = 900, 240
-"""Samples of the close look at most and at least."""
+"""Maximum and minimum samples of the close-up."""
 CLOSE_MEMORIES = 15.0
-"""Length of the close look in memories of the loop (dead time and time constant)."""
+"""Length of the close-up in settling times of the loop (dead time and time constant)."""
 NEARLY_ALL = 0.9
-"""Spans that hold more than this share of a recording are not marked: they tell nothing."""
+"""Spans above this share of a recording are not marked, because they give no information."""
 SEEN = 0.2
-"""Errors are drawn on an axis that reaches this part of their size to either side at least."""
+"""Errors are drawn on an axis that includes at least this part of their size on either side."""
 SEGMENTS = 8
-"""Parts that a spectrum is averaged over."""
+"""Parts over which a spectrum is averaged."""
 LONGEST_SEGMENT, SHORTEST_SEGMENT = 4096, 64
-"""Samples of such a part at most and at least; ours."""
+"""Maximum and minimum samples of such a part; ours."""
 SPECTRUM_POINTS = 120
 """Points of a spectrum."""
 ERRORS = 2.0
@@ -42,12 +42,12 @@ SHORT = {"baseline": ROWS["baseline"], "model": ROWS["explained"]}
 
 
 def recorded_pv(e: Explained) -> Floats:
-    """PV, its clock set right [% of span], shape (n,)."""
+    """PV with its clock corrected [% of span], shape (n,)."""
     return e.found.p.inputs.level + e.found.p.y
 
 
 def simulations(e: Explained) -> dict[str, Floats]:
-    """PV by baseline, model and brought [% of span], anchored as for the proof, shape (n,) each."""
+    """PV by baseline, improved and user's model [% of span], anchored as for the proof, shape (n,) each."""
     p, proof = e.found.p, e.found.proven
     names = ("baseline", "model") if e.found.accepted else ("baseline",)
     drawn = dict(zip(names, proof.drawn, strict=False))
@@ -56,7 +56,7 @@ def simulations(e: Explained) -> dict[str, Floats]:
 
 
 def drawn_trends(e: Explained) -> tuple[Trend, ...]:
-    """The whole recording, and the stretch that tells most at full resolution."""
+    """The whole recording, and the most informative stretch at full resolution."""
     marked = bool(e.said.where.get("spans"))
     drawn, n, part = signals(e), e.case.subject.pv.size, close_part(e)
     how = NOTES["shaded"] * marked + NOTES["zoom"]
@@ -68,7 +68,7 @@ def drawn_trends(e: Explained) -> tuple[Trend, ...]:
 
 
 def signals(e: Explained) -> list[tuple[str, str, int, Floats]]:
-    """Label, colour, panel and values of all that is drawn over time."""
+    """Label, colour, panel and values of everything drawn over time."""
     s, pv, simulated = e.case.subject, recorded_pv(e), simulations(e)
     out = [] if s.sp is None else [("SP", "sp", 0, s.sp)]
     out.append(("PV, clock set right" if e.found.late_s else "PV recorded", "recorded", 0, pv))
@@ -84,7 +84,7 @@ def trend(
     buckets: int,
     words: tuple[str, str, str],
 ) -> Trend:
-    """A part of what is drawn over time, with the spans that matter marked; its name, title and caption."""
+    """A part of the time courses, with relevant spans marked; its name, title and caption."""
     r, usable = e.case.prepared.record, e.case.subject.usable
     n = part.stop - part.start
     edges = (np.arange(min(buckets, n)) * n) // min(buckets, n)
@@ -102,7 +102,7 @@ def trend(
 
 
 def close_part(e: Explained) -> slice:
-    """The stretch of the close look: where the verdict rests most, or where OP travels most."""
+    """The stretch of the close-up: where the evidence is largest, or where OP travels most."""
     s, c = e.case.subject, e.found.plain.model.c
     memory = CLOSE_MEMORIES * float(c[Slot.T] + c[Slot.L]) / s.dt_s
     length = min(int(np.clip(memory, LEAST_CLOSE, CLOSE)), s.pv.size)
@@ -111,7 +111,7 @@ def close_part(e: Explained) -> slice:
 
 
 def weight(e: Explained) -> Floats:
-    """How much each sample matters for the verdict, shape (n,)."""
+    """Weight of each sample in the verdict, shape (n,)."""
     found, n = e.found, e.case.subject.pv.size
     if found.finding is not None and not found.finding.where.all():
         return np.concatenate((found.finding.where.astype(float), np.zeros(n)))[:n]
@@ -121,7 +121,7 @@ def weight(e: Explained) -> Floats:
 
 
 def misfit_panels(e: Explained) -> Panels:
-    """The one-step errors along each feature that a table does not say better, and the spectrum, before and after."""
+    """The one-step errors along each feature that needs a plot, and the spectrum, before and after."""
     at = located_in(e.found.p, e.found.plain, e.case.subject)
     known = {f.name: f for f in at.features}
     along = (feature_plot(e, g, known.get(g.name)) for g in at.groups if "axis" in FEATURES[g.name])
@@ -159,14 +159,14 @@ def errors_along(g: Group, fit: Fitted, judged: Mask, by: str) -> tuple[Floats, 
 
 
 def note_of(f: Feature | None) -> str:
-    """Whether a feature carries the misfit, under its plot; empty where it was not tested."""
+    """Whether the misfit depends on a feature, as a note below its plot; empty if it was not tested."""
     if f is None:
         return ""
     return f"Carries the misfit (chance {max(f.p, 0.01):.2g})." if f.carries else "Does not carry the misfit."
 
 
 def spectrum_plot(e: Explained) -> Plot:
-    """Spectrum of what the simulations leave, as its part of the rms per octave of period."""
+    """Spectrum of the simulation errors, as the share of the rms per octave of period."""
     pv, dt_s = recorded_pv(e), e.case.subject.dt_s
     left = {k: pv - x for k, x in simulations(e).items() if k != "brought"}
     lines = tuple(Line(SHORT[k], *spectrum(x, dt_s), kind=k) for k, x in left.items())
@@ -175,7 +175,7 @@ def spectrum_plot(e: Explained) -> Plot:
 
 
 def spectrum(x: Floats, dt_s: float) -> tuple[Floats, Floats]:
-    """Periods [s] and a signal's part of the rms per octave there [its unit], shape (m,) each."""
+    """Periods [s] and a signal's share of the rms per octave there [its unit], shape (m,) each."""
     from scipy.signal import welch  # its import takes longer than most explanations
 
     segment = max(min(x.size // SEGMENTS, LONGEST_SEGMENT), SHORTEST_SEGMENT)
@@ -187,7 +187,7 @@ def spectrum(x: Floats, dt_s: float) -> tuple[Floats, Floats]:
 
 
 def found_plot(e: Explained) -> Plot | None:
-    """The picture of what has no name and explains the loop best, else of the first effect found."""
+    """The picture of an unnamed effect that explains the loop best, otherwise of the first effect found."""
     found, said, finding = e.found, e.said, e.found.finding
     inputs, plain = found.p.inputs, found.plain.model.c
     if finding is not None:
@@ -209,7 +209,7 @@ def found_plot(e: Explained) -> Plot | None:
 
 
 def law_plot(e: Explained) -> Plot | None:
-    """OP rebuilt by the stated settings where nothing is wrong with them."""
+    """OP recomputed by the stated settings if no fault was found in them."""
     if e.found.controller is not None or e.found.law is None:
         return None
     shape, said = by_stated_law(e.case.subject), NOTES["sound_controller"]
@@ -217,7 +217,7 @@ def law_plot(e: Explained) -> Plot | None:
 
 
 def shape_plot(shape: Picture | None, said: str, name: str = "shape", title: str = "") -> Plot | None:
-    """A shape as a plot: what was recorded below, what was found above; `said` of it, or what its kind says."""
+    """A picture as a plot: the recorded curve below, the finding above; caption `said`, or that of its kind."""
     if shape is None:
         return None
     lines, areas = [], []

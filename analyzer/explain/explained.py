@@ -1,6 +1,6 @@
-"""One loop explained: what was asked, what was found, the answer, and the answer as plain data.
+"""Explanation of one loop: the request, the findings, the answer, and the answer as plain data.
 
-The data are the contract of `triage explain --format json`; text, page and store quote them.
+The data are the contract of `triage explain --format json`; text, page and store use them.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from identification.mismatch.words import reason
 from reports.plain import json_ready
 
 TOLD_IN_REASON = ("note", "caution", "shown", "outside")
-"""Parts of an answer that the data have in their reason, and by a key of its own where there is such physics."""
+"""Parts of an answer that the data include in their reason, and under a separate key if there is such an effect."""
 
 
 @dataclass(frozen=True, slots=True)
 class Explained:
-    """One loop explained: what was asked, what was found, the answer in numbers and as data, the user's own model."""
+    """Explanation of one loop: the request, the findings, the answer in numbers and as data, the user's own model."""
 
     case: Case
     found: Explanation
@@ -42,11 +42,11 @@ class Explained:
     brought: UserModel | None = None
 
     def model(self) -> dict[str, Any]:
-        """The model found, the plain loop where nothing was, as data to be written."""
+        """The improved model, or the baseline model without findings, as data for a file."""
         c, found, s = self.case, self.found, self.case.prepared.scale
         scale = dict(zip(SCALE, (s.low, s.span, s.op_low, s.op_span), strict=True))
         names = tuple(e.name for e in self.said.effects)
-        # the constants that pages draw and the proof judges, not those that tell the next sample best
+        # the constants for pages and proof, not those with the best one-step-ahead prediction
         return to_data(c.spec.loop, found.p.inputs, found.proven.drawn[1], names, found.late_s, scale)
 
 
@@ -58,24 +58,24 @@ def explained(
 ) -> Explained:
     """Explain one loop.
 
-    tell : is told what is tried; brought : the user's own model, which is judged and is one more start of the search;
+    tell : called with each step; brought : the user's own model, which is judged and is one more start of the search;
     held_out : other recordings of the loop by name, on which the explanation is proven.
     """
     own, others, scale = None, held_out or {}, c.prepared.scale
-    with np.errstate(all="ignore"):  # a candidate that runs away loses; its overflow is nobody's business
+    with np.errstate(all="ignore"):  # a diverging candidate loses; its overflow needs no warning
         start = None if brought is None else plain_start(brought)
         found = proven_on(explain(c.subject, tell, start), [in_percent_of(c, x) for x in others.values()])
         said = answer(found, c.subject)
         if brought is not None:
             own = judged(brought, found, c.subject, span_note(scale, brought))
     data = as_data(c, said, own)
-    if c.subject.stated is None:  # where they are stated, the controller's check says what is to be said
+    if c.subject.stated is None:  # if they are stated, the controller check reports
         data |= law_data(found.law, c.subject.dt_s)
     if c.learned is not None and c.learned.model is not None:
         data["experiments"] = json_ready(experiment_data(c.learned))
         clause = in_a_clause(c.learned)
         data["reason"] = f"{data['reason']} {clause[:1].upper()}{clause[1:]}."
-    if others:  # of each, where something was found that could be held against it
+    if others:  # with each, if an effect was found to be tested on it
         data["held_out_on"] = [
             {
                 "recording": name,
@@ -89,14 +89,14 @@ def explained(
 
 
 def with_night(data: dict[str, Any], decision: Row | None) -> dict[str, Any]:
-    """An answer with what the night decided of the loop, to which the physics may only add."""
+    """An answer with the night's decision on the loop, which the explanation may only supplement."""
     return data if decision is None else data | {"night": json_ready(decision_data(decision))}
 
 
 def experiment_data(of: Learned) -> dict[str, Any]:
-    """What experiments tell: kind of answer, constants with 90 % intervals, and the courses that tell them."""
+    """Results of experiments: kind of response, constants with 90 % intervals, and their time courses."""
     model = of.model
-    assert model is not None  # asked for where there is one
+    assert model is not None  # called only with a model
     return {
         "kind": str(model.kind),
         "constants": {k: asdict(e) for k, e in model.estimates.items()},
@@ -106,13 +106,13 @@ def experiment_data(of: Learned) -> dict[str, Any]:
 
 
 def in_percent_of(c: Case, other: Case) -> Recording:
-    """Another recording in the percent of the one that is fitted; without stated ranges theirs differ."""
+    """Another recording in the percent of the fitted one; without stated ranges they differ."""
     pv, op = rescaled(other.prepared.scale, c.prepared.scale, other.subject.pv, other.subject.op)
     return replace(other.subject, pv=pv, op=op, sp=None)
 
 
 def as_data(c: Case, said: Answer, brought: UserModel | None = None) -> dict[str, Any]:
-    """The answer as data that JSON can hold."""
+    """The answer as JSON-compatible data."""
     data = answer_data(c.spec.loop, said, f"{reason(said)} {c.shortened}".strip())
     if brought is not None:
         judgement = {"fitted": asdict(brought.fitted), "held_out": asdict(brought.held_out)}
@@ -124,14 +124,14 @@ def as_data(c: Case, said: Answer, brought: UserModel | None = None) -> dict[str
 
 
 def answer_data(loop: str, said: Answer, why: str) -> dict[str, Any]:
-    """What an answer says by itself, as the contract has it."""
+    """The answer alone, in the form of the contract."""
     told = {k: v for k, v in asdict(said).items() if k not in TOLD_IN_REASON}
     return {"loop": loop} | told | {"reason": why}
 
 
 def law_data(law: ControlLaw | None, dt_s: float) -> dict[str, Any]:
-    """The law that gives OP, as a further key: Kp [% OP/% PV], Ti [s], none without integral action, and the share of
-    OP that it explains."""
+    """The law that reproduces OP, as a further key: Kp [% OP/% PV], Ti [s], none without integral action, and the
+    explained share of OP."""
     if law is None or law.kp * law.ki <= 0.0:
         return {}
     ti_s = integral_time(law.kp, law.ki, law.residual.size) * dt_s
@@ -139,5 +139,5 @@ def law_data(law: ControlLaw | None, dt_s: float) -> dict[str, Any]:
 
 
 def abstained(loop: str, reason: str) -> dict[str, Any]:
-    """The answer where the question cannot be answered from the record."""
+    """The answer if the record does not allow an explanation."""
     return json_ready(answer_data(loop, Answer("unexplained", "none", (), {}, {}, {}, None), reason))

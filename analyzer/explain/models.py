@@ -1,4 +1,4 @@
-"""Models of a loop in files: the one found is kept, one that a user brings is read with suspicion, judged and run."""
+"""Models of a loop in files: the improved one is saved, a user's one is checked, judged and simulated."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from identification.record import Floats
 from identification.simulation.parameters import Slot, neutral
 
 HUNDRED = (60.0, 160.0)
-"""Ratios of two gains that look like percent against fractions; ours: a refit moves a gain by less."""
+"""Ratios of two gains that indicate percent against fractions; ours: a refit moves a gain by less."""
 TIMES = (((40.0, 90.0), "minutes"), ((2400.0, 5400.0), "hours"))
-"""Ratios of two time constants that look like minutes, or hours, against seconds."""
+"""Ratios of two time constants that indicate minutes, or hours, against seconds."""
 SAVED, ANEW = "a model saved by `triage explain`", "save it anew"
 RUNS = "a model that can be run on this recording"
 SCALE = ("pv_low", "pv_span", "op_low", "op_span")
@@ -37,7 +37,7 @@ def read_model(path: Path, loop: str) -> dict[str, Any]:
     Raises
     ------
     InputError
-        It is no model, or another loop's.
+        It is not a model, or another loop's.
     """
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
@@ -52,7 +52,7 @@ def read_model(path: Path, loop: str) -> dict[str, Any]:
 
 
 def checked(data: Mapping[str, Any], path: Path) -> None:
-    """Raise InputError where a number of a model is none."""
+    """Raise InputError if a number of a model is invalid."""
 
     def refused(seen: str, expected: str, todo: str = "save the model anew") -> InputError:
         return InputError(f"{path}: {seen}", expected, todo)
@@ -76,7 +76,7 @@ def checked(data: Mapping[str, Any], path: Path) -> None:
 
 
 def plain_start(brought: Mapping[str, Any]) -> Floats:
-    """Constants of the plain loop in a model, shape (SIZE,): the rest of it is judged, not believed."""
+    """Baseline constants of a model, shape (SIZE,), as a start; its other constants are only judged."""
     own, out = constants(dict(brought)), neutral()
     for slot in (Slot.T, Slot.L, Slot.K):
         out[slot] = own[slot]
@@ -85,7 +85,7 @@ def plain_start(brought: Mapping[str, Any]) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class UserModel:
-    """The user's model: PV as it simulates it [% PV], shape (n,), its misfit on both parts, one line about it."""
+    """The user's model: simulated PV [% PV], shape (n,), its misfit on both parts, one line about it."""
 
     simulated: Floats = field(repr=False)
     fitted: Misfit
@@ -94,9 +94,9 @@ class UserModel:
 
 
 def judged(data: Mapping[str, Any], found: Explanation, s: Recording, more: str = "") -> UserModel:
-    """The user's model on the recording explained, its mean freed, beside the plain loop refitted.
+    """The user's model on the explained recording, with a free mean, compared with the refitted baseline model.
 
-    more : what else there is to say of it.
+    more : further text about it.
     """
     out = carried(dict(data), s.op, s.pv, s.dt_s)
     cut = int((1.0 - s.limits.proof.held_out) * s.pv.size)
@@ -113,7 +113,7 @@ def judged(data: Mapping[str, Any], found: Explanation, s: Recording, more: str 
 
 
 def against_plain(own: float, plain: float, as_good: float) -> str:
-    """How a model does against the plain loop fitted anew, from both misfits."""
+    """Comparison of a model with the refitted baseline model, from both misfits."""
     if own > as_good * plain:
         return "it does worse than the plain loop can"
     better = own * as_good < plain
@@ -121,16 +121,16 @@ def against_plain(own: float, plain: float, as_good: float) -> str:
 
 
 def within(ratio: float, ends: tuple[float, float]) -> bool:
-    """Whether a ratio, or its inverse, lies between two ends."""
+    """Whether a ratio, or its inverse, is between two limits."""
     size = abs(ratio)
     return ends[0] <= size <= ends[1] or (size > 0 and ends[0] <= 1.0 / size <= ends[1])
 
 
 def wrong_units(own: Floats, found: Mapping[str, float]) -> str:
-    """What looks wrong with a model's units against the process as identified; empty where nothing does.
+    """Probable errors in a model's units compared with the identified process; empty if there are none.
 
-    own : constants of the user's model, shape (SIZE,); found : gain [% PV/% OP] and time_constant_s of the plain loop
-    fitted to the recording.
+    own : constants of the user's model, shape (SIZE,); found : gain [% PV/% OP] and time_constant_s of the baseline
+    model fitted to the recording.
     """
     gain, lag_s = found["gain"], found["time_constant_s"]
     its, said = f"its gain, {own[Slot.K]:.3g},", []
@@ -148,7 +148,7 @@ def wrong_units(own: Floats, found: Mapping[str, float]) -> str:
 
 
 def span_note(now: Scale, brought: Mapping[str, Any]) -> str:
-    """What to say where a model was made with another PV span than the record now has; empty where not."""
+    """Note for a model made with another PV span than that of the record; otherwise empty."""
     scale = brought.get("scale")
     then = scale.get("pv_span") if isinstance(scale, dict) else None
     if not isinstance(then, int | float) or abs(then / now.span - 1.0) < EXPLAIN.span_differs:
@@ -158,9 +158,9 @@ def span_note(now: Scale, brought: Mapping[str, Any]) -> str:
 
 
 def saved_scale(data: Mapping[str, Any], now: Scale) -> Scale:
-    """What percent means to a saved model: what it meant in the recording that was fitted.
+    """Meaning of percent in a saved model: that in the fitted recording.
 
-    Without a stated range percent is of the range recorded, and the next recording has another.
+    Without a stated range percent is of the recorded range, which differs in the next recording.
     """
     then = data.get("scale")
     if not isinstance(then, dict) or not all(isinstance(then.get(n), int | float) for n in SCALE):
@@ -175,12 +175,12 @@ def rescaled(now: Scale, then: Scale, pv: Floats, op: Floats) -> tuple[Floats, F
 
 
 def simulated(c: Case, data: dict[str, Any], stamps: Floats, closed: bool) -> tuple[Floats, Floats]:
-    """PV and OP in their own units at each stamp, from a saved model run open loop or, if wished, closed.
+    """PV and OP in their own units at each stamp, from a saved model in open or, if requested, closed loop.
 
     Raises
     ------
     InputError
-        The loop is to be closed and its controller is not known.
+        A closed loop is requested and its controller is unknown.
     """
     r, law, now = c.prepared.record, c.subject.stated, c.prepared.scale
     scale = saved_scale(data, now)

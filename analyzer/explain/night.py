@@ -1,7 +1,7 @@
-"""The flagged loops of a night explained, one by one on worker processes, each answer kept as it comes.
+"""Explanation of the flagged loops of a night, one by one on worker processes, each answer stored immediately.
 
-An error of one loop, a dead worker included, is that loop's answer. Kept in STORE/explained/NIGHT.parquet: a row a
-loop with verdict, block, reason, the whole answer as JSON and its page as it is to be drawn (reports/page_file.py).
+An error of one loop, including a dead worker, is that loop's answer. Stored in STORE/explained/NIGHT.parquet: one row
+per loop with verdict, block, reason, the answer as JSON and its page ready for rendering (reports/page_file.py).
 """
 
 from __future__ import annotations
@@ -24,19 +24,18 @@ from identification.errors import TriageError
 
 TABLE = "explained"
 QUIET = (Cause.NONE, Action.NONE, "", None)
-"""Causes and actions that are none."""
+"""Causes and actions that mean none."""
 ASKED = [
     *("loop", "status", "oscillating_pct", "oscillation_significance", "cause", "valve_fault", "action"),
     "source_loop",
 ]
-"""Columns that say whether a loop is worth an explanation, what its valve has, and whose loop leads it."""
+"""Columns for deciding whether a loop needs an explanation, its valve fault, and the loop that leads it."""
 Row = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """One loop of a night to be explained, with the loop that leads it where one is known, and what the night says of
-    its valve."""
+    """One loop of a night to be explained, with the loop that leads it if known, and the night's valve fault."""
 
     export: Export
     spec: LoopSpec
@@ -47,14 +46,14 @@ class Question:
 
 
 def flagged(row: Mapping[str, Any]) -> bool:
-    """Whether a loop of a night is worth an explanation: it oscillates, or has a cause or an action."""
+    """Whether a loop of a night needs an explanation: it oscillates, or has a cause or an action."""
     if row["status"] != Status.OK:
         return False
     return counts(row["oscillating_pct"]) or row["cause"] not in QUIET or row["action"] not in QUIET
 
 
 def answered(q: Question, began: Callable[[int], None] = lambda at: None) -> Row:
-    """The row of one loop, whatever happens; runs in a worker process."""
+    """The row of one loop, in any case; runs in a worker process."""
     from analyzer.explain.explained import abstained
 
     page = ""
@@ -62,7 +61,7 @@ def answered(q: Question, began: Callable[[int], None] = lambda at: None) -> Row
         data, page = _answer_and_page(q)
     except TriageError as error:
         data = abstained(q.spec.loop, str(error))
-    except Exception as error:  # an error of one loop is that loop's answer, never the night's end
+    except Exception as error:  # an error of one loop is that loop's answer and never ends the night
         data = abstained(q.spec.loop, f"not explained: {type(error).__name__}: {error}")
     return answer_row(data, q.night.name, page)
 
@@ -107,13 +106,13 @@ def questions(plant: Plant, rows: Sequence[Mapping[str, Any]], night: Night) -> 
 
 
 def known(store: Store, night: str) -> list[Row]:
-    """Rows that the store holds of a night; none where nothing was explained."""
+    """Rows of a night in the store; empty if nothing was explained."""
     held = store.read_if_there(TABLE, night)
     return [] if held is None else held.to_pylist()
 
 
 def keep(store: Store, night: str, rows: Sequence[Row]) -> None:
-    """Write what is explained so far."""
+    """Write the explanations so far."""
     store.write(TABLE, night, rows_table(rows, EXPLAINED))
 
 
@@ -125,10 +124,10 @@ def explain_flagged(
     resume: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Row]:
-    """Explain the flagged loops of an assessed night and keep the answers: the rows, in the order in which they came.
+    """Explain the flagged loops of an assessed night and store the answers: the rows, in order of completion.
 
-    store : which holds the night; jobs : worker processes, 0 works in this one; resume : leave out loops that
-    the store holds an answer of; progress : called with loops done and loops in all.
+    store : the store with the night; jobs : worker processes, 0: this one; resume : skip loops that already have an
+    answer in the store; progress : called with loops done and loops in all.
     """
     from analyzer.explain.explained import abstained
 

@@ -1,4 +1,4 @@
-"""The page of an explanation: what is wrong, how sure it is, what it looks like, what it could also be."""
+"""The page of an explanation: the effect, its confidence, its pictures, and the alternatives."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from reports.texts import slug
 def explanation_page(e: Explained, zone: str = UTC_NAME) -> Page:
     """The page of one loop's explanation, with times on the plant's clock."""
     data, named = e.data, bool(e.found.accepted)
-    with np.errstate(all="ignore"):  # a model that runs away is drawn as far as it goes
+    with np.errstate(all="ignore"):  # a diverging model is drawn as far as it is finite
         sections = (
             _section("What it is", *_verdict_blocks(e)),
             _section("Recording and simulation", *drawings.drawn_trends(e)),
@@ -42,7 +42,7 @@ def explanation_page(e: Explained, zone: str = UTC_NAME) -> Page:
 
 
 def _section(name: str, *blocks: Block | None, closed: bool = False) -> Section:
-    """A section of what there is: neither of pictures that could not be drawn nor of tables without rows."""
+    """A section of the given blocks, without missing pictures and without tables that have no rows."""
     shown = (b for b in blocks if b is not None and (not isinstance(b, Table) or b.rows))
     return Section(name, tuple(shown), closed=closed)
 

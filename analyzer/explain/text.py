@@ -1,4 +1,4 @@
-"""An explanation as text for a terminal: the sentence first, then columns that line up."""
+"""An explanation as text for a terminal: the sentence first, then aligned columns."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _headed(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[tuple[st
 
 
 def lined_up(rows: Rows, numeric: Sequence[int] = ()) -> list[str]:
-    """Rows as lines whose columns line up, numbers to the right; the last column wraps."""
+    """Rows as lines with aligned columns, numbers to the right; the last column wraps."""
     widths = [max(map(len, cells)) for cells in zip(*rows, strict=True)]
     left = 2 + sum(widths[:-1]) + 2 * (len(widths) - 1)
     out = []

@@ -1,5 +1,4 @@
-"""The words, figures and tables of an explanation, whose text and page show the same cells, and how it goes together
-with the night's verdict."""
+"""Words, figures and tables of an explanation, equal in text and page, and its agreement with the night's verdict."""
 
 from __future__ import annotations
 
@@ -24,7 +23,7 @@ Data = Mapping[str, Any]
 TOLD = texts("explanation")
 FEATURES, CURVES, ROWS, NOTES = (TOLD[part] for part in ("features", "curves", "rows", "notes"))
 SHOWN = 12
-"""Names shown of those that were tried."""
+"""Names of tried effects shown."""
 
 
 def title(verdict: str) -> str:
@@ -33,14 +32,14 @@ def title(verdict: str) -> str:
 
 
 def number_text(value: float | None, unit: str = "") -> str:
-    """A number of three digits with its unit, a dash where it is not known."""
+    """A number of three digits with its unit, a dash if unknown."""
     if value is None or not math.isfinite(value):
         return "–"
     return f"{number(value)} {unit}".strip()
 
 
 def interval_text(value: Mapping[str, Any]) -> str:
-    """The ends of a parameter's interval, with as many digits as tell them apart; a dash where it has no width."""
+    """The ends of a parameter's interval, with enough digits to differ; a dash if it has no width."""
     low, high = value["low"], value["high"]
     if low is None or high is None or low == high:
         return "–"
@@ -69,7 +68,7 @@ def rms(value: float) -> str:
 
 
 def places(where: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Spans, ranges, periods and direction of OP that carry the misfit, each with its name."""
+    """Spans, ranges, periods and direction of OP with the misfit, each with its name."""
     out = []
     if where.get("spans"):
         shown = ", ".join(f"{duration(a) or '0 s'} to {duration(b)}" for a, b in where["spans"][:4])
@@ -83,7 +82,7 @@ def places(where: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def parameters(data: Data) -> Table:
-    """Parameters with intervals of all effects, and of physics that has no name."""
+    """Parameters with intervals of all effects, including unnamed ones."""
     rows = tuple(
         (Cell(x["name"]), Cell(called), plain_cell(v["value"]), Cell(interval_text(v)), Cell(v["unit"]))
         for x in [*data["effects"], *([data["outside"]] if "outside" in data else [])]
@@ -94,14 +93,14 @@ def parameters(data: Data) -> Table:
 
 
 def held_out(data: Data) -> tuple[float, float]:
-    """Misfit [% PV] of the plain and the better model on held-out data, in the loop's own band where it is known."""
+    """Misfit [% PV] of the baseline and the better model on held-out data, in the loop's band if known."""
     fit, banded = data["fit"], data["fit"].get("in_band")
     plain, better = (banded[k] if banded else fit[k]["held_out"] for k in ("baseline", "explained"))
     return plain["rmse"], better["rmse"]
 
 
 def improves(data: Data) -> bool:
-    """Whether the model with what was found simulates held-out data better than the plain one."""
+    """Whether the improved model simulates held-out data better than the baseline model."""
     if not data["moved"]:
         return False
     plain, better = held_out(data)
@@ -109,8 +108,7 @@ def improves(data: Data) -> bool:
 
 
 def improvement(data: Data) -> str:
-    """What the model with what was found gains on held-out data, in the loop's own band where it is known; '' where
-    it gains nothing."""
+    """Improvement by the model with effects on held-out data, in the loop's band if known; '' if there is none."""
     if not improves(data):
         return ""
     plain, better = held_out(data)
@@ -121,7 +119,7 @@ def improvement(data: Data) -> str:
 
 
 def no_better(data: Data) -> str:
-    """That a model with what was found is no better on held-out data; '' where it is, or nothing was found."""
+    """Text that a model with effects is no better on held-out data; '' if it is, or there are no effects."""
     if not data["moved"] or improves(data):
         return ""
     plain, better = map(rms, held_out(data))
@@ -129,7 +127,7 @@ def no_better(data: Data) -> str:
 
 
 def _constants(data: Data) -> dict[str, tuple[float, float]]:
-    """The constants that moved; gain over time constant where these moved so far that only their ratio is known."""
+    """The changed constants; gain over time constant if these changed so far that only their ratio is known."""
     known = dict(data["moved"])
     if any(a and abs(b / a) > EXPLAIN.ratio_alone for a, b in (known["gain"], known["time_constant_s"])):
         gain, lag = (known.pop(k) for k in ("gain", "time_constant_s"))
@@ -139,7 +137,7 @@ def _constants(data: Data) -> dict[str, tuple[float, float]]:
 
 
 def moved(data: Data) -> Table:
-    """The plain loop's constants before and after, where the model with what was found is the better one."""
+    """The baseline constants before and after, if the model with effects is better."""
     named, known = TOLD["constants"], _constants(data) if improves(data) else {}
     rows = tuple(
         (Cell(named[k]["title"]), plain_cell(a), plain_cell(b), Cell(change(a, b)), Cell(named[k]["unit"]))
@@ -164,7 +162,7 @@ def misfits(data: Data, note: str = "") -> Table:
 
 
 def others(data: Data) -> Table:
-    """Misfit of both simulations on each other recording that was held out."""
+    """Misfit of both simulations on each other held-out recording."""
     rows = tuple(
         (Cell(x["recording"]), _rms(x["baseline"]), _rms(x["explained"]), Cell(share(x["share"]), x["share"]))
         for x in data.get("held_out_on", [])
@@ -182,7 +180,7 @@ def _fit(misfit: Mapping[str, float]) -> Cell:
 
 
 def features(data: Data) -> Table:
-    """What the misfit is tied to, by which chance, and where it is by that, as bias or size."""
+    """Features with p-values, and the range of the misfit for significant ones, as bias or size."""
     rows = tuple(
         (
             Cell(FEATURES[f["name"]]["title"], kind="strong" if f["carries"] else ""),
@@ -202,7 +200,7 @@ def _carried_by(feature: Mapping[str, Any]) -> str:
 
 
 def alternatives(data: Data) -> Table:
-    """Names that fit as well or look alike, and what would tell them from the one that is told."""
+    """Names that fit equally well or are indistinguishable, and the test that distinguishes them."""
     rows = tuple(
         (Cell(other, kind="strong"), Cell(discriminating_test(first["name"], other)))
         for first in data["effects"][:1]
@@ -212,7 +210,7 @@ def alternatives(data: Data) -> Table:
 
 
 def tried(first: tuple[Candidate, ...], taken: tuple[Candidate, ...]) -> Table:
-    """What was tried in the first round, the best of each name, the likeliest first."""
+    """Candidates of the first round, the best of each name, most likely first."""
     names = {c.name for c in taken}
     best = {c.name: c for c in sorted(first, key=lambda c: c.penalised)}
     rows = tuple(
@@ -229,7 +227,7 @@ def _standing(c: Candidate, taken: set[str]) -> str:
 
 
 def beside_night(row: Mapping[str, Any], verdict: str, block: str) -> str:
-    """One sentence on how what a night found and the explanation go together; '' where there is nothing to say."""
+    """One sentence on the agreement of a night's finding with the explanation; '' if there is nothing to add."""
     told = TOLD["beside_verdict"]
     if row["action"] == Action.CHECK_MEASUREMENT and Lane.FROZEN in lanes_in(row):
         return str(told["frozen"])
@@ -241,13 +239,13 @@ def beside_night(row: Mapping[str, Any], verdict: str, block: str) -> str:
 
 
 def agreement(row: Mapping[str, Any], verdict: str, block: str) -> str:
-    """One sentence on how a night's verdict and its explanation go together; empty where neither is about a valve.
+    """One sentence on the agreement of a night's verdict with its explanation; empty if neither is about a valve.
 
-    The verdict asks why a loop oscillates, from the whole night with the controller in the loop; the explanation asks
-    which physics a simulation of PV from the recorded OP lacks, proven on a part that it has not seen. A cause of the
-    oscillation is the verdict's to name, so the explanation asks the verdict on its own recording first (case.py). A
-    kind of fault is the explanation's where it is proven on held-out data. What still differs, for the night and the
-    recording explained need not be the same, is said here, with what would settle it.
+    The verdict determines why a loop oscillates, from the whole night with the controller in the loop; the
+    explanation determines which physics is missing in a simulation of PV from the recorded OP, tested on a part not
+    used for the fit. The verdict has priority for a cause of the oscillation, so the explanation starts with the
+    verdict on its own recording (case.py). The explanation has priority for a kind of fault proven on held-out data.
+    Other differences, because night and explained recording may differ, are reported with the test that decides.
 
     row : the loop's row of the night: cause, valve_fault; verdict, block : the explanation's name and block.
     """

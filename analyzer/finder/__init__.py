@@ -1,1 +1,1 @@
-"""Which tags of a bag make which loops: by names, then by what the data show."""
+"""Finder of loops in an unordered list of tags: by names, then by the data."""

@@ -1,4 +1,5 @@
-"""A bag of tags: which may be PV, OP or SP, which is held at which set point, and which answers it."""
+"""Candidate roles of tags: which may be PV, OP or SP, at which set point one is controlled, and which one
+responds."""
 
 from __future__ import annotations
 
@@ -12,15 +13,15 @@ from analyzer.finder.law import Matrix, blocks
 from analyzer.limits import FINDER
 
 Cause = tuple[int, ...]
-"""A tag that may be PV, or PV and SP whose difference is the error."""
+"""A tag that may be PV, or PV and SP with the difference as error."""
 
 
 @dataclass(frozen=True, slots=True)
 class Bag:
-    """What is asked of a bag of tags on one clock: values, shape (n, tags), and which of them move how.
+    """An unordered set of tags on one clock: values, shape (n, tags), and how they move.
 
-    live : tags that move often enough to be PV or OP; still : tags that never do; same : first of the tags that hold
-    what another holds too, by tag.
+    live : tags that move often enough to be PV or OP; still : tags that never move; same : first tag with identical
+    values, by tag.
     """
 
     values: Matrix
@@ -41,12 +42,12 @@ class Bag:
         return cls(values, tuple(live), tuple(np.flatnonzero(moved == 0)), tuple(moving), same)
 
     def twice(self, tag: int) -> bool:
-        """Whether another tag holds the same: the output of a master and the set point of its slave."""
+        """Whether another tag has identical values: the output of a master and the set point of its slave."""
         return bool((self.same == tag).sum() > 1)
 
 
 def errors(bag: Bag) -> set[Cause]:
-    """Pairs of tags that may be PV and SP, for one follows the other about its level."""
+    """Pairs of tags that may be PV and SP, because one follows the other about its level."""
     if not bag.live or not bag.moving:
         return set()
     width = max(len(bag.values) // FINDER.slow_blocks, 1)
@@ -67,8 +68,8 @@ def errors(bag: Bag) -> set[Cause]:
 
 
 def held_at(bag: Bag) -> set[Cause]:
-    """Tags with the set point at which each is plainly held, and no other tag is: one that moves but seldom, or what
-    another tag holds too, for that is a master's output."""
+    """Tags with the set point at which each is clearly controlled, unlike any other tag. The set point rarely moves,
+    or is recorded twice, as a master's output is."""
     moving = [k for k in bag.moving if k not in bag.live or bag.twice(k)]
     if len(bag.live) < 2 or not moving:
         return set()
@@ -81,7 +82,7 @@ def held_at(bag: Bag) -> set[Cause]:
 
 
 def answering(bag: Bag, held: set[Cause]) -> dict[Cause, int]:
-    """The tag that moves at once with a set point at which another one is held, where no other tag does so: OP."""
+    """The tag that moves immediately with the set point of another tag, if it is the only one: OP."""
     pairs = sorted(held)
     others = [k for k in bag.live if k not in {pv for pv, _ in pairs}]
     if not pairs or len(others) < 2:

@@ -1,4 +1,4 @@
-"""Tags beside a loop: the position of its valve, and the mode of its controller; none where more than one may be."""
+"""Further tags of a loop: the position of its valve and the mode of its controller; none if several tags may be."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from analyzer.limits import FINDER
 
 
 def positions(values: Matrix, outputs: Sequence[int], others: Sequence[int]) -> dict[int, int]:
-    """The tag that stands where an output is, but for play, in the output's own unit: by output, places of tags in
-    values, shape (n, tags)."""
+    """The tag with the same values as an output except for backlash, in the output's own unit: by output, indices of
+    tags in values, shape (n, tags)."""
     op, x = values[:, list(outputs)], values[:, list(others)]
     spread = np.maximum(op.std(axis=0)[:, None], TINY)
     power = (op**2).mean(axis=0)[:, None] + (x**2).mean(axis=0) - 2.0 * op.T @ x / len(values)
@@ -24,28 +24,28 @@ def positions(values: Matrix, outputs: Sequence[int], others: Sequence[int]) -> 
 
 
 def _at_once(op: NDArray[np.float64], x: NDArray[np.float64]) -> bool:
-    """Whether a tag is nearest to what an output was a few samples before at most: a process lags more."""
+    """Whether a tag is nearest to an output at most a few samples earlier: a process has a longer lag."""
     lags = range(min(FINDER.position_lags, len(op) // 2))
     away = [float(np.mean((x[k:] - op[: len(op) - k]) ** 2)) for k in lags]
     return bool(np.argmin(away) <= FINDER.position_late)
 
 
 def modes(outputs: Mapping[int, NDArray[np.float64]], tags: Sequence[NDArray[np.float64]]) -> dict[int, int]:
-    """The tag in one value of which, and only then, an output stands still: by output, the place of the tag."""
+    """The tag of which exactly one value coincides with a constant output: by output, index of the tag."""
     keys = list(outputs)
     off = np.array([[_disagreement(outputs[key], tag) for tag in tags] for key in keys])
     return _alone(off.reshape(len(keys), len(tags)), FINDER.mode, lambda i, k: (keys[i], k))
 
 
 def may_be_mode(tag: NDArray[np.float64]) -> bool:
-    """Whether a tag takes few values and changes them now and then."""
+    """Whether a tag has few values and changes rarely."""
     changes = int((np.diff(tag) != 0).sum())
     seldom = FINDER.mode_changes <= changes <= FINDER.live_share * len(tag)
     return seldom and len(np.unique(tag)) <= FINDER.mode_values
 
 
 def _alone(away: Matrix, most: float, named: Callable[[int, int], tuple[int, int]]) -> dict[int, int]:
-    """Rows and columns that are near one another, and neither to any other."""
+    """Rows and columns that are near each other, and near no other."""
     found = []
     for i, k in np.argwhere(away <= most):
         next_best = min(
@@ -57,8 +57,8 @@ def _alone(away: Matrix, most: float, named: Callable[[int, int], tuple[int, int
 
 
 def _disagreement(op: NDArray[np.float64], tag: NDArray[np.float64]) -> float:
-    """Share of the samples in which an output moves in manual or stands in automatic, of the value of a tag in which
-    it stands most; inf where the output hardly moves in the others, or the tag changes all the time."""
+    """Share of the samples in which an output moves in manual or is constant in automatic, with manual the value of a
+    tag at which it moves least; inf if the output hardly moves at the others, or the tag changes constantly."""
     values = np.unique(tag)
     moved = np.concatenate([[False], np.diff(op) != 0])
     shares = [float(moved[tag == value].mean()) for value in values]

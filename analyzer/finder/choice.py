@@ -1,4 +1,4 @@
-"""Which pairs are chosen of a bag: with its set point where PV has one, and one-to-one."""
+"""Choice of pairs: PV with its set point if there is one, and one-to-one."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from analyzer.limits import FINDER
 
 
 def preferred(bag: Bag, scores: Scores) -> tuple[NDArray[np.float32], set[int], dict[Cause, int]]:
-    """Weights of causes and tags, shape (causes, tags), and the set points: one beside PV comes first where the law
-    is better for it than by either alone, and then is neither PV nor OP itself."""
+    """Weights of causes and tags, shape (causes, tags), and the set points. A pair of PV and SP has priority if the
+    law is better for it than for either alone; its set point is then neither PV nor OP."""
     weight = np.max([scores.weight(w) for w in range(len(scores.widths))], axis=0)
     alone = {cause[0]: c for c, cause in enumerate(scores.causes) if len(cause) == 1}
     held, set_points = _by_law(scores, weight.max(axis=1)), set[int]()
@@ -42,8 +42,8 @@ def preferred(bag: Bag, scores: Scores) -> tuple[NDArray[np.float32], set[int], 
 def _keep(
     bag: Bag, weight: NDArray[np.float32], alone: dict[int, int], held: tuple[int, Cause], op: int | None
 ) -> None:
-    """In weights, let PV stand with the set point at which it is held alone, a place and its tags, and with no tag
-    but the OP that answers, where one does."""
+    """Set weights so that PV is combined only with the set point at which it alone is controlled, an index and its
+    tags, and only with the OP that responds, if there is one."""
     c, (pv, _) = held
     weight[c] = np.maximum(weight[c], weight[alone[pv]])
     weight[alone[pv]] = weight[:, bag.live.index(pv)] = 0.0
@@ -55,7 +55,7 @@ def _keep(
 
 
 def _by_law(scores: Scores, most: NDArray[np.float32]) -> set[Cause]:
-    """What is held, where no other tag explains more with that set point; most : weight of each cause."""
+    """Controlled tags and set points without another tag of more weight there; most : weight of each cause."""
     own = dict(zip(scores.causes, most, strict=True))
 
     def other(held: Cause) -> float:
@@ -66,7 +66,7 @@ def _by_law(scores: Scores, most: NDArray[np.float32]) -> set[Cause]:
 
 
 def one_to_one(bag: Bag, scores: Scores, weight: NDArray[np.float32]) -> list[tuple[int, int]]:
-    """Causes and tags, each tag in one pair at most: the likest first. A set point stands for itself no more."""
+    """Causes and tags in order of weight, each tag in at most one pair. A set point is then no cause of its own."""
     taken: set[int] = set()
     chosen = []
     likely = np.flatnonzero(weight >= FINDER.least_weight)

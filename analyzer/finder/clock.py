@@ -1,4 +1,4 @@
-"""Tags of an export on one clock, a few at a time: what the finder looks at."""
+"""Tags of an export on one clock, read a few at a time, as input of the finder."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from analyzer.limits import FINDER
 @dataclass(frozen=True, slots=True)
 class Sampled:
     """Tags on one clock: names, values without gaps, shape (n, tags), the time between samples [s], and text tags,
-    each text as the number of its place among the tag's own."""
+    each text as its index among the tag's own texts."""
 
     tags: tuple[str, ...]
     values: NDArray[np.float64]
@@ -24,7 +24,7 @@ class Sampled:
     texts: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     def of(self, tags: Sequence[str]) -> Sampled:
-        """Some of the tags, as far as they are held, in the order asked for."""
+        """Some of the tags, if available, in the requested order."""
         place = {tag: k for k, tag in enumerate(self.tags)}
         known = [tag for tag in tags if tag in place]
         texts = {tag: self.texts[tag] for tag in tags if tag in self.texts}
@@ -37,10 +37,10 @@ def sampled(
     span: tuple[float, float],
     told: Callable[[int, int], None] = lambda done, total: None,
 ) -> Sampled:
-    """Values of tags that hold numbers, and texts, over the last day of a span [s since 1970-01-01 UTC].
+    """Values of numeric tags, and texts, over the last day of a span [s since 1970-01-01 UTC].
 
-    Held from each good sample to the next; a tag of which most is bad is left out. Raises
-    InputError where the export cannot be read.
+    Held from each good sample to the next; a mostly bad tag is left out. Raises InputError where the export cannot be
+    read.
     """
     first, last = export.span()
     last = min(last, span[1])
@@ -67,7 +67,7 @@ def sampled(
 
 
 def _clock(read: Sequence[Series], first: float, last: float, tags: int) -> NDArray[np.float64]:
-    """A clock of the commonest interval of some tags, thinned where all tags would have too many samples."""
+    """A clock with the most frequent interval of some tags, coarser if all tags would have too many samples."""
     steps = [float(np.median(np.diff(s.stamp_s))) for s in read if len(s.stamp_s) > 1]
     step = max(float(np.median(steps)) if steps else 1.0, 1e-3)
     thinned = int(np.ceil((last - first) / step * tags / FINDER.most_cells))
@@ -79,7 +79,7 @@ def _clock(read: Sequence[Series], first: float, last: float, tags: int) -> NDAr
 
 
 def _held(series: Series, clock: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """A tag's last good value at each time of a clock; None where it has few."""
+    """A tag's last good value at each time of a clock; None if it has few."""
     value = series.value
     if series.text is not None:
         value = np.unique(series.text.astype(str), return_inverse=True)[1].astype(float)

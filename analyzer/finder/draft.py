@@ -1,4 +1,4 @@
-"""A draft of loops.csv: what is stated, what the names of tags say, and what the data show of the others."""
+"""A draft of loops.csv: stated loops, loops by tag names, and loops by data for the other tags."""
 
 from __future__ import annotations
 
@@ -47,15 +47,15 @@ HEAD = (
 
 ISA_NAME = re.compile(rf"(?<![A-Za-z])([{''.join(STATED['types'])}])(?:D?[IRT]?C[AV]?|[IT]{{1,2}})[-_ ]?\d")
 WITHIN_PCT = 5.0
-"""How far an OP in percent may lie beyond 0 and 100."""
+"""Tolerance of an OP in percent below 0 and above 100."""
 MOST_NAMES = 5
-"""Loops that are named in a note."""
+"""Maximum number of loops listed in a note."""
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A loop of the draft: its row, by what it was found ('names', 'data', 'stated', or 'recorded' where the loop is
-    stated and its settings are those that its data show), how sure that is [%], and what speaks for it."""
+    """A loop of the draft: its row, its source ('names', 'data', 'stated', or 'recorded' if the loop is stated and
+    its settings are identified from data), its confidence [%], and the evidence for it."""
 
     spec: LoopSpec
     found_by: str
@@ -64,12 +64,12 @@ class Row:
 
     @property
     def sure(self) -> bool:
-        """Whether the row counts; else it is written commented out."""
+        """Whether the row is confident enough; otherwise it is written commented out."""
         return self.sure_pct >= FINDER.sure_pct
 
     @property
     def as_run(self) -> LoopSpec:
-        """The loop as a night has it: a range that is only recorded is none that is stated."""
+        """The loop as used in the batch run: a range that is only recorded does not count as stated."""
         return replace(self.spec, pv_lo=None, pv_hi=None)
 
 
@@ -79,10 +79,10 @@ def draft(
     span: tuple[float, float] = (-math.inf, math.inf),
     told: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Row]:
-    """The loops of an export: stated ones as they are, others by names, then by data of the tags that are left.
+    """The loops of an export: stated ones unchanged, others by names, then by data of the remaining tags.
 
-    span : of time, of which the last day is looked at [s since 1970-01-01 UTC]; told : is told of tags read, and of
-    all. Raises InputError where the export cannot be read.
+    span : of time, of which the last day is used [s since 1970-01-01 UTC]; told : called with the number of tags
+    read, and of all. Raises InputError where the export cannot be read.
     """
     taken = {tag for spec in stated for tag in spec.tags}
     open_ones = [s for s in match(stated, export.tags)[0] if s.kp is None or s.ti is None]
@@ -103,7 +103,7 @@ def draft(
 
 
 def _named(held: Sampled, spec: LoopSpec) -> Row:
-    """A loop of names, with what its data show of type, ranges and settings."""
+    """A loop by names, with type, ranges and settings from its data."""
     said = f"tags of one name: {', '.join(spec.tags)}"
     known = [tag for tag in (spec.pv, spec.op, spec.sp) if tag in held.tags]
     if known[:2] != [spec.pv, spec.op] or len(held.values) < FINDER.least_blocks:
@@ -116,7 +116,7 @@ def _named(held: Sampled, spec: LoopSpec) -> Row:
 
 
 def _stated(held: Sampled, spec: LoopSpec, with_tags: LoopSpec | None) -> Row:
-    """A stated loop; of one without settings, given here with its tags, those that its data show."""
+    """A stated loop; if it has tags but no settings, with the settings from its data."""
     own_tags = () if with_tags is None else (with_tags.pv, with_tags.op, with_tags.sp)
     known = [tag for tag in own_tags if tag is not None and tag in held.tags]
     if len(known) < 2 or len(held.values) < FINDER.least_blocks:
@@ -132,7 +132,7 @@ def _stated(held: Sampled, spec: LoopSpec, with_tags: LoopSpec | None) -> Row:
 
 
 def found_told(rows: Sequence[Row]) -> tuple[str, ...]:
-    """What was found by data, a sentence each, and what was left out for being less sure."""
+    """Sentences on the loops found by data, and on those left out because of low confidence."""
     seen = [row for row in rows if row.found_by == "data"]
     sure = tuple(
         f"{row.spec.loop}: found by data, {row.sure_pct:.0f} % sure: {row.says}" for row in seen if row.sure
@@ -146,7 +146,7 @@ def found_told(rows: Sequence[Row]) -> tuple[str, ...]:
 
 
 def by_data(held: Sampled) -> list[Row]:
-    """Loops that the data of tags show, with the position and the mode of those that are sure."""
+    """Loops found in the data of tags, with the position and the mode of the confident ones."""
     pairs = found_pairs(held.values)
     sure = [p for p in pairs if p.sure_pct >= FINDER.sure_pct]
     outputs = {held.values[:, p.op].tobytes(): _name(held.tags[p.pv], held.tags[p.op]) for p in sure}
@@ -155,7 +155,7 @@ def by_data(held: Sampled) -> list[Row]:
 
 
 def _beside(held: Sampled, sure: Sequence[FoundPair]) -> dict[int, dict[str, str]]:
-    """Tags of position and mode of the loops that are sure, by the place of OP."""
+    """Tags of position and mode of the confident loops, by the index of OP."""
     own = {k for p in sure for k in (p.pv, p.op, p.sp)}
     others = [k for k in range(len(held.tags)) if k not in own]
     found: dict[int, dict[str, str]] = {p.op: {} for p in sure}
@@ -192,7 +192,7 @@ def _row(held: Sampled, pair: FoundPair, outputs: dict[bytes, str], beside: dict
 
 
 def _shown(held: Sampled, pair: FoundPair) -> dict[str, Any]:
-    """Columns of loops.csv that the data of a loop show: recorded ranges, and the settings where the law is plain."""
+    """Columns of loops.csv from the data of a loop: recorded ranges, and settings if the law is clear."""
     pv, op = (held.values[:, k] for k in (pair.pv, pair.op))
     (pv_lo, pv_hi), (op_lo, op_hi) = _extremes(pv), _extremes(op)
     if op.min() >= -WITHIN_PCT and op.max() <= 100.0 + WITHIN_PCT:
@@ -217,7 +217,7 @@ def _law(held: Sampled, pair: FoundPair) -> str:
 
 
 def _joined(found: Sequence[Row], open_loops: Sequence[LoopSpec]) -> list[Row]:
-    """Loops whose OP their names leave open, with the OP that the data show; and the loops that no name tells of."""
+    """Loops whose OP is not clear by name, with the OP found by data; and the loops found by data alone."""
     by_pv = {row.spec.pv: row for row in found}
     rows = []
     for spec in open_loops:
@@ -231,7 +231,7 @@ def _joined(found: Sequence[Row], open_loops: Sequence[LoopSpec]) -> list[Row]:
 
 
 def _name(pv: str, op: str) -> str:
-    """What both tags begin with, where that is a name; else PV's tag."""
+    """The common prefix of both tags, if it is a name; else PV's tag."""
     apart = next((k for k, (a, b) in enumerate(zip(pv, op, strict=False)) if a != b), min(len(pv), len(op)))
     shared = pv[:apart].rstrip("._:/- ")
     whole = all(len(tag) == len(shared) or not tag[len(shared)].isalnum() for tag in (pv, op))
@@ -239,19 +239,19 @@ def _name(pv: str, op: str) -> str:
 
 
 def type_of(tag: str) -> str:
-    """The type of a loop by the first letter of its ISA name (FIC101: a flow); '' where that tells nothing."""
+    """The type of a loop by the first letter of its ISA name (FIC101: a flow); '' if unknown."""
     letters = ISA_NAME.search(tag)
     return "" if letters is None else str(STATED["types"][letters[1]])
 
 
 def _extremes(x: np.ndarray) -> tuple[float, float]:
-    """Least and largest of what was recorded, in few digits; apart where it stands still."""
+    """Minimum and maximum of the recorded values, in few digits; different even for a constant."""
     low, high = (float(f"{v:.4g}") for v in (x.min(), x.max()))
     return (low, high) if high > low else (low - 0.5, low + 0.5)
 
 
 def as_csv(rows: Sequence[Row]) -> str:
-    """The draft as loops.csv; what is less sure is commented out."""
+    """The draft as loops.csv; rows of low confidence are commented out."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     stated = {name for row in rows for name in row.spec.stated}

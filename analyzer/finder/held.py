@@ -1,7 +1,7 @@
-"""Where tags are held: which set point is a tag's, and which of two tags that belong together is OP.
+"""Set point of a controlled tag, and which of two related tags is OP.
 
-A controller with an integral holds PV at SP: the mean of PV, and the level of PV at which OP rests, lie at SP, and
-the slow moves of PV are those of SP. OP follows the load instead: it drifts, and ends at its limits.
+A controller with an integral keeps PV at SP: the mean of PV, and the level of PV at which OP is constant, are equal
+to SP, and the slow moves of PV are those of SP. OP follows the load instead: it drifts, and reaches its limits.
 """
 
 from __future__ import annotations
@@ -17,34 +17,34 @@ from analyzer.limits import FINDER
 
 
 def nearness(values: Matrix, tags: Sequence[int], set_points: Sequence[int]) -> Matrix:
-    """How much speaks for each set point as that of each tag, shape (tags, set points), natural log: the spread of
-    the tag over the distance of the means, and the slow moves of the tag over those of its error."""
+    """Evidence for each set point as that of each tag, shape (tags, set points), natural log: the spread of the tag
+    over the distance of the means, and the slow moves of the tag over those of its error."""
     x, s = values[:, list(tags)], values[:, list(set_points)]
     near = closeness(np.abs(x.mean(axis=0)[:, None] - s.mean(axis=0)), x.std(axis=0)[:, None])
     return near + tracked(x, s)
 
 
 def deviation_of_mean(error: Matrix) -> Matrix:
-    """Standard errors of the means of tags that drift, shape (n, tags), from averages over long blocks."""
+    """Standard errors of the means of drifting tags, shape (n, tags), from averages over long blocks."""
     slow = blocks(error, max(len(error) // FINDER.drift_blocks, 1))
     return np.asarray(slow.std(axis=0) / np.sqrt(len(slow)))
 
 
 def by_chance(x: Matrix, set_points: Matrix) -> Matrix:
-    """What of the nearness of the mean of a tag to set points, shape (n, set points), is chance: a distance below its
-    standard error shows no more than that."""
+    """Part of the nearness of a tag's mean to set points, shape (n, set points), that is due to chance: a distance
+    below its standard error is no further evidence."""
     away, error = np.abs(x.mean() - set_points.mean(axis=0)), deviation_of_mean(x[:, None] - set_points)
     return closeness(away, x.std()) - closeness(np.maximum(away, error), x.std())
 
 
 def closeness(away: Matrix, spread: Matrix | float) -> Matrix:
-    """Log of a spread over a distance, 0 where that is the larger."""
+    """Log of a spread over a distance, 0 if the distance is larger."""
     return np.asarray(-np.log(np.clip(away / np.maximum(spread, TINY), FINDER.nearest, 1.0)))
 
 
 def apart(x: Matrix, level: Matrix, near: Matrix) -> float:
-    """How much nearer a tag is to the nearest set point than to the next one at another level, natural log: the
-    distance of levels that have nothing to do with the tag exceeds this with odds exp(-this).
+    """How much nearer a tag is to the nearest set point than to the next one at another level, natural log: for
+    levels unrelated to the tag the distance exceeds this with odds exp(-this).
 
     x : shape (n,); level, near : mean of each set point and its nearness, shape (set points,).
     """
@@ -58,7 +58,7 @@ def apart(x: Matrix, level: Matrix, near: Matrix) -> float:
 
 
 def tracked(x: Matrix, s: Matrix) -> Matrix:
-    """Log of the slow moves of tags over those of their errors, shape (tags, set points); 0 where SP stands still."""
+    """Log of the slow moves of tags over those of their errors, shape (tags, set points); 0 if SP is constant."""
     width = max(len(x) // FINDER.slow_blocks, 1)
     x, s = (blocks(v, width) for v in (x, s))
     x, s = x - x.mean(axis=0), s - s.mean(axis=0)
@@ -69,8 +69,8 @@ def tracked(x: Matrix, s: Matrix) -> Matrix:
 
 
 def resting_level(pv: Matrix, op: Matrix, width: int) -> tuple[float, float]:
-    """Level of PV at which OP rests by the law, and its standard error, from rows at no limit of OP, shape (n,);
-    the error is inf where too few are left."""
+    """Level of PV at which OP is constant by the law, and its standard error, from rows without OP at a limit, shape
+    (n,); the error is inf if too few remain."""
     x, rows = pv - pv.mean(), free_moves(op, width)
     if len(rows) < FINDER.least_moves:
         return 0.0, np.inf
@@ -83,7 +83,7 @@ def resting_level(pv: Matrix, op: Matrix, width: int) -> tuple[float, float]:
 
 
 def free_moves(op: Matrix, width: int) -> NDArray[np.int64]:
-    """Places of the moves between blocks of so many samples of which neither has OP, shape (n,), at a limit."""
+    """Indices of the moves between blocks of so many samples, both without OP, shape (n,), at a limit."""
     margin = FINDER.at_limit * np.ptp(op)
     limited = (op <= op.min() + margin) | (op >= op.max() - margin)
     within = blocks(limited[:, None].astype(float), width)[:, 0] == 0.0
@@ -91,8 +91,8 @@ def free_moves(op: Matrix, width: int) -> NDArray[np.int64]:
 
 
 def alike(values: Matrix) -> NDArray[np.bool_]:
-    """Which tags stand at the same level and move the same way, shape (tags, tags): a stem where its output stands,
-    two sensors, a PV that keeps up with its SP; none is the PV of the other."""
+    """Which tags have the same level and the same moves, shape (tags, tags): a stem and its output, two sensors, a PV
+    and the SP that it tracks; none is the PV of the other."""
     x, moves = values - values.mean(axis=0), np.diff(values, axis=0)
     spread, mean = x.std(axis=0), values.mean(axis=0)
     cross = x.T @ x / len(x)
@@ -102,14 +102,14 @@ def alike(values: Matrix) -> NDArray[np.bool_]:
 
 
 def at_no_limit(held: Matrix, width: int) -> NDArray[np.int64]:
-    """Moves between blocks of which neither has a tag at a limit, of those of `held` that rest at limits at all."""
+    """Moves between blocks without a tag at a limit, for those of `held` that rest at limits at all."""
     free = [free_moves(x, width) for x in held.T if limited(x)]
     return reduce(np.intersect1d, free, np.arange(len(held) // width - 1))
 
 
 def law_of(held: Matrix, each: Sequence[int]) -> tuple[Matrix, Matrix]:
-    """Share that the law explains, either way, of PV and OP, and that of their innovations which is one, by width;
-    from moves at no limit, where there are enough."""
+    """Share of PV and OP that the law explains, in both directions, and the common share of their innovations, by
+    width; from moves without limits, if there are enough."""
     law, noise = np.empty(len(each)), np.empty(len(each))
     for k, width in enumerate(each):
         moves, rows = Moves.of(held, width), at_no_limit(held, width)
@@ -120,7 +120,7 @@ def law_of(held: Matrix, each: Sequence[int]) -> tuple[Matrix, Matrix]:
 
 
 def slower(pv: Matrix, op: Matrix) -> float:
-    """Log of the slow share of OP's variance over that of PV's: feedback leaves PV none."""
+    """Log of the slow share of OP's variance over that of PV's: feedback removes slow moves from PV."""
     share = []
     for x in (op, pv):
         width = max(len(x) // FINDER.drift_blocks, 1)
@@ -129,14 +129,14 @@ def slower(pv: Matrix, op: Matrix) -> float:
 
 
 def limited(x: Matrix) -> bool:
-    """Whether a tag rests at an extreme of its own though it moves freely: an output at its limit."""
+    """Whether a tag rests at one of its extremes although it moves freely: an output at its limit."""
     at = max((x == x.min()).mean(), (x == x.max()).mean())
     return bool(at > FINDER.limited_share and len(np.unique(x)) > FINDER.limited_values)
 
 
 def answers(values: Matrix, tags: Sequence[int], set_points: Sequence[int]) -> Matrix:
-    """How surely each tag moves with each set point in the same sample or the next, in standard errors, shape (tags,
-    set points); 0 where it only repeats it. The proportional part of a controller does so, and a process lags."""
+    """Significance of each tag's move with each set point in the same sample or the next, in standard errors, shape
+    (tags, set points); 0 if it only repeats it. The proportional action does so; a process lags."""
     x, s = (np.diff(values[:, list(of)], axis=0) for of in (tags, set_points))
     length = np.outer(np.sqrt((x**2).sum(axis=0)), np.sqrt((s**2).sum(axis=0))) + TINY
     now, later = x.T @ s / length, x[1:].T @ s[:-1] / length

@@ -1,9 +1,9 @@
-"""How well one tag's moves follow another by the law of a controller, for all pairs of tags at once.
+"""Test of the control law between the moves of two tags, for all pairs of tags at once.
 
 A PI controller moves OP by -Kp (dPV + 1/Ti int (PV - SP) dt). Between the averages of neighbouring blocks of samples
-the same law holds of the moves of both and of the moves of the running integral, however long the blocks are. What
-the noise of PV does to OP in the very same sample no process does to another, for it lags: so the innovations of both
-are compared as well (Haugh 1976, J. Am. Stat. Assoc. 71: cross-correlation of prewhitened series).
+the same law relates the moves of both and the moves of the running integral, for any block length. The noise of PV
+acts on OP in the same sample, which is impossible for a process, because it lags: so the innovations of both are also
+compared (Haugh 1976, J. Am. Stat. Assoc. 71: cross-correlation of prewhitened series).
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from analyzer.limits import FINDER
 
 Matrix = NDArray[np.float64]
 TINY = 1e-12
-"""What is no length of a column, but rounding."""
+"""Length of a column below which it is rounding."""
 ALIKE = 1e-6
-"""Least share of moves and integral that are not one."""
+"""Least share by which moves and integral must differ."""
 
 
 @dataclass(frozen=True, slots=True)
 class Moves:
-    """Moves of block averages and of the running integrals of tags, means removed, shape (blocks - 1, tags), and what
-    is left of the moves once each tag's own past is taken out."""
+    """Moves of block averages and of the running integrals of tags, means removed, shape (blocks - 1, tags), and the
+    innovations of the moves, without the part explained by each tag's own past."""
 
     value: Matrix
     integral: Matrix
@@ -39,7 +39,7 @@ class Moves:
 
     @classmethod
     def plain(cls, values: Matrix, width: int) -> Moves:
-        """Without innovations, which take longest."""
+        """Without innovations, which take most of the time."""
         centred = values - values.mean(axis=0)
         running = np.cumsum(centred, axis=0) - centred / 2
         value, integral = (np.diff(blocks(x, width), axis=0) for x in (centred, running))
@@ -47,7 +47,7 @@ class Moves:
         return cls(value, integral, np.empty((0, value.shape[1])))
 
     def at(self, rows: NDArray[np.int64]) -> Moves:
-        """Some of the moves, of which those have innovations that are late enough."""
+        """Some of the moves, with innovations for those that are late enough."""
         late = rows[rows >= FINDER.past]
         return Moves(self.value[late], self.integral[late], self.innovation[late - FINDER.past])
 
@@ -57,12 +57,12 @@ class Moves:
 
 
 def widths(samples: int) -> tuple[int, ...]:
-    """Lengths of blocks [samples], of which there are enough."""
+    """Lengths of blocks [samples] for which there are enough blocks."""
     return tuple(w for w in FINDER.widths if samples // w >= FINDER.least_blocks) or (1,)
 
 
 def explained(causes: Moves, effects: Moves) -> Matrix:
-    """Share of the moves of each effect that the law explains by each cause, shape (causes, effects), 0 to 1."""
+    """Share of the moves of each effect explained by the law from each cause, shape (causes, effects), 0 to 1."""
     moved, summed, wanted = _unit(causes.value), _unit(causes.integral), _unit(effects.value)
     a, b = moved.T @ wanted, summed.T @ wanted
     c = (moved * summed).sum(axis=0)[:, None]
@@ -75,11 +75,11 @@ def shared_noise(causes: Moves, effects: Moves) -> Matrix:
 
 
 def direction(moves: Moves, pv: int, op: int, rows: NDArray[np.int64]) -> float:
-    """How much more some rows of the moves look like a controller from `pv` to `op` than from `op` to `pv`, in
+    """Evidence of some rows of the moves for a controller from `pv` to `op` rather than from `op` to `pv`, in
     standard errors.
 
-    Of a controller moves and integral act the same way. The other way round they do not: what OP owes to the noise
-    of PV has the sign of the controller, what PV owes to OP that of the process, and feedback has both opposite.
+    In a controller moves and integral have one sign. In the reverse direction they differ: the response of OP to PV's
+    noise has the sign of the controller, that of PV to OP the process's, and feedback makes them opposite.
     """
 
     def agreeing(cause: int, effect: int) -> float:
@@ -113,7 +113,7 @@ def _unit(columns: Matrix) -> Matrix:
 
 
 def innovations(value: Matrix) -> Matrix:
-    """What is left of moves, shape (n, tags), once each tag's own last ones are taken out; shape (n - past, tags)."""
+    """Residual of moves, shape (n, tags), not explained by each tag's own past; shape (n - past, tags)."""
     past = FINDER.past
     out = np.empty((len(value) - past, value.shape[1]))
     for k in range(value.shape[1]):

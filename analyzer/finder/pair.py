@@ -1,4 +1,4 @@
-"""A loop that the data show: its tags, what speaks for them, and its settings."""
+"""A loop found by data: its tags, the evidence for them, and its settings."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from analyzer.limits import FINDER
 
 @dataclass(frozen=True, slots=True)
 class FoundPair:
-    """A loop that the data show; places of tags in the bag.
+    """A loop found by data; indices of tags in the bag.
 
-    law : share of OP's moves that the law explains, 0 to 1, in blocks of `width` samples; noise : share of the
-    innovations of OP and PV that is one; asked : weight from which a pair counts at this width; runner_up : weight
-    of the next best tag; towards : how much more the law holds from PV to OP than back; freer : how much more OP
-    drifts and rests at limits; nearer : how much nearer SP is to PV than to OP; resolved : whether neighbouring
-    averages are alike; acts : whether SP moves OP as PV does; answers : whether OP, and no other tag, moves at once
-    with SP; other : most that another tag explains of OP with an SP that moves; told : share that the law explains
-    in blocks of `told_width`, the shortest in which it holds; kp : gain, in units of OP per unit of PV, negative
-    where OP rises with PV; ti_samples : integral time, inf where none acts, None where two ways to it disagree:
-    noise of PV between its samples hides it from the one, not from the other, which asks the samples beside.
+    law : share of OP's moves that the law explains, 0 to 1, in blocks of `width` samples; noise : common share of the
+    innovations of OP and PV; asked : weight required at this width; runner_up : weight of the next best tag; towards
+    : evidence for the law from PV to OP over the reverse; freer : how much more OP drifts and rests at limits; nearer
+    : how much nearer SP is to PV than to OP; resolved : whether neighbouring averages are similar; acts : whether SP
+    moves OP as PV does; answers : whether OP, and no other tag, moves immediately with SP; other : largest share of
+    OP explained by another tag with a moving SP; told : share that the law explains in blocks of `told_width`, the
+    shortest in which it is valid; kp : gain, in units of OP per unit of PV, negative if OP rises with PV; ti_samples
+    : integral time, inf without integral action, None if two estimates disagree: noise of PV between its samples
+    affects one of them, but not the other, which uses adjacent samples.
     """
 
     pv: int
@@ -58,13 +58,13 @@ class FoundPair:
 
     @property
     def weight(self) -> float:
-        """How much like a controller's the pair is, 0 to 1."""
+        """Similarity of the pair to a controller, 0 to 1."""
         return float(self.law * np.sqrt(self.noise))
 
     @property
     def sure_pct(self) -> float:
-        """How sure the pair is [%], by the weakest of its signs: the weight, the runners-up, which of both is OP;
-        and an OP that rises with PV, where nothing tells which is which, may be the PV of a follower."""
+        """Confidence of the pair [%], by its weakest criterion: the weight, the runners-up, and which tag is OP. An
+        OP that rises with PV may be the PV of a follower if no other criterion distinguishes them."""
         less = FINDER.acting if self.acts else 1.0
         law = (
             self.weight / (self.asked * less),
@@ -82,7 +82,7 @@ class FoundPair:
 
 
 def known_pair(values: Matrix) -> FoundPair:
-    """The law of a loop whose tags are known: PV, OP and, where there is one, SP, shape (n, 2) or (n, 3)."""
+    """The law of a loop with known tags: PV, OP and, if there is one, SP, shape (n, 2) or (n, 3)."""
     sp = 2 if values.shape[1] > 2 else None
     error = values[:, 0] - (0.0 if sp is None else values[:, 2])
     columns, each = np.column_stack([error, values[:, 1]]), widths(len(values))
@@ -95,7 +95,7 @@ def known_pair(values: Matrix) -> FoundPair:
 
 
 def with_settings(bag: Bag, pair: FoundPair) -> FoundPair:
-    """The pair with gain and integral time of the law, from blocks in which it holds and OP is at no limit."""
+    """The pair with gain and integral time of the law, from blocks in which it is valid and OP is not at a limit."""
     op, low = bag.values[:, pair.op], 0.0 if pair.sp is None else bag.values[:, pair.sp]
     error = bag.values[:, [pair.pv]] - np.reshape(low, (-1, 1))
     moves, rows = Moves.of(np.column_stack([error, op]), pair.told_width), free_moves(op, pair.told_width)

@@ -1,4 +1,4 @@
-"""Which tags are PV, OP and SP of one loop, by what the data show: one-to-one over all tags of a bag."""
+"""Identification of PV, OP and SP of loops from data: one-to-one over all tags."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from analyzer.limits import FINDER
 
 
 def found_pairs(values: Matrix) -> list[FoundPair]:
-    """Loops among tags, the surest first, whether sure or not.
+    """Loops among tags, most confident first, including those of low confidence.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def found_pairs(values: Matrix) -> list[FoundPair]:
 def _taken(
     bag: Bag, scores: Scores, chosen: Sequence[tuple[int, int]], set_points: set[int]
 ) -> NDArray[np.float64]:
-    """The weight of the pair in which each live tag is, 0 where it is in none, inf for set points; shape (tags,)."""
+    """The weight of the pair of each live tag, 0 if it is in none, inf for set points; shape (tags,)."""
     weight = np.where(np.isin(bag.live, list(set_points)), np.inf, 0.0)
     for c, j in chosen:
         own = np.isin(bag.live, (*scores.causes[c], bag.live[j]))
@@ -65,7 +65,7 @@ def _taken(
 
 
 def _slaves(bag: Bag, scores: Scores, chosen: Sequence[tuple[int, int]], tag: int) -> set[int]:
-    """Tags of the pairs whose set point a tag is: they follow it, and are none of its own loop."""
+    """Tags of the pairs whose set point a tag is: they follow it, and do not belong to its own loop."""
     own = [(*scores.causes[c], bag.live[j]) for c, j in chosen if len(scores.causes[c]) > 1]
     return {k for tags in own if tag in tags[:2] for k in tags if k != tag}
 
@@ -73,16 +73,16 @@ def _slaves(bag: Bag, scores: Scores, chosen: Sequence[tuple[int, int]], tag: in
 def _pair(
     bag: Bag, scores: Scores, c: int, j: int, taken: NDArray[np.float64], slaves: set[int]
 ) -> FoundPair:
-    """The pair of a cause and a tag at the width where it shows most; one of a PV alone in samples, or in blocks so
-    long that no wave is left in them, for between these all that shares a wave looks like a law.
+    """The pair of a cause and a tag at the width with the strongest evidence. A PV without SP is tested in samples,
+    or in blocks longer than any oscillation: between these, any common oscillation resembles a law.
 
-    taken : weight of the pair of each live tag; one that is surer of another pair is no runner-up; slaves : tags of
+    taken : weight of the pair of each live tag; a tag with a stronger other pair is no runner-up; slaves : tags of
     the pairs whose set point OP is.
     """
     cause, tag = scores.causes[c], bag.live[j]
     weight = scores.weight(slice(None), c, j)
     pv, sp = pv_and_sp(bag, scores, cause, tag) if len(cause) > 1 else (cause[0], None)
-    if sp is not None and sp not in bag.live:  # it hardly moves: PV's law may be plainer alone
+    if sp is not None and sp not in bag.live:  # SP hardly moves: the law may be clearer for PV alone
         own = bag.live.index(pv)
         if scores.weight(0, own, j) > weight.max():
             c, cause = own, (pv,)
@@ -117,19 +117,19 @@ def _pair(
 
 
 def asked_of(each: Sequence[int]) -> Matrix:
-    """Weight from which a pair counts at each width."""
+    """Required weight of a pair at each width."""
     return np.array([FINDER.weights[FINDER.widths.index(width)] for width in each])
 
 
 def _enough(weight: NDArray[Any], noise: NDArray[Any], asked: Matrix) -> Matrix:
-    """How much there is of weight and of shared noise over what is asked: the lesser of both, by width."""
+    """Ratio of weight and of shared noise to the required values: the smaller one, by width."""
     return np.asarray(np.minimum(weight / asked, noise / FINDER.least_noise))
 
 
 def _with_set_points(bag: Bag, pairs: Sequence[FoundPair]) -> list[FoundPair]:
-    """The pairs the way round for which most speaks, each with the set point that speaks most for it, one-to-one: its
-    own by the law, or one that lies where a tag is held and moves as the tag slowly does."""
-    from scipy.optimize import linear_sum_assignment  # half a second, for those who look for loops alone
+    """The pairs in the direction with more evidence, each with the set point of most evidence, one-to-one: the one in
+    its law, or one at the level of a tag with the tag's slow moves."""
+    from scipy.optimize import linear_sum_assignment  # takes half a second; needed only by the finder
 
     if not pairs:
         return []
@@ -149,8 +149,8 @@ def _with_set_points(bag: Bag, pairs: Sequence[FoundPair]) -> list[FoundPair]:
 
 
 def _other_pv(bag: Bag, pair: FoundPair, pairs: Sequence[FoundPair]) -> float:
-    """The most that the law explains of OP by any other tag with a set point that moves, in blocks of the pair's
-    width: a tag that only follows SP is held there too. What stands where PV or OP does, or follows OP, is none."""
+    """The largest share of OP explained by another tag with a moving set point, in blocks of the pair's width: a tag
+    that only follows SP is also controlled there. Tags equal to PV or OP, or following OP, are excluded."""
     if pair.sp is None or pair.sp in bag.still:
         return 0.0
     slaves = {p.pv for p in pairs if p.sp is not None and bag.same[p.sp] == bag.same[pair.op]}
@@ -165,8 +165,8 @@ def _other_pv(bag: Bag, pair: FoundPair, pairs: Sequence[FoundPair]) -> float:
 
 
 def _near_both(bag: Bag, pair: FoundPair, free: Sequence[int], known: Matrix) -> Matrix:
-    """What speaks for each free set point as that of PV, and as that of OP, shape (2, set points): what is `known` of
-    both by their means and slow moves, or the level at which the law has the other rest."""
+    """Evidence for each free set point as that of PV, and as that of OP, shape (2, set points): what is `known` of
+    both by their means and slow moves, or the level at which the other is constant by the law."""
     near, level, still = known.copy(), bag.values[:, free].mean(axis=0), np.isin(free, bag.still)
     for at, (tag, other) in enumerate(((pair.pv, pair.op), (pair.op, pair.pv))):
         x = bag.values[:, tag]
@@ -180,19 +180,19 @@ def _near_both(bag: Bag, pair: FoundPair, free: Sequence[int], known: Matrix) ->
 
 
 def _gain(pair: FoundPair, near: Matrix) -> Matrix:
-    """How much more speaks for a pair with each set point than with none, the better way round."""
+    """Additional evidence for a pair with each set point over none, in the better direction."""
     way = pair.towards + pair.freer
     return np.asarray(np.maximum(near[0] + way, near[1] - way) - abs(way))
 
 
 def _with_set_point(bag: Bag, pair: FoundPair, near: Matrix, k: int | None, free: Sequence[int]) -> FoundPair:
-    """A pair with the set point at place `k` of the free ones, `near` PV and OP by so much."""
+    """A pair with the set point at index `k` of the free ones, with nearness `near` to PV and OP."""
     if pair.sp is not None:
         pv, op = nearness(bag.values, (pair.pv, pair.op), [pair.sp])[:, 0]
     else:
         pv, op = (0.0, 0.0) if k is None else near[:, k]
     most = FINDER.certain * (1 if pair.sp is None and (k is None or free[k] in bag.still) else 2)
-    pv, op = max(pv, 0.0), max(op, 0.0)  # that SP is far from one tag does not bring it near the other
+    pv, op = max(pv, 0.0), max(op, 0.0)  # a distance from one tag is no evidence for the other
     turned = _turned(replace(pair, nearer=float(np.clip(pv - op, -most, most))))
     if pair.sp is None and k is not None and near[int(turned.pv != pair.pv), k] > 0.0:
         turned = replace(turned, sp=free[k], freer=turned.freer if free[k] in bag.still else 0.0)
@@ -202,7 +202,7 @@ def _with_set_point(bag: Bag, pair: FoundPair, near: Matrix, k: int | None, free
 
 
 def _of_error(bag: Bag, pair: FoundPair, sp: int) -> FoundPair:
-    """The pair with the law of PV and SP together, at the width where that shows most."""
+    """The pair with the law of PV and SP together, at the width with the strongest evidence."""
     tags = bag.values[:, [pair.pv, sp, pair.op]]
     held, each = np.column_stack([tags[:, 0] - tags[:, 1], tags[:, 2]]), widths(len(tags))
     law, noise = law_of(held, each)
@@ -223,7 +223,7 @@ def _of_error(bag: Bag, pair: FoundPair, sp: int) -> FoundPair:
 
 
 def _turned(pair: FoundPair) -> FoundPair:
-    """The pair the way round for which more speaks."""
+    """The pair in the direction with more evidence."""
     if pair.towards + pair.freer + pair.nearer >= 0.0:
         return pair
     return replace(

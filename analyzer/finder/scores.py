@@ -1,4 +1,4 @@
-"""How much like a controller's each pair of tags of a bag is."""
+"""Similarity of each pair of tags to a controller."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from analyzer.finder.law import Moves, explained, shared_noise, widths
 
 @dataclass(frozen=True, slots=True)
 class Scores:
-    """The law (either way) and the noise that is shared, of causes and live tags by width, shape (widths, causes,
-    tags); moves, a width each; held, the tags that are plainly held at a set point; alike, which live tags are one
-    but for play or noise, shape (tags, tags)."""
+    """The law (in either direction) and the shared noise, of causes and live tags by width, shape (widths, causes,
+    tags); moves, one per width; held, the tags that are clearly controlled at a set point; alike, which live tags are
+    equal except for backlash or noise, shape (tags, tags)."""
 
     causes: Sequence[Cause]
     law: NDArray[np.float32]
@@ -28,12 +28,12 @@ class Scores:
     alike: NDArray[np.bool_]
 
     def weight(self, *at: slice | int | NDArray[np.int64]) -> NDArray[np.float32]:
-        """How much like a controller's, at places of (widths, causes, tags)."""
+        """Similarity to a controller, at indices of (widths, causes, tags)."""
         return np.asarray(self.law[at] * np.sqrt(self.noise[at]))
 
 
 def scored(bag: Bag) -> Scores:
-    """How much like a controller's each pair of cause and live tag is."""
+    """Similarity of each pair of cause and live tag to a controller."""
     held = held_at(bag)
     others = [k for k in bag.moving if k not in bag.live]
     causes = [*((k,) for k in (*bag.live, *others)), *sorted(errors(bag) | held)]

@@ -1,4 +1,4 @@
-"""Which of two tags is OP, and which of two is SP."""
+"""Decision which of two tags is OP, and which of two is SP."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from analyzer.limits import FINDER
 
 
 def freer(pv: Matrix, op: Matrix, still: bool) -> float:
-    """How much more OP moves as an output does than PV: it rests at its limits and, where SP stands still, drifts."""
+    """How much more OP moves like an output than PV: it rests at its limits and, with constant SP, drifts."""
     drift = np.clip(slower(pv, op) * FINDER.drift, -FINDER.drift_certain, FINDER.drift_certain) * still
     return float(drift + FINDER.at_limits * (float(limited(op)) - float(limited(pv))))
 
 
 def towards(held: Matrix, scores: Scores, c: int, j: int) -> float:
-    """How much more the law holds from PV to OP, the columns of `held`, than back: at the width where that shows most
-    of those at which neighbouring averages are alike, for a cycle that the samples miss shows nothing."""
+    """Evidence for the law from PV to OP, the columns of `held`, over the reverse: at the width with the strongest
+    evidence among those with similar neighbouring averages, because an undersampled cycle is no evidence."""
     found = [0.0]
     for width, moves, law in zip(scores.widths, scores.moves, scores.law[:, c, j], strict=True):
         if law >= FINDER.telling and resolved(held, width):
@@ -30,7 +30,7 @@ def towards(held: Matrix, scores: Scores, c: int, j: int) -> float:
 
 
 def acts(tags: Matrix, width: int) -> bool:
-    """Whether SP moves OP as PV does, with the other sign: tags are PV, SP and OP, shape (n, 3)."""
+    """Whether SP moves OP as PV does, with the opposite sign: tags are PV, SP and OP, shape (n, 3)."""
     moves = Moves.of(tags, width)
     error = moves.integral[:, 0] - moves.integral[:, 1]
     slope, _ = fitted(moves.value[:, 2], moves.value[:, 0], moves.value[:, 1], error)
@@ -38,15 +38,15 @@ def acts(tags: Matrix, width: int) -> bool:
 
 
 def resolved(held: Matrix, width: int) -> bool:
-    """Whether neighbouring averages are alike of all tags, shape (n, tags)."""
+    """Whether neighbouring averages of all tags are similar, shape (n, tags)."""
     x = blocks(held, width)
     x = x - x.mean(axis=0)
     return bool(((x[1:] * x[:-1]).sum(axis=0) >= FINDER.resolved * (x**2).sum(axis=0)).all())
 
 
 def pv_and_sp(bag: Bag, scores: Scores, cause: Cause, op: int) -> tuple[int, int]:
-    """Which of two tags that follow one another is PV, and which SP: what another tag holds too, in its own scale
-    (the output of a master, the PV of a leader), or what moves seldom; else SP does not follow OP later."""
+    """Which of two tags that follow each other is PV, and which SP: SP is duplicated by another tag in its own scale
+    (a master's output, a leader's PV), or rarely moves; otherwise it is the one that does not follow OP later."""
     pv, sp = cause
     moved = [int((np.diff(bag.values[:, k]) != 0).sum()) for k in cause]
     held = [_held_elsewhere(bag, scores, k, (*cause, op)) for k in cause]
@@ -63,7 +63,7 @@ def pv_and_sp(bag: Bag, scores: Scores, cause: Cause, op: int) -> tuple[int, int
 
 
 def _held_elsewhere(bag: Bag, scores: Scores, tag: int, own: Cause) -> bool:
-    """Whether a tag's innovations are those of another tag that is none of its `own` loop."""
+    """Whether a tag's innovations are those of another tag outside its `own` loop."""
     if bag.twice(tag) or tag not in bag.live:
         return bag.twice(tag)
     others = np.flatnonzero(~np.isin(bag.live, own))

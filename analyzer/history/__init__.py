@@ -1,1 +1,1 @@
-"""The only readers of exports: raw stamps, values and quality out."""
+"""The readers of exports: they return raw stamps, values and quality."""

@@ -1,5 +1,5 @@
-"""Which columns of a table hold the time, how it is written there, and its seconds, of the file's clock and of UTC:
-across the hour that autumn repeats and the one that spring leaves out, and of clocks that know neither."""
+"""Time columns of a table: which ones, their format, and their seconds on the file's clock and in UTC, across the
+hour repeated in autumn and the hour skipped in spring, also for clocks without summer time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TICKS_PER_S = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 
 @dataclass(frozen=True, slots=True)
 class TimeScale:
-    """How a number means a time: second = number * unit_s + origin_s, on a local clock or on UTC."""
+    """Meaning of a number as a time: second = number * unit_s + origin_s, on a local clock or in UTC."""
 
     name: str
     low: float
@@ -36,7 +36,7 @@ class TimeScale:
 
     @property
     def note(self) -> str:
-        """How stamps of this scale are read."""
+        """Note on how stamps of this scale are read."""
         if self == OF_DAY:
             return f"stamps are {self.name}; export the date too, so that the night has its own"
         said = f"stamps are {'texts' if self == ELAPSED else 'numbers'}, read as {self.name}"
@@ -50,11 +50,11 @@ MISSING_HOUR = "samples stand in the hour that the time zone leaves out in sprin
 REPEATED_HOUR = "samples stand in the hour that the time zone repeats in autumn; told apart by their order"
 SCALES = tuple(TimeScale(**scale) for scale in WORDS["scales"])
 SINCE_START = {unit: TimeScale(**scale) for unit, scale in WORDS["since_start"].items()}
-"""Clocks that count from the start, by the unit that the column's name states."""
+"""Clocks that count from the start, by the unit in the column's name."""
 ELAPSED = TimeScale("hours, minutes and seconds since the start", 0, 0, 1.0)
 """A clock in text that counts from the start, such as 25:10:03."""
 OF_DAY = TimeScale("times of day with no date, from 1970-01-01 on, a day more at each midnight", 0, 0, 1.0)
-"""A clock in text that states no date, such as 23:00:00."""
+"""A clock in text without a date, such as 23:00:00."""
 WITHOUT_LEAP = "so read, the stamps run without a leap"
 MIDNIGHT = r"[ T]0?0:00:00(?:\.0+)?$"
 COUNTED = r"^\s*(?P<h>\d{1,5}):(?P<m>[0-5]\d):(?P<s>[0-5]\d(?:[.,]\d+)?)\s*$"
@@ -62,8 +62,8 @@ COUNTED = r"^\s*(?P<h>\d{1,5}):(?P<m>[0-5]\d):(?P<s>[0-5]\d(?:[.,]\d+)?)\s*$"
 
 @dataclass(frozen=True, slots=True)
 class DateOrder:
-    """What stands first ('day', 'month' or 'year'), what decided it, and whether that is sure: else another file may
-    decide."""
+    """First part of a date ('day', 'month' or 'year'), the reason, and whether it is certain; otherwise another file
+    may decide."""
 
     first: str
     why: str
@@ -71,7 +71,7 @@ class DateOrder:
 
 
 def shown_order(parts: Fields) -> DateOrder | None:
-    """The order that a number above 12 shows, or else that in which alone the stamps run without a leap; or None."""
+    """The order shown by a number above 12, or the only order in which the stamps increase regularly; or None."""
     first, second = ((part[parts.open] > 12).any() for part in (parts.a, parts.b))
     if first != second:
         return DateOrder(
@@ -93,21 +93,21 @@ class Clock:
     scale : Scale or None
         Meaning of numbers.
     order : DateOrder or None
-        What stands first in dates that leave it open; None while undecided (then the month).
+        First part of ambiguous dates; None while undecided (then the month).
     date_format, timezone : str or None
         As in `ReadOptions`.
     local : bool
         True where the stamps state no zone.
     below_s : float
-        Unit [s] of the last of the columns, which holds what is below the second; 0 where none does.
+        Unit [s] of the last of the columns, which contains the fraction of a second; 0 without one.
     offset_s : float or None
-        What the column's name states of its zone [s east of Greenwich].
+        Time zone offset in the column's name [s east of Greenwich].
     winter_s : float or None
-        Offset of the stated zone's winter time [s east of Greenwich] where the clock keeps it all the year.
+        Offset of the stated zone's winter time [s east of Greenwich] if the clock keeps it all year.
     doubt : str
-        What of the zone is not known, for the notes.
+        What is unknown about the zone, for the notes.
     every_s : float
-        Stated time between rows whose stamps do not advance [s]; 0 where they do.
+        Stated time between rows whose stamps do not advance [s]; 0 if they do.
     """
 
     columns: tuple[int, ...]
@@ -162,7 +162,7 @@ class Clock:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """How the stamps are read, where that is not plain from their writing."""
+        """Notes on how the stamps are read, unless it is obvious."""
         notes = [] if self.scale is None else [self.scale.note]
         if self.every_s:
             notes.append(f"stamps do not advance: rows are taken as {self.every_s:g} s apart, as stated")
@@ -186,14 +186,14 @@ class Clock:
         if parts is None:
             return np.full(len(texts), np.nan), True
         order = self.order
-        if order is None and parts.open.any():  # the head left nothing open
+        if order is None and parts.open.any():  # no ambiguous date in the first rows
             order = shown_order(parts)
         second = stamp_seconds(parts, "month" if order is None else order.first)
         return midnights_told(second, parts), not parts.stated.any()
 
 
 def time_scale_of(column: pa.Array, unit: str = "") -> TimeScale | None:
-    """How the numbers of a column mean a time, by their size and a unit in its name; None where they mean none."""
+    """Meaning of a column's numbers as a time, by their size and a unit in its name; None if they are not times."""
     number = numbers(column)
     number = number[np.isfinite(number)]
     if len(number) == 0:
@@ -217,21 +217,21 @@ def time_scale_of(column: pa.Array, unit: str = "") -> TimeScale | None:
 
 
 def _step(number: NDArray[np.float64]) -> float:
-    """The usual distance of neighbouring numbers that differ; 0 where none do."""
+    """The usual difference of different neighbouring numbers; 0 if there is none."""
     steps = np.abs(np.diff(number))
     return float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
 
 
 def _unit_by_step(number: NDArray[np.float64]) -> str:
-    """'ms' for counts that step by what only milliseconds do, 's' for others: trends of loops are sampled every few
-    seconds, or every few minutes."""
+    """'ms' for counts with steps that only milliseconds have, 's' for others: loop trends are sampled every few
+    seconds or every few minutes."""
     step = _step(number)
     whole = bool((number % 1 == 0).all())
     return "ms" if whole and step >= HISTORY.least_ms_step and (step % 60 != 0 or step % 1000 == 0) else "s"
 
 
 def counted_s(texts: pa.Array) -> NDArray[np.float64]:
-    """Texts such as 25:10:03 as seconds, shape (n,), NaN where they are none."""
+    """Texts such as 25:10:03 as seconds, shape (n,), NaN for other texts."""
     parts = pc.extract_regex(texts, COUNTED)
     hour, minute, second = (
         numbers(pc.replace_substring(pc.struct_field(parts, name), ",", ".")) for name in "hms"
@@ -240,14 +240,14 @@ def counted_s(texts: pa.Array) -> NDArray[np.float64]:
 
 
 def is_of_day(date_format: str) -> bool:
-    """Whether a format states a time of day and no date."""
+    """Whether a format has a time of day and no date."""
     at = datetime(2026, 5, 12, 8, 9, 10)
     return datetime.strptime(at.strftime(date_format), date_format) == at.replace(1900, 1, 1)
 
 
 def of_day_s(texts: pa.Array, date_format: str | None = None) -> NDArray[np.float64]:
-    """Times of day as seconds, shape (n,), NaN where they are none: a day more, or less, where one lies over half a
-    day from the last."""
+    """Times of day as seconds, shape (n,), NaN for other texts: a day is added, or subtracted, after a change of more
+    than half a day."""
     if date_format is not None:
         second = _formatted(texts, date_format)[0] % DAY_S
     else:
@@ -261,7 +261,7 @@ def of_day_s(texts: pa.Array, date_format: str | None = None) -> NDArray[np.floa
 
 
 def date_and_time(arrays: Sequence[pa.Array]) -> pa.Array:
-    """A column of dates and a column of times of day as one column of text; one column alone as it is."""
+    """A column of dates and one of times of day as one column of text; a single column unchanged."""
     if len(arrays) == 1:
         return arrays[0]
     texts = (pc.replace_substring_regex(as_text(array), MIDNIGHT, "") for array in arrays)
@@ -278,8 +278,8 @@ def _formatted(texts: pa.Array, date_format: str) -> tuple[NDArray[np.float64], 
 
 
 def to_utc(local_s: NDArray[np.float64], zone: str) -> tuple[NDArray[np.float64], Counter[str]]:
-    """Seconds of a local wall clock, in the order of the file, to seconds of UTC, shape (n,), and how many lie in
-    repeated and in missing hours; NaN stays NaN, and becomes of the hour that does not exist."""
+    """Convert seconds of a local wall clock, in the order of the file, to seconds of UTC, shape (n,), and count those
+    in repeated and in skipped hours; NaN stays NaN, and skipped hours become NaN."""
     falling = np.nansum(np.sign(np.diff(local_s))) < 0
     ordered = local_s[::-1] if falling else local_s
     summer, winter = _offset_readings(ordered, zone)
@@ -294,10 +294,10 @@ def to_utc(local_s: NDArray[np.float64], zone: str) -> tuple[NDArray[np.float64]
 
 
 def winter_offset_s(local_s: NDArray[np.float64], zone: str) -> float | None:
-    """The offset of a zone's winter time [s east of Greenwich] where a clock keeps it all the year; else None.
+    """The offset of a zone's winter time [s east of Greenwich] if a clock keeps it all year; else None.
 
-    Such a clock shows the hour that spring leaves out, and the hour that autumn repeats once only; how many samples
-    stand in these hours beside their neighbours tells it, in whatever order the samples are; NaN where unreadable.
+    Such a clock contains the hour skipped in spring, and only once the hour repeated in autumn. The numbers of
+    samples in these hours and in adjacent ones show it, in any order of the samples; NaN where unreadable.
     """
     hour, count = np.unique(np.floor(local_s[np.isfinite(local_s)] / HOUR_S), return_counts=True)
     inner = np.flatnonzero(np.diff(hour) <= 2.0)
@@ -320,7 +320,7 @@ def is_fixed(zone: str) -> bool:
 
 
 def _shares(hours: NDArray[np.float64], held: dict[float, int], least: int) -> list[float]:
-    """Samples in some hours over those of the fuller hour beside them, where these are enough to tell."""
+    """Samples in some hours relative to the fuller adjacent hour, if there are enough."""
     shares = []
     for hour in hours.tolist():
         beside = held.get(hour - 1.0, 0), held.get(hour + 1.0, 0)
@@ -332,7 +332,7 @@ def _shares(hours: NDArray[np.float64], held: dict[float, int], least: int) -> l
 def _offset_readings(
     local_s: NDArray[np.float64], zone: str
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Both readings of every stamp: with summer time where the hour is doubtful, and without."""
+    """Both readings of every stamp: with summer time where the hour is ambiguous, and without."""
     index = pd.DatetimeIndex((np.nan_to_num(local_s) * 1e6).round().astype("datetime64[us]"))
 
     def reading(summer: bool) -> NDArray[np.float64]:
@@ -344,7 +344,7 @@ def _offset_readings(
 
 
 def _second_pass(local_s: NDArray[np.float64], twice: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """True within a repeated hour from where the clock was set back."""
+    """True within a repeated hour after the clock was set back."""
     second = np.zeros(len(local_s), dtype=bool)
     doubtful = np.flatnonzero(twice)
     if doubtful.size == 0:
@@ -358,9 +358,9 @@ def _second_pass(local_s: NDArray[np.float64], twice: NDArray[np.bool_]) -> NDAr
 
 
 def _set_back(local_s: NDArray[np.float64], rows: NDArray[np.intp], typical_s: float) -> int:
-    """How many of the rows of one repeated hour stand before the clock was set back.
+    """Number of the rows of one repeated hour before the clock was set back.
 
-    Where it ran backwards most; where it never did, where an hour more makes the least gap.
+    At the largest backward step; without one, where an additional hour makes the smallest gap.
     """
     before = local_s[rows] - local_s[np.maximum(rows - 1, 0)]
     at_start = before[0] if rows[0] > 0 else -np.inf

@@ -33,26 +33,26 @@ from analyzer.places import at_hand, bring, is_remote
 from identification.errors import InputError
 
 DOUBT = "; state "
-"""What stands in notes on readings of which another is possible, before how the other is stated."""
+"""Text in notes between a reading and the option for another possible reading."""
 __all__ = ["Export", "ReadOptions", "open_export"]
 
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """Paths and layouts, no samples; small to send to a worker process.
+    """Paths and layouts, no samples; small enough to send to a worker process.
 
     Parameters
     ----------
     sources : tuple of Source
-        One a file.
+        One per file.
     tags : tuple of str
-        All tags, in the order in which they are met.
+        All tags, in the order of their first occurrence.
     skipped : tuple of str
         Files of a folder that could not be read, each with the reason.
     origins : mapping of Path to str
         URLs of the files that were copied from shared storage.
     marks : mapping of Path to Mark
-        What the files were known by when they were opened.
+        Marks of the files when they were opened.
     """
 
     sources: tuple[Source, ...]
@@ -87,9 +87,9 @@ class Export:
         return series
 
     def span(self, tag: str | None = None) -> tuple[float, float]:
-        """First and last stamp of all files, or of those that hold a tag [s since 1970-01-01 UTC].
+        """First and last stamp of all files, or of those with a tag [s since 1970-01-01 UTC].
 
-        Stray stamps, far from the rest of their file, do not count and are told in the notes.
+        Stray stamps, far from the rest of their file, are excluded and reported in the notes.
         """
         homes = range(len(self.sources)) if tag is None else self._homes[tag]
         for home in homes:
@@ -101,12 +101,12 @@ class Export:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was detected, a sentence each: on every file, and on the samples of all tags read so far."""
+        """What was detected, one sentence each: for every file, and for the samples of all tags read so far."""
         return (*self.file_notes, *met_told(self.met(self._met)))
 
     @property
     def file_notes(self) -> tuple[str, ...]:
-        """What was detected of every file, and stamps that were set aside; first what could be read otherwise."""
+        """What was detected in every file, and excluded stamps; ambiguous readings first."""
         files: dict[str, list[str]] = {}
         for source in self.sources:
             for note in source.notes:
@@ -117,7 +117,7 @@ class Export:
         return tuple(sorted(notes, key=lambda note: DOUBT not in note))
 
     def met(self, tags: Iterable[str]) -> Counter[str]:
-        """How often something worth telling was met in the samples of some tags that were read."""
+        """Number of occurrences of each reportable problem in the samples of some tags that were read."""
         return sum((self._met[tag] for tag in tags if tag in self._met), Counter())
 
     def _check_known(self, tags: Sequence[str]) -> None:
@@ -130,7 +130,7 @@ class Export:
 
 
 def open_export(paths: Sequence[Path], options: ReadOptions | None = None) -> Export:
-    """Find out what files hold, without reading their values.
+    """Detect the contents of files without reading their values.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def open_export(paths: Sequence[Path], options: ReadOptions | None = None) -> Ex
 
 
 def _marks(paths: Iterable[Path]) -> dict[Path, Mark]:
-    """What files are known by; one that cannot be read is told of where it is opened."""
+    """Marks of files; an unreadable one is reported when it is opened."""
     marks = {}
     for path in paths:
         with suppress(OSError):
@@ -166,7 +166,7 @@ def _marks(paths: Iterable[Path]) -> dict[Path, Mark]:
 
 
 def _check_stated(options: ReadOptions) -> None:
-    """Raise InputError for options that no file could be read with."""
+    """Raise InputError for options with which no file could be read."""
     if options.timezone is not None:
         zone_of(options.timezone or "nowhere")
     _ = options.interval_s
@@ -197,7 +197,7 @@ def _is_format(written: str) -> bool:
 
 
 def _readable_files(paths: Sequence[Path], options: ReadOptions) -> tuple[list[Source], list[str]]:
-    """The files that can be read, and why others of a folder cannot: those cost their own loops and no more."""
+    """The readable files, and why others of a folder are not: only their loops are lost."""
     sources: list[Source] = []
     skipped: list[InputError] = []
     named = {Path(path) for path in paths}
@@ -213,7 +213,7 @@ def _readable_files(paths: Sequence[Path], options: ReadOptions) -> tuple[list[S
 
 
 def _opened_tables(path: Path, options: ReadOptions) -> tuple[list[Source], list[InputError]]:
-    """The tables of a file, one but for workbooks, and why it or other sheets of a workbook are none."""
+    """The tables of a file, one except for workbooks, and the errors of it or of other sheets of a workbook."""
     try:
         with _faults_told(path):
             parts = unpacked(path, options.place)
@@ -242,8 +242,8 @@ def _table_source(plain: Path, options: ReadOptions) -> Source:
 
 
 def _agreed(sources: Sequence[Source]) -> tuple[Source, ...]:
-    """Files whose dates read either way follow a file of the same export whose dates do not; and all keep winter time
-    where one file shows that its clock does."""
+    """Files whose dates are ambiguous get the order of a file of the same export whose dates are not; and all keep
+    winter time if one file shows that its clock does."""
     winter_s = next((s.clock.winter_s for s in sources if s.clock.winter_s is not None), None)
     if winter_s is not None:
         sources = [s.with_clock(winter_s=winter_s) if s.clock.local else s for s in sources]
@@ -256,7 +256,7 @@ def _agreed(sources: Sequence[Source]) -> tuple[Source, ...]:
 
 
 def met_told(met: Counter[str]) -> list[str]:
-    """Sentences on what was met in samples, the most frequent first."""
+    """Sentences on problems in samples, the most frequent first."""
     return [f"{count} {what}" for what, count in met.most_common()]
 
 
@@ -266,7 +266,7 @@ def _some(names: Sequence[str]) -> str:
 
 @contextmanager
 def _faults_told(path: Path) -> Iterator[None]:
-    """Faults of a file that show only when it is read: gone, cut short, damaged, too large, without a stamp."""
+    """Report file errors that appear only on reading: missing, truncated, damaged, too large, without a stamp."""
     try:
         yield
     except MemoryError as error:

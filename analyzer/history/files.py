@@ -1,5 +1,5 @@
-"""Which files an export consists of, and packed ones laid beside as plain ones, bounded: gzip, bzip2, xz, a zip
-archive of one file, and workbooks, each sheet as text, cell by cell as it is stored and not as it is shown.
+"""Files of an export. Packed files (gzip, bzip2, xz, zip archives of one file) and workbooks are converted to plain
+copies within size limits, workbooks one sheet at a time as text, with cells as stored, not as displayed.
 
 Workbooks are read by python-calamine (extra `excel`): xlsx, xlsm, xlsb, xls and ods.
 """
@@ -41,13 +41,13 @@ STREAMS: dict[bytes, Callable[..., Any]] = {
     b"BZh": bz2.open,
     b"\xfd7zX": lzma.open,
 }
-"""How files that begin so are opened."""
+"""Openers by the first bytes of a file."""
 OLD = b"\xd0\xcf\x11\xe0"
-"""First bytes of a workbook of the old kind."""
+"""First bytes of a workbook of the old format."""
 FEWEST = 2
-"""Rows and columns of a table at least: a header and a sample, stamps and values."""
+"""Minimum rows and columns of a table: a header and a sample, stamps and values."""
 PLAIN = re.compile(r"[^\w.-]+")
-"""What stands for nothing in the name of a file."""
+"""Characters that are replaced in the name of a copy."""
 BLOCK_BYTES = 1 << 20
 
 
@@ -76,7 +76,7 @@ def detect_encoding(head: bytes) -> str:
 
 
 def export_files(paths: Sequence[Path]) -> list[Path]:
-    """Files behind the paths given, each once: in the order given, within a folder by name.
+    """Files of the given paths, each once: in the given order, within a folder by name.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def export_files(paths: Sequence[Path]) -> list[Path]:
 
 
 def ends_of(path: Path) -> bytes:
-    """Size and both ends of a file, by which it is known."""
+    """Size and both ends of a file, by which it is identified."""
     with path.open("rb") as file:
         size = file.seek(0, 2)
         file.seek(0)
@@ -101,7 +101,7 @@ def ends_of(path: Path) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """By what a file is known again: size, time of its last change [ns], and a digest of both ends."""
+    """Identification of a file: size, time of its last change [ns], and a digest of both ends."""
 
     size: int
     changed_ns: int
@@ -109,17 +109,17 @@ class Mark:
 
 
 def mark_of(path: Path) -> Mark:
-    """What a file is known by now. Raises OSError where it cannot be read."""
+    """The present mark of a file. Raises OSError where it cannot be read."""
     stat = path.stat()
     return Mark(stat.st_size, stat.st_mtime_ns, hashlib.blake2b(ends_of(path), digest_size=16).digest())
 
 
 class ChangedError(InputError):
-    """A file of an export was written to, or taken away, while it was read."""
+    """A file of an export was changed or removed while it was read."""
 
 
 def require_unchanged(marks: Mapping[Path, Mark]) -> None:
-    """Raise ChangedError where a file is no longer what it was when it was opened."""
+    """Raise ChangedError where a file has changed since it was opened."""
     for path, mark in marks.items():
         try:
             same, seen = mark_of(path) == mark, f"{path}: was written to while it was read"
@@ -131,12 +131,12 @@ def require_unchanged(marks: Mapping[Path, Mark]) -> None:
 
 
 def is_parquet(path: Path) -> bool:
-    """True for files that end as Parquet or begin as Parquet.
+    """True for files with the ending or the first bytes of Parquet.
 
     Raises
     ------
     InputError
-        The file is empty, or packed as none that is read.
+        The file is empty, or packed in an unsupported way.
     """
     with path.open("rb") as file:
         start = file.read(4)
@@ -149,7 +149,7 @@ def is_parquet(path: Path) -> bool:
 
 
 def packed_beside(paths: Sequence[Path]) -> list[str]:
-    """Sentences on files of the folders given that hold an export in a wrapping that is not read."""
+    """Sentences on export files in the given folders that are packed in an unsupported way."""
     said = []
     for folder in (Path(p) for p in paths if Path(p).is_dir()):
         found = sorted(p.name for p in folder.iterdir() if p.suffix.lower() == NOT_READ_ENDING)
@@ -184,14 +184,14 @@ def _is_export(path: Path) -> bool:
 
 @lru_cache(maxsize=1)
 def own_scratch() -> Path:
-    """A directory of this process, gone with it."""
+    """A temporary directory of this process."""
     made = Path(tempfile.mkdtemp(prefix="triage-"))
     atexit.register(shutil.rmtree, made, True)
     return made
 
 
 def unpacked(path: Path, place: Path) -> list[Path]:
-    """The file itself, or, where it is packed, a plain copy of it under `place`, or the tables of a workbook.
+    """The file itself, or, if it is packed, a plain copy of it under `place`, or the tables of a workbook.
 
     Raises
     ------
@@ -201,7 +201,7 @@ def unpacked(path: Path, place: Path) -> list[Path]:
     with path.open("rb") as file:
         start = file.read(5)
     members = _members(path) if start.startswith(ZIP) else []
-    # text that is only called a workbook is none
+    # a text file with the ending of a workbook is no workbook
     named = start.startswith(ZIP) and path.suffix.lower() in WORKBOOK_ENDINGS
     if start.startswith(OLD) or named or any(info.filename.startswith("xl/") for info in members):
         _check_size(path, sum(info.file_size for info in members), 0, place)
@@ -223,7 +223,7 @@ def unpacked(path: Path, place: Path) -> list[Path]:
 
 
 def _members(path: Path) -> list[zipfile.ZipInfo]:
-    """What an archive holds; nothing where it is damaged, which its reader tells."""
+    """Members of an archive; empty for a damaged one, which its reader reports."""
     try:
         with zipfile.ZipFile(path) as archive:
             return archive.infolist()
@@ -248,7 +248,7 @@ def _archive_member(path: Path, folder: Path) -> Path:
 
 
 def _copied(source: IO[Any], out: Path, path: Path) -> Path:
-    """Copy what a stream unpacks, stopping where it grows beyond all measure."""
+    """Copy the unpacked contents of a stream, up to a size limit."""
     done = 0
     with out.open("wb") as file:
         while block := source.read(BLOCK_BYTES):
@@ -259,8 +259,8 @@ def _copied(source: IO[Any], out: Path, path: Path) -> Path:
 
 
 def _check_size(path: Path, size: int, written: int, folder: Path) -> None:
-    """Raise InputError where a file of `size` bytes, some of them `written` to a folder, is beyond all measure or the
-    disk's room."""
+    """Raise InputError if a file of `size` bytes, some of them `written` to a folder, exceeds the size limit or the
+    free space of the disk."""
     packed = path.stat().st_size
     if size > max(HISTORY.unpacked_times * packed, HISTORY.unpacked_bytes):
         seen = f"{path}: {packed} bytes that unpack to more than {size / 1e6:.0f} MB"
@@ -273,12 +273,12 @@ def _check_size(path: Path, size: int, written: int, folder: Path) -> None:
 
 
 def sheets_as_text(path: Path, folder: Path) -> list[Path]:
-    """Each sheet of a workbook that holds a table as a text file of its own under `folder`, in their order.
+    """Each sheet of a workbook that has a table as a separate text file under `folder`, in their order.
 
     Raises
     ------
     InputError
-        The package is missing, the file is damaged or has a password, or no sheet holds a table.
+        The package is missing, the file is damaged or has a password, or no sheet has a table.
     """
     try:
         from python_calamine import CalamineError
@@ -288,7 +288,7 @@ def sheets_as_text(path: Path, folder: Path) -> list[Path]:
         raise InputError(seen, expected, remedy) from error
     try:
         found = _sheets(path, folder)
-    except BaseException as error:  # a panic of the reader is no Exception
+    except BaseException as error:  # a panic of the reader is not an Exception
         known = isinstance(error, OSError | ValueError | RuntimeError | CalamineError)
         if not known and type(error).__name__ != "PanicException":
             raise
@@ -322,7 +322,7 @@ def _sheets(path: Path, folder: Path) -> list[Path]:
 
 
 def _write(rows: Iterable[list[Any]], path: Path) -> None:
-    """Rows as tab-delimited text; rows without a cell are left out, and titles above a table stand alone."""
+    """Rows as tab-delimited text, without empty rows; titles above a table are separate lines."""
     above = True
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, delimiter="\t", lineterminator="\n")

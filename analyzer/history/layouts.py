@@ -1,5 +1,5 @@
-"""The layouts of tables: wide (a column for each tag), pairs (a clock beside each tag's values) and long (a row for
-each sample, with the tag in a column of its own)."""
+"""Layouts of tables: wide (one column per tag), pairs (a clock column for each tag's values) and long (one row per
+sample, with the tag in a separate column)."""
 
 from __future__ import annotations
 
@@ -42,19 +42,19 @@ TIME_FIRST = re.compile(rf"^(?:{any_of('time_first')})[ ._:/-]+", re.IGNORECASE)
 VALUE_WORDS = re.compile(rf"(?:^|[ ._:/-])\(?(?:{any_of('value')})\)?(?:[ ._]\d+)?$", re.IGNORECASE)
 NUMBERED = re.compile(r"[ ._]\d+$")
 Stamps = tuple[NDArray[np.float64], Counter[str]]
-"""Stamps of rows [s since 1970-01-01 UTC], and what was met in them."""
+"""Stamps of rows [s since 1970-01-01 UTC], and the problems found in them."""
 Rows = NDArray[np.int64] | None
 """Rows of a table, None for all of them."""
 
 
 def source_of(table: Table, options: ReadOptions) -> Source:
-    """The table by the first layout that knows it; a further one is a function that answers None for a table that is
-    not its own. The last takes every table and says what is missing.
+    """The table in the first layout that applies; a new layout is a function that returns None for other tables. The
+    last one accepts every table and reports what is missing.
 
     Raises
     ------
     InputError
-        There is no time column, or no column of values beside it.
+        There is no time column, or no other column of values.
     """
     return open_long(table, options) or open_pairs(table, options) or open_wide(table, options)
 
@@ -70,26 +70,26 @@ class TagColumn:
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """One file whose layout is understood; small, picklable, holds no samples.
+    """One file with a known layout; small, picklable, without samples.
 
     Parameters
     ----------
     table : Table
     tags : tuple of str
     columns : tuple of TagColumn
-        One a tag; of a long table one for all.
+        One per tag; for a long table one for all.
     good_quality : tuple of str or None
         As in `ReadOptions`.
     layout : tuple of str
-        Of what kind it is, in words.
+        Its layout, in words.
     tag : int
-        Column of the tags of a long table, -1 of any other.
+        Column of the tags of a long table, otherwise -1.
     scheme : Scheme or None
-        Of all codes of quality; None: found out of each column.
+        Of all quality codes; None: determined from each column.
     ones : bool or None
-        Whether most codes are 1 and not 0; None: found out of each column.
+        Whether most codes are 1 and not 0; None: determined from each column.
     paired : bool
-        Whether rows without a stamp lie below a tag's last one.
+        Whether rows without a stamp follow a tag's last one.
     """
 
     table: Table
@@ -118,12 +118,12 @@ class Source:
         return (*self.table.notes, *self.layout, *self.clock.notes)
 
     def with_clock(self, **known: Any) -> Source:
-        """The same file with what is known of its clocks from other files, by the fields of `Clock`."""
+        """The same file with clock properties known from other files, by the fields of `Clock`."""
         columns = (replace(c, clock=replace(c.clock, **known)) for c in self.columns)
         return replace(self, columns=tuple(columns))
 
     def read(self, tags: Sequence[str]) -> dict[str, Series]:
-        """Samples of those of `tags` that the file holds."""
+        """Samples of those of `tags` that are in the file."""
         asked, long = set(tags), self.tag >= 0
         wanted = {tag: self.columns[0 if long else k] for k, tag in enumerate(self.tags) if tag in asked}
         if not wanted:
@@ -144,11 +144,11 @@ class Source:
         }
 
     def _stamped(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
-        """The rows whose stamps those of a tag of a long table have: its own, or the first where none advances."""
+        """The rows with the stamps of a tag in a long table: its own, or the first ones if none advances."""
         return np.arange(len(rows)) if self.clock.every_s else rows
 
     def span(self) -> MainSpan:
-        """Where the samples lie in time, stray ones apart [s since 1970-01-01 UTC]."""
+        """Time span of the samples without stray ones [s since 1970-01-01 UTC]."""
         clocks = dict.fromkeys(c.clock for c in self.columns)
         needed = sorted({i for clock in clocks for i in clock.columns})
         spans = []
@@ -165,7 +165,7 @@ class Source:
         return MainSpan(first, last, sum(s.stray for s in spans))
 
     def _timed(self, clock: Clock, arrays: dict[int, pa.Array]) -> tuple[Stamps, Rows]:
-        """Stamps of one clock's rows, and which rows of the table these are."""
+        """Stamps of one clock's rows, and the indices of these rows in the table."""
         times = [arrays[i] for i in clock.columns]
         if not self.paired:
             return clock.utc(*clock.seconds(times)), None
@@ -192,7 +192,7 @@ def _taken(column: pa.Array, rows: Rows) -> pa.Array:
 
 
 def open_wide(table: Table, options: ReadOptions) -> Source:
-    """Take a table as wide: one time column, and a column for each tag."""
+    """Read a table as wide: one time column, and a column for each tag."""
     clock = find_clock(table, options)
     others = [i for i in range(len(table.names)) if i not in clock.columns and _holds_values(table, i)]
     free = [i for i in others if not _counts_rows(table, i)] or others
@@ -216,8 +216,8 @@ def open_wide(table: Table, options: ReadOptions) -> Source:
 
 
 def _with_loop(names: Sequence[str], stem: str) -> tuple[str, ...]:
-    """Full tags: bare columns such as 'PV' and 'OP' belong to the loop that the file is named for, and a lone column
-    of values to the tag that it is named for."""
+    """Full tags: bare columns such as 'PV' and 'OP' belong to the loop named by the file, and a single column of
+    values to the tag named by the file."""
     if len(names) == 1 and plain(names[0]) in COLUMNS["value"]:
         return (stem,)
     if not names or not all(plain(name) in COLUMNS["bare_ending"] for name in names):
@@ -226,9 +226,9 @@ def _with_loop(names: Sequence[str], stem: str) -> tuple[str, ...]:
 
 
 def _any_number(table: Table, columns: Sequence[int]) -> bool:
-    """Whether the first rows of any column hold a number, or nothing yet; a list of alarms holds none.
+    """Whether the first rows of any column have a number, or nothing yet; a list of alarms has none.
 
-    Columns of a controller's modes are texts too: they are named for their loop.
+    Columns of controller modes are also texts: they are named after their loop.
     """
     if any(mark in table.names[i] for i in columns for mark in ".:/_"):
         return True
@@ -239,7 +239,7 @@ def _any_number(table: Table, columns: Sequence[int]) -> bool:
 
 
 def _counts_rows(table: Table, i: int) -> bool:
-    """Whether a column is named for that and numbers the rows, up or down: an index is no tag."""
+    """Whether a column numbers the rows, up or down, and its name says so: an index is not a tag."""
     if plain(table.names[i]) not in COLUMNS["index"] or not pa.types.is_integer(table.types[i]):
         return False
     number = table.head([i])[0].drop_null().to_numpy(zero_copy_only=False)
@@ -256,7 +256,7 @@ def _holds_values(table: Table, i: int) -> bool:
 
 
 def open_pairs(table: Table, options: ReadOptions) -> Source | None:
-    """Take a table as pairs where two or more columns hold stamps, each with values behind it; else None."""
+    """Read a table as pairs if two or more columns have stamps, each followed by values; else None."""
     if options.time_column is not None or options.date_format is not None:
         return None
     groups = _groups(table, options.stated)
@@ -273,10 +273,10 @@ def open_pairs(table: Table, options: ReadOptions) -> Source | None:
 
 
 def _groups(table: Table, stated: Collection[str]) -> list[tuple[int, list[int]]]:
-    """Each column of stamps, none of stated tags, with the columns behind it up to the next; none where a column has
-    nothing behind it."""
+    """Each column of stamps, except stated tags, with the columns up to the next one; empty if a column has none
+    after it."""
     timed = [_is_time(name) for name in table.names]
-    # a tag, of both
+    # a tag above both columns
     above = [NUMBERED.sub("", a) != "" and b == "" for a, b in pairwise((*table.names, "."))]
     texts = [is_text(kind) or pa.types.is_temporal(kind) for kind in table.types]
     likely = [i for i, may in enumerate(zip(texts, timed, above, strict=True)) if any(may)]
@@ -293,16 +293,16 @@ def _groups(table: Table, stated: Collection[str]) -> list[tuple[int, list[int]]
 
 
 def _is_time(name: str) -> bool:
-    """Whether a column's own name is that of stamps."""
+    """Whether a column's own name is a name for stamps."""
     bare = NUMBERED.sub("", name[: HISTORY.name_length])
     return plain(bare) in COLUMNS["stamp"] or any((TIME_WORDS.search(bare), TIME_FIRST.match(bare)))
 
 
 def _paired(table: Table, time: int, beside: Sequence[int], options: ReadOptions) -> list[TagColumn]:
-    """The tags that share one clock: those behind it that hold values, with their quality."""
+    """The tags with a common clock: the following columns of values, with their quality."""
     quality = [i for i in beside if plain(NUMBERED.sub("", table.names[i])) in COLUMNS["quality"]]
     held = [i for i in beside if i not in quality]
-    # a tag, of which letters behind say nothing, or the time's name
+    # a tag, whose last letters are no time zone, or the name of the time
     above = NUMBERED.sub("", table.names[time])
     clock = stamps_clock(table, time, options, above if plain(above) in COLUMNS["stamp"] else "")
     single = quality[0] if len(quality) == 1 and len(held) == 1 else -1
@@ -310,7 +310,7 @@ def _paired(table: Table, time: int, beside: Sequence[int], options: ReadOptions
 
 
 def _tag(table: Table, column: TagColumn) -> str:
-    """The tag's name: above its values, or where that says nothing above its stamps."""
+    """The tag's name: above its values, or above its stamps if that is unspecific."""
     own, other = table.names[column.value], table.names[column.clock.columns[0]]
     if plain(NUMBERED.sub("", own)) in COLUMNS["value"] or own == "":
         return TIME_WORDS.sub("", other[: HISTORY.name_length]) or other
@@ -318,13 +318,13 @@ def _tag(table: Table, column: TagColumn) -> str:
 
 
 def tag_column(table: Table) -> int:
-    """The column of tags of a long table, -1 of any other."""
+    """The column of tags of a long table, otherwise -1."""
     tag = first_named(table.names, COLUMNS["tag"])
     return -1 if tag is None or _value_column(table) is None else tag
 
 
 def open_long(table: Table, options: ReadOptions) -> Source | None:
-    """Take a table as long where it has columns for tag and value; else None."""
+    """Read a table as long if it has columns for tag and value; else None."""
     tag, value = tag_column(table), _value_column(table)
     if tag < 0 or value is None:
         return None
@@ -348,12 +348,12 @@ def _kinds(table: Table, column: int) -> pa.Array:
 
 
 def _value_column(table: Table) -> int | None:
-    """The column that is named so, else the only one of numbers that is neither time nor quality."""
+    """The column with such a name, else the only one of numbers that is neither time nor quality."""
     named = first_named(table.names, COLUMNS["value"])
     if named is not None:
         return named
     floating = [i for i, kind in enumerate(table.types) if pa.types.is_floating(kind)]
-    taken = {*COLUMNS["stamp"], *COLUMNS["quality"]} - {"data"}  # a date in Italian, but of numbers a value
+    taken = {*COLUMNS["stamp"], *COLUMNS["quality"]} - {"data"}  # a date in Italian, but a value if numeric
     free = [i for i in floating if plain(table.names[i]) not in taken]
     return free[0] if len(free) == 1 else None
 

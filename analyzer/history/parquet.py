@@ -1,11 +1,11 @@
-"""Parquet: columns by projection, rows of one tag by filter.
+"""Parquet files: columns by projection, rows of one tag by filter; and copies of large exports.
 
-And copies: exports too big to be read for each loop anew are streamed once into Parquet by loop, in bounded memory. A
-wide table becomes one file, of which each loop reads its columns. Of a long one, whose tags may be interleaved line
-by line, the rows go into some dozens of files by tag, so that a loop's tags are read from a few of them.
+Exports too large to be read once per loop are streamed once into Parquet by loop, in bounded memory. A wide table
+becomes one file, of which each loop reads its columns. The rows of a long one, whose tags may be interleaved, go to
+some dozens of files by tag, so that a loop's tags are in a few of them.
 
-A copy is laid whole or not at all, so that a run that goes on takes it up: it is known by the file's name, size and
-both ends, by how it was read, and by this program's version.
+A copy is made completely or not at all, so that a resumed run can use it: it is identified by the file's name, size
+and both ends, by the read options, and by this program's version.
 """
 
 from __future__ import annotations
@@ -39,24 +39,24 @@ from identification.errors import InputError
 
 OPEN_FILES = 4
 PIECES = 64
-"""Files of a long copy; ours: of 4,500 tags each holds seventy, and a loop's four lie in a sixteenth of all."""
+"""Files of a long copy; ours: of 4,500 tags each contains seventy, and a loop's four are in a sixteenth of all."""
 BATCH_ROWS = 500_000
-"""Rows of a Parquet file that are handed on at a time."""
+"""Rows of a Parquet file per batch."""
 HELD_ROWS = 32_768
-"""Rows of a file that are held before they are written: 64 files of 50 bytes a row hold 100 MB."""
+"""Buffered rows of a file before writing: 64 files of 50 bytes a row need 100 MB."""
 PROBED_GROUPS = 64
-"""Groups of rows, from all of a file, whose texts are looked at."""
+"""Row groups, distributed over a file, whose texts are checked."""
 DONE = "done.json"
-"""What a copy says of itself; written last."""
+"""Description of a copy; written last."""
 NAMED = "converted-"
 Said = dict[str, list[str]]
-"""What a pass over an export found out: notes, and the tags of a long table in the order of their first rows."""
+"""Results of a pass over an export: notes, and the tags of a long table in the order of their first rows."""
 
 
 @dataclass(frozen=True, slots=True)
 class ParquetTable(Table):
-    """A Parquet file, known by its footer; or a copy in a `folder`, its columns named by position: one
-    piece, or of a long table those in which a row is by its tag."""
+    """A Parquet file, described by its footer; or a copy in a `folder`, its columns named by position: one file, or
+    for a long table several, selected by tag."""
 
     rows: int = 0
     folder: Path | None = None
@@ -71,9 +71,9 @@ class ParquetTable(Table):
         return [batch.column(name) for name in names]
 
     def read(self, columns: Sequence[int], where: tuple[int, Sequence[str]] | None = None) -> list[pa.Array]:
-        """Whole columns, or the rows where the tag's column holds one of some texts.
+        """Whole columns, or the rows where the tag's column contains one of some texts.
 
-        Without `where`, of a long copy the rows of one piece stand for all: they are of all times.
+        Without `where`, the rows of one piece represent a whole long copy: they cover all times.
         """
         if where is None:
             return self._columns(self._largest(), columns)
@@ -93,11 +93,11 @@ class ParquetTable(Table):
         return [one_array(table.column(name)) for name in names]
 
     def _stored(self, columns: Sequence[int]) -> list[str]:
-        """Names of columns as they stand in the files."""
+        """Names of columns as in the files."""
         return [self.names[i] if self.folder is None else str(i) for i in columns]
 
     def _pieces(self, wanted: Collection[int] | None = None) -> list[Path]:
-        """The files, or those of some numbers."""
+        """The files, or those with some numbers."""
         if self.folder is None:
             return [self.path]
         return [p for p in sorted(self.folder.glob("*.parquet")) if wanted is None or int(p.stem) in wanted]
@@ -108,7 +108,7 @@ class ParquetTable(Table):
 
 @lru_cache(maxsize=100_000)
 def piece_of(tag: str) -> int:
-    """The piece of a tag: that of its loop, which is what stands before its last point, stroke or colon."""
+    """The piece of a tag: that of its loop, which is the part before its last point, stroke or colon."""
     loop = tag[: max(tag.rfind(mark) for mark in "./:|")] or tag
     return zlib.crc32(loop.encode("utf-8")) % PIECES
 
@@ -119,7 +119,7 @@ def open_parquet(path: Path) -> ParquetTable:
     Raises
     ------
     InputError
-        The file is no Parquet, is cut short, or holds no rows.
+        The file is not Parquet, is truncated, or has no rows.
     """
     try:
         with pq.ParquetFile(path) as file:
@@ -149,13 +149,13 @@ def open_parquet(path: Path) -> ParquetTable:
 
 
 def _encoded_bytes(footer: pq.FileMetaData) -> int:
-    """Size of all column chunks as the footer declares them, which padding between them adds nothing to [bytes]."""
+    """Size of all column chunks as declared in the footer, without padding [bytes]."""
     groups = (footer.row_group(k) for k in range(footer.num_row_groups))
     return sum(g.column(j).total_compressed_size for g in groups for j in range(footer.num_columns))
 
 
 def _require_short_texts(path: Path, schema: pa.Schema) -> None:
-    """Raise InputError where many rows share long texts through a dictionary: decoded they take gigabytes."""
+    """Raise InputError if many rows share long texts through a dictionary: decoded they need gigabytes."""
     names = [f.name for f in schema if is_text(f.type)]
     with contextlib.suppress(pa.ArrowException, OSError), pq.ParquetFile(path, read_dictionary=names) as file:
         footer = file.metadata
@@ -173,9 +173,9 @@ def _require_short_texts(path: Path, schema: pa.Schema) -> None:
 
 
 def _check_pages(path: Path) -> None:
-    """Raise InputError for a file whose pages, damaged, are read without end; other damage shows where it is read.
+    """Raise InputError for a file with damaged pages that would be read endlessly; other damage appears on reading.
 
-    The read is left to a thread, which ends with the process: nothing else stops it.
+    The read runs in a thread, which ends with the process: nothing else stops it.
     """
     reading = threading.Thread(target=_read_through, args=(path,), daemon=True)
     reading.start()
@@ -192,8 +192,8 @@ def _read_through(path: Path) -> None:
 
 
 def _longest_text(footer: pq.FileMetaData) -> float:
-    """Mean length of the longest texts that a column has in a row group, as the footer declares them [bytes]; 0 where
-    none has much text."""
+    """Mean length of the longest texts of a column in a row group, as declared in the footer [bytes]; 0 without much
+    text."""
     texts = [j for j in range(footer.num_columns) if footer.schema.column(j).physical_type == "BYTE_ARRAY"]
     groups = [footer.row_group(k) for k in range(footer.num_row_groups)]
     sizes = [(g.column(j).total_uncompressed_size, g.num_rows) for g in groups for j in texts]
@@ -202,30 +202,30 @@ def _longest_text(footer: pq.FileMetaData) -> float:
 
 @lru_cache(maxsize=OPEN_FILES)
 def _opened_once(path: Path, changed_ns: int, process: int) -> pq.ParquetFile:
-    return pq.ParquetFile(path)  # not mapped: pages of a file that stays open would stay in memory
+    return pq.ParquetFile(path)  # not mapped: pages of an open file would stay in memory
 
 
 def _opened(path: Path) -> pq.ParquetFile:
-    """The file, opened once by each process: of a footer with thousands of columns that takes as long as a loop."""
+    """The file, opened once per process: opening a footer with thousands of columns takes as long as a loop."""
     return _opened_once(path, path.stat().st_mtime_ns, os.getpid())
 
 
 def converted(table: Sheet | ParquetTable, tag: int, place: Path) -> ParquetTable:
-    """Stream a table into Parquet, or take up what an earlier process has streamed of the same.
+    """Stream a table into Parquet, or use the copy of an earlier process.
 
     Parameters
     ----------
     table : Sheet or ParquetTable
-        Text, or a long Parquet file, of which each loop's read would decode all.
+        Text, or a long Parquet file, which would otherwise be decoded fully for each loop.
     tag : int
         Column of the tags of a long table, -1 for a wide one.
     place : Path
-        Where the files are laid.
+        Folder of the files.
 
     Raises
     ------
     InputError
-        The disk has no room, or the text cannot be read.
+        The disk is full, or the text cannot be read.
     """
     mark = hashlib.blake2b(ends_of(table.path), digest_size=16)
     mark.update(repr((table.path.name, table, tag, version("loop-triage"))).encode())
@@ -248,19 +248,19 @@ def converted(table: Sheet | ParquetTable, tag: int, place: Path) -> ParquetTabl
 
 
 def holds_copies(place: Path) -> bool:
-    """Whether a directory of copies holds a whole one."""
+    """Whether a directory of copies has a complete one."""
     return any(place.glob(f"{NAMED}*/{DONE}"))
 
 
 def forget_halves(place: Path) -> None:
-    """Remove what a process that died left half done in a directory of copies."""
+    """Remove incomplete copies of a terminated process from a directory."""
     for left in place.iterdir():
         if left.is_dir() and not (left / DONE).exists():
             shutil.rmtree(left, ignore_errors=True)
 
 
 def _said(folder: Path) -> Said | None:
-    """What a whole copy says of itself; None where there is none, or a file of it lost its end with the power."""
+    """Description of a complete copy; None where there is none, or a file lost its end in a power failure."""
     try:
         found = json.loads((folder / DONE).read_text(encoding="utf-8"))
         for path in folder.glob("*.parquet"):
@@ -271,7 +271,7 @@ def _said(folder: Path) -> Said | None:
 
 
 def _laid(table: Sheet | ParquetTable, tag: int, folder: Path) -> Said:
-    """Lay a copy into a folder, which is there once it is whole."""
+    """Write a copy to a folder, which exists once it is complete."""
     room = table.path.stat().st_size * (1 if isinstance(table, Sheet) else 4)
     if shutil.disk_usage(folder.parent).free < room:
         seen = f"{table.path}: no room for a copy of {room / 1e9:.1f} GB in {folder.parent}"
@@ -289,8 +289,8 @@ def _laid(table: Sheet | ParquetTable, tag: int, folder: Path) -> Said:
 
 
 def _sheet_parted(tag: int, folder: Path, sheet: Sheet, texts: Collection[int]) -> tuple[int, int, list[str]]:
-    """How many lines of a sheet were rows and how many were left out, and the tags."""
-    for left in folder.glob("*.parquet"):  # of a pass that was begun anew
+    """Number of lines of a sheet that were rows and that were left out, and the tags."""
+    for left in folder.glob("*.parquet"):  # of an earlier pass
         left.unlink()
     left_out: list[int] = []
     with csv.open_csv(sheet.path, **reading(sheet, left_out, {*texts, tag} - {-1})) as reader:
@@ -300,14 +300,14 @@ def _sheet_parted(tag: int, folder: Path, sheet: Sheet, texts: Collection[int]) 
 
 
 def _decoded(path: Path) -> Iterator[list[pa.Array]]:
-    """The rows of a Parquet file, dictionaries decoded: their batches are not of one type."""
+    """The rows of a Parquet file with decoded dictionaries, because their batches have different types."""
     with pq.ParquetFile(path) as file:
         for batch in file.iter_batches(batch_size=BATCH_ROWS):
             yield [a.dictionary_decode() if pa.types.is_dictionary(a.type) else a for a in batch.columns]
 
 
 def _parted(batches: Iterable[list[pa.Array]], tag: int, folder: Path) -> tuple[int, list[str]]:
-    """Lay rows into the files of their pieces; how many they are, and the tags in the order in which they are met."""
+    """Write rows to the files of their pieces; return their number, and the tags in order of first occurrence."""
     rows, tags = 0, dict[str, None]()
     held = defaultdict[int, list[pa.RecordBatch]](list)
     writers: dict[int, pq.ParquetWriter] = {}
@@ -333,7 +333,7 @@ def _parted(batches: Iterable[list[pa.Array]], tag: int, folder: Path) -> tuple[
 
 
 def _by_piece(batch: pa.RecordBatch, tag: int, tags: dict[str, None]) -> Iterator[tuple[int, pa.RecordBatch]]:
-    """The rows of each piece, all of a wide table of one; the tags that they hold are added to `tags`."""
+    """The rows of each piece, all in one for a wide table; their tags are added to `tags`."""
     if batch.num_rows == 0:
         return
     if tag < 0:

@@ -1,4 +1,4 @@
-"""The plant's clock: dates, midnights and times of day in its time zone; all else counts seconds of UTC."""
+"""The plant's clock: dates, midnights and times of day in its time zone; everything else counts seconds of UTC."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ HOUR_S, DAY_S = 3600.0, 86400.0
 
 
 def zone_of(name: str | None) -> ZoneInfo:
-    """The time zone of a name, UTC where there is none.
+    """The time zone of a name, UTC without a name.
 
     Raises
     ------
     InputError
-        Where no such zone is known here.
+        The zone is not known here.
     """
     try:
         return ZoneInfo(name or UTC_NAME)
@@ -44,7 +44,7 @@ def stamp(at_s: float, zone: str | None) -> str:
 
 
 def utc_seconds(at: datetime, zone: str | None) -> float:
-    """A time of the plant's clock [s since 1970-01-01 UTC]; of an hour that stands twice the first one."""
+    """A time of the plant's clock [s since 1970-01-01 UTC]; in a repeated hour the first one."""
     return (at if at.tzinfo is not None else at.replace(tzinfo=zone_of(zone))).timestamp()
 
 

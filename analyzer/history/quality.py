@@ -1,8 +1,7 @@
-"""Quality of samples: which columns hold codes of it, what scheme they follow, and which samples are not good.
+"""Quality of samples: columns of quality codes, their scheme, and which samples are not good.
 
-OPC DA: the low byte is 192 and above where good, 64 to 127 uncertain, below 64 bad. OPC UA: the two highest
-of 32 bits are 00 good, 01 uncertain, 10 bad. Confidence (0 to 100): good from 50. Uncertain samples are not
-used.
+OPC DA: the low byte is 192 and above where good, 64 to 127 uncertain, below 64 bad. OPC UA: the two highest of 32
+bits are 00 good, 01 uncertain, 10 bad. Confidence (0 to 100): good from 50. Uncertain samples are not used.
 """
 
 from __future__ import annotations
@@ -25,20 +24,20 @@ QUALITY_OF = (
     re.compile(rf"^(?P<tag>.+?)[ ._:/|#-]?\(?(?:{any_of('quality')})\)?$", re.IGNORECASE),
     re.compile(rf"^(?:{any_of('quality')})(?: of)?[ ._:/|#-]*[(\[]?(?P<tag>.+?)[)\]]?$", re.IGNORECASE),
 )
-"""Names of quality columns that hold the tag's, in front or behind."""
+"""Names of quality columns that include the tag, as prefix or suffix."""
 GOOD, BAD, NOT_BAD, IS_BAD = (
     frozenset(WORDS["quality"][kind]) for kind in ("good", "bad", "not_bad", "is_bad")
 )
 DA_GOOD, UA_UNCERTAIN, CONFIDENCE_GOOD, CONFIDENCE_FULL = 192, 0x40000000, 50, 100
 PCS7_GOOD = 0x80
 INTERPOLATED = 0x00020000
-"""Flag of OPC historical access beside the DA code in the low byte."""
+"""Flag of OPC historical access next to the DA code in the low byte."""
 FLAGGED_INTERPOLATED = "samples are flagged as interpolated, not recorded"
 HEXADECIMAL = re.compile(r"^\s*0[xX][0-9a-fA-F]{1,8}\s*$")
 
 
 class Scheme(StrEnum):
-    """How the codes of one quality column are meant."""
+    """Meaning of the codes of one quality column."""
 
     TEXT = "texts such as Good and Bad"
     DA = "OPC DA codes, 192 and above good"
@@ -61,19 +60,19 @@ IS_GOOD: Mapping[Scheme, Callable[[Codes], NDArray[np.bool_]]] = {
     Scheme.PCS7: lambda code: (code >= PCS7_GOOD) & (code < 0x100),
     Scheme.IGNITION: lambda code: (code >= DA_GOOD) & (code < 0x100),
 }
-"""Which numbers are good; what is no number is good in none."""
+"""Which numbers are good; a text that is no number is good in none."""
 
 
 def ones_prevail(columns: Iterable[pa.Array]) -> bool:
-    """Whether of the codes 0 and 1 in some columns' rows most are 1."""
+    """Whether most of the codes 0 and 1 in some columns' rows are 1."""
     number = np.concatenate([np.empty(0), *(_numbers(codes) for codes in columns)])
     return bool((number == 1).sum() > (number == 0).sum())
 
 
 def scheme_of(name: str, codes: pa.Array, ones: bool | None = None) -> Scheme:
-    """Decide by the column's name and all the codes that occur in it.
+    """Determine the scheme from the column's name and all codes in it.
 
-    `ones` is whether of the codes 0 and 1 most are 1, as `ones_prevail` has it of more rows; None: of these.
+    `ones` : whether most of the codes 0 and 1 are 1, from `ones_prevail` over more rows; None: from these codes.
     """
     number, name = _numbers(codes), plain(name)
     known = number[np.isfinite(number)].astype(np.int64)
@@ -101,10 +100,10 @@ def scheme_of(name: str, codes: pa.Array, ones: bool | None = None) -> Scheme:
 def not_good(
     codes: pa.Array, scheme: Scheme, good: tuple[str, ...] | None
 ) -> tuple[NDArray[np.bool_], Counter[str]]:
-    """Samples that the historian does not call good, shape (n,), and how often each such code was met.
+    """Samples that are not good according to the historian, shape (n,), and the count of each such code.
 
-    `good` are codes or texts that count as good whatever the scheme says, None where the scheme counts; a blank is
-    bad, but where codes stand only where something is wrong.
+    `good` are codes or texts that count as good in any scheme, None: as in the scheme; a blank is bad, unless codes
+    are written only for errors.
     """
     kinds, place, count = distinct(codes)
     names = kinds.to_pylist()
@@ -127,12 +126,12 @@ def not_good(
 def quality_columns(
     table: Table, free: Sequence[int], stated: Collection[str] = ()
 ) -> tuple[dict[int, int], list[str]]:
-    """Value column to quality column of a wide table, by position, and sentences on such as are not understood.
+    """Value column to quality column of a wide table, by position, and sentences on columns that are not understood.
 
-    `free` are the columns that are not the time's; `stated` are names of tags, which hold no quality.
+    `free` are the columns other than the time's; `stated` are names of tags, which are not quality.
 
-    A quality column is named for its tag (FIC101.PV_Q, Qual FIC101.PV), or stands right of its values under a bare
-    name that comes several times (Status), or is the only one of its kind and speaks for the whole row.
+    A quality column is named after its tag (FIC101.PV_Q, Qual FIC101.PV), or is right of its values under a repeated
+    bare name (Status), or is the only one of its kind and applies to the whole row.
     """
     names = table.names
     by_name = {names[i]: i for i in reversed(free)}
@@ -141,7 +140,7 @@ def quality_columns(
     found = {tag: i for tag, i in found.items() if names[i] not in stated}
     bare = [i for i in free if plain(names[i]) in COLUMNS["quality"] and i not in found.values()]
     bare = [i for i in bare if names[i] not in stated]
-    if len(bare) > 1:  # an error of the loop, say, is a signal
+    if len(bare) > 1:  # e.g. an error of the loop is a signal
         bare = [i for i in bare if not _has_fractions(table, i)]
     values = [i for i in free if i not in bare and i not in found.values()]
     if len(bare) > 1:
@@ -156,7 +155,7 @@ def quality_columns(
 
 
 def _tag_of(name: str, others: Mapping[str, int]) -> str | None:
-    """The other column that a quality column is named for."""
+    """The other column after which a quality column is named."""
     if len(name) > HISTORY.name_length:
         return None
     tags = (match["tag"] for pattern in QUALITY_OF if (match := pattern.match(name)) is not None)
@@ -164,15 +163,15 @@ def _tag_of(name: str, others: Mapping[str, int]) -> str | None:
 
 
 def _has_fractions(table: Table, i: int) -> bool:
-    """Whether a column holds numbers that are not whole."""
+    """Whether a column has numbers that are not whole."""
     held = table.head([i])[0].drop_null()
     return pa.types.is_floating(held.type) and not pc.all(pc.equal(held, pc.floor(held))).as_py()
 
 
 def _is_coded(table: Table, i: int) -> bool:
-    """Whether a column named as quality holds codes: few kinds, whole numbers or known texts.
+    """Whether a column named as quality has codes: few kinds, whole numbers or known texts.
 
-    A loop's flow may be called Q.
+    A loop's flow may have the name Q.
     """
     codes = table.head([i])[0].drop_null()
     if len(codes) == 0:
@@ -207,7 +206,7 @@ def _good(kinds: pa.Array, scheme: Scheme) -> NDArray[np.bool_]:
 
 
 def _good_text(text: str) -> bool:
-    """Whether a text is good, or one of the words that commas part is, and none of them is bad."""
+    """Whether a text is good, or has a good word between commas and no bad one."""
     words = [word.strip() for word in re.split(r"[,;|]", text.lower())]
     return BAD.isdisjoint(words) and any(word in GOOD or word.startswith("good") for word in words)
 

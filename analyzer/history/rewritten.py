@@ -1,5 +1,5 @@
-"""Layouts that no table is, laid beside as plain ones: blocks of one tag after another, columns of blanks, and long
-tables whose tags stand in several columns."""
+"""Unusual layouts converted to plain tables: blocks of one tag after another, columns separated by blanks, and long
+tables with tags in several columns."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ BARE_TITLE = re.compile(r"^\"?(?P<tag>[^\s\",;|A-Za-z]*[A-Za-z][^\s\",;|._:/-]*[
 BEHIND = re.compile(r"\W+$")
 STAMPED = re.compile(r"^\s*\"?\d{1,4}[-/. ]\w{1,10}[-/. ]\d{1,4}\b")
 NUMBERED = re.compile(r"^[+-]?\d[\d.:/T+-]*Z?$")
-"""What a row of data begins with: a stamp or a number."""
+"""Beginning of a row of data: a stamp or a number."""
 GAP = re.compile(r"\s{2,}")
 RULE = re.compile(r"^\s*-{3,}(?:\s+-{3,})+\s*$")
 
@@ -27,9 +27,9 @@ Rewrite = Callable[[Iterator[str]], Iterator[Sequence[str]]]
 
 
 def rewritten(path: Path, encoding: str, lines: Sequence[str], place: Path) -> Path | None:
-    """A plain table of a file in one of these layouts, separated by tabs, in UTF-8; None for any other file.
+    """A plain table from a file in one of these layouts, tab-separated, in UTF-8; None for any other file.
 
-    `lines` are the file's first ones, the copy is laid under `place`.
+    `lines` are the file's first ones; the copy is written under `place`.
     """
     filled = [line for line in lines if line.strip()]
     rewrite = _blocks(filled) or _in_parts(filled) or _columns(filled[: 4 * HISTORY.layout_lines])
@@ -46,7 +46,7 @@ def rewritten(path: Path, encoding: str, lines: Sequence[str], place: Path) -> P
 
 
 def _title(line: str) -> str:
-    """The tag that a line stands for as a title over its samples; '' for any other line."""
+    """The tag, if a line is the title above its samples; otherwise ''."""
     if len(line) > HISTORY.name_length:
         return ""
     found = TITLE.match(line) or BARE_TITLE.match(line.strip())
@@ -57,7 +57,7 @@ def _title(line: str) -> str:
 
 
 def _blocks(filled: Sequence[str]) -> Rewrite | None:
-    """How blocks of one tag after another are read, where the first lines are such a block's."""
+    """Reader for blocks of one tag after another, if the first lines are such a block."""
     at = next((k for k, line in enumerate(filled[: HISTORY.layout_lines]) if _title(line)), None)
     if at is None:
         return None
@@ -83,7 +83,7 @@ def _blocks(filled: Sequence[str]) -> Rewrite | None:
 
 
 def _in_parts(filled: Sequence[str]) -> Rewrite | None:
-    """How a long table is read whose tag is a role alone, PV or OP, and whose loop stands in other columns."""
+    """Reader for a long table with only the role, PV or OP, as tag, and the loop in other columns."""
     lines = [line for line in filled if not line.startswith("#")]
     delimiter = max(DELIMITERS, key=lines[0].count) if lines else ""
     head, *rest = list(csv.reader(lines, delimiter=delimiter)) if lines else [[]]
@@ -108,8 +108,8 @@ def _in_parts(filled: Sequence[str]) -> Rewrite | None:
 
 
 def _columns(filled: Sequence[str]) -> Rewrite | None:
-    """How columns that blanks part are read, where the first lines are such columns and hold no delimiter: under a
-    ruled line by its strokes, by two blanks or more, or by one."""
+    """Reader for columns separated by blanks, if the first lines have such columns and no delimiter: below a ruled
+    line by its strokes, by two blanks or more, or by one."""
     if len(filled) < 4 or any(d in line for d in DELIMITERS for line in filled[:4]):
         return None
     rule = next((line for line in filled[: HISTORY.layout_lines] if RULE.match(line)), "")
@@ -132,8 +132,8 @@ def _columns(filled: Sequence[str]) -> Rewrite | None:
 
 
 def _words(filled: Sequence[str]) -> Rewrite | None:
-    """How a table is read whose columns are parted by one blank, below a header as wide or, where a stamp is a date
-    and a time of day under one name, a word narrower."""
+    """Reader for columns separated by one blank, below a header of the same width, or one word narrower if a stamp is
+    a date and a time of day under one name."""
     head, *rest = [line.split() for line in filled]
     more = Counter(map(len, rest)).most_common(1)[0][0] - len(head)
     fitting = sum(len(row) == len(head) + more and NUMBERED.match(row[0]) is not None for row in rest)

@@ -1,7 +1,7 @@
-"""Samples of one tag: as they stand in one file, joined into one series, and their span of time.
+"""Samples of one tag: read from one file, joined into one series, and their span of time.
 
-Stamps far from the rest (a clock that was wrong once, a last value from weeks before, a stamp of 1601) would stretch
-a record over years of nothing, so they are set aside and told.
+Stamps far from the rest (a clock error, a last value from weeks before, a stamp of 1601) would extend a record by
+years without data, so they are excluded and reported.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ class Series:
     stamp_s : ndarray of float, shape (n,)
         Time of each sample [s since 1970-01-01 UTC]; in the order of a file NaN where unreadable.
     value : ndarray of float, shape (n,)
-        Values in the tag's own unit; NaN where the export holds no number.
+        Values in the tag's own unit; NaN where the export has no number.
     bad : ndarray of bool, shape (n,)
-        True where the historian says that the value is not good, or where there is no number; of a text tag,
+        True where the historian marks the value as not good, or where there is no number; for a text tag,
         where there is no text.
     text : ndarray of str or None
-        The texts, shape (n,), where the tag is a text tag (controller modes); else None.
+        The texts, shape (n,), for a text tag (controller modes); else None.
     unread : int
-        Values in the export that look like numbers and could not be understood; bad here.
+        Values in the export that look like numbers but could not be read; bad here.
     example : str
         One of them.
     found : Counter
-        What is worth telling: each key completes the sentence "12 ...".
+        Reportable problems: each key completes the sentence "12 ...".
     """
 
     stamp_s: NDArray[np.float64]
@@ -56,7 +56,7 @@ class Series:
     found: Counter[str] = field(default_factory=Counter, repr=False)
 
     def taken(self, index: NDArray[np.generic] | slice) -> Series:
-        """Some of the samples, and nothing of what was found."""
+        """Some of the samples, without the problems found."""
         text = None if self.text is None else self.text[index]
         return Series(
             self.stamp_s[index], self.value[index], self.bad[index], text, self.unread, self.example
@@ -64,7 +64,7 @@ class Series:
 
 
 def joined_pieces(pieces: Sequence[Series]) -> Series:
-    """Join the pieces of one tag (one a file) into one series of strictly rising stamps.
+    """Join the pieces of one tag (one per file) into one series of strictly rising stamps.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def joined_pieces(pieces: Sequence[Series]) -> Series:
 
 
 def _oldest_first(piece: Series, found: Counter[str]) -> Series:
-    """The samples of a file that have a stamp, turned round where they run newest first."""
+    """The samples of a file with a stamp, reversed if the newest is first."""
     readable = np.isfinite(piece.stamp_s)
     if not readable.all():
         found[NO_STAMP] += int((~readable).sum())
@@ -111,7 +111,7 @@ def _end_to_end(pieces: Sequence[Series]) -> Series:
 
 
 def _sorted_by_stamp(joined: Series, origin: NDArray[np.int64], found: Counter[str]) -> Series:
-    """Stable sort by stamp, then the last of each stamp; counts what was met on the way."""
+    """Stable sort by stamp, then the last sample of each stamp; counts the problems found."""
     order = np.argsort(joined.stamp_s, kind="stable")
     within_file = np.diff(origin) == 0
     found[UNORDERED] += int(((np.diff(joined.stamp_s) < 0) & within_file).sum())
@@ -126,12 +126,12 @@ def _sorted_by_stamp(joined: Series, origin: NDArray[np.int64], found: Counter[s
 
 
 class NoStampError(ValueError):
-    """Not one stamp of a file can be read."""
+    """No stamp of a file can be read."""
 
 
 @dataclass(frozen=True, slots=True)
 class MainSpan:
-    """First and last stamp of the samples that belong together [s], and how many lie before and after."""
+    """First and last stamp of the main samples [s], and the number of samples before and after."""
 
     first_s: float
     last_s: float
@@ -139,7 +139,7 @@ class MainSpan:
 
 
 def main_span(stamp_s: NDArray[np.float64]) -> MainSpan:
-    """The span of time in which the samples lie, without stray ones at either end.
+    """The time span of the samples, without stray ones at either end.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def main_span(stamp_s: NDArray[np.float64]) -> MainSpan:
 
 
 def stamp_text(seconds: float) -> str:
-    """A stamp [s since 1970-01-01 UTC] in words; in years where it is beyond any calendar."""
+    """A stamp [s since 1970-01-01 UTC] as text; in years if it is outside the calendar."""
     years = 1970 + seconds / (365.2425 * 86400.0)
     if not 1 <= years < 9999:
         return f"year {years:.0f}"

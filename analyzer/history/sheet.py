@@ -1,4 +1,4 @@
-"""Delimited text: its columns, read only as far as they are asked for."""
+"""Delimited text: its columns, read only as needed."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ LATE_TEXT = re.compile(r"In CSV column #(?P<column>\d+): (?:Row #\d+: )?CSV conv
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sheet(Table):
-    """A file of delimited text and how it is written.
+    """A file of delimited text and its format.
 
     `first_row` is the number of the first row below the header, `bytes` the size of the file. With `as_written` all
-    columns stay text, for dates of a stated format that may look like ISO dates and be none; with `unquoted` quotes
-    are no quotes.
+    columns stay text, for dates of a stated format that look like ISO dates but are not; with `unquoted` quotes have
+    no special meaning.
     """
 
     first_row: int
@@ -42,7 +42,7 @@ class Sheet(Table):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """How the file is written, and the lines of it that do not fit its header."""
+        """Notes on the format of the file, and on the lines that do not match its header."""
         return (*self.found, *_loaded(self)[1])
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
@@ -59,15 +59,15 @@ class Sheet(Table):
 
 @lru_cache(maxsize=KEPT_READS)
 def _loaded(sheet: Sheet) -> tuple[list[pa.Array], list[str]]:
-    """Columns of the whole file by position, and sentences on it."""
+    """Columns of the whole file by position, and notes on it."""
     return read_through(sheet, _parsed_sheet)
 
 
 def read_through(
     sheet: Sheet, read: Callable[[Sheet, Collection[int]], tuple[int, int, Read]]
 ) -> tuple[Read, list[str]]:
-    """What `read` finds in a sheet, beside the numbers of its rows and of lines that it leaves out; and what is to be
-    told of these. Quotes are taken as they stand where so few lines came back that an open one swallowed others.
+    """Result of `read` on a sheet, which also returns the numbers of rows and of lines left out; and notes on these.
+    Quotes lose their meaning if so few lines were returned that an open one must have swallowed others.
 
     Raises
     ------
@@ -93,8 +93,8 @@ def read_through(
 
 
 def _as_far_as_numbers_go(sheet: Sheet, read: Callable[[Sheet, Collection[int]], Read]) -> Read:
-    """What `read` gives of a sheet, begun anew with a column as text where only its first block is all numbers, or in
-    another encoding where a letter late in the file shows it."""
+    """Result of `read` on a sheet, repeated with a column as text if only its first block is all numbers, or in
+    another encoding if a later letter requires it."""
     texts = set[int]()
     while True:
         try:
@@ -112,7 +112,7 @@ def _as_far_as_numbers_go(sheet: Sheet, read: Callable[[Sheet, Collection[int]],
 
 @lru_cache(maxsize=KEPT_READS)
 def _count_lines(path: Path, changed_ns: int) -> int:
-    """Lines of a file that hold anything, within one."""
+    """Number of non-empty lines of a file, within one."""
     count = 0
     with path.open("rb") as file:
         while block := file.read(BLOCK_BYTES):
@@ -128,7 +128,7 @@ def _parsed_sheet(sheet: Sheet, texts: Collection[int]) -> tuple[int, int, list[
 
 
 def types_of(sheet: Sheet) -> tuple[pa.DataType, ...]:
-    """Types of all columns; of a big file those of its first rows, without reading further."""
+    """Types of all columns; for a big file those of its first rows only."""
     if sheet.bytes < HISTORY.whole_bytes:
         return tuple(array.type for array in _loaded(sheet)[0])
     with csv.open_csv(sheet.path, **reading(sheet, [], ())) as reader:
@@ -136,9 +136,9 @@ def types_of(sheet: Sheet) -> tuple[pa.DataType, ...]:
 
 
 def reading(sheet: Sheet, left_out: list[int], texts: Collection[int]) -> dict[str, Any]:
-    """Options of the parser; it adds to `left_out` for each line that does not fit.
+    """Options of the parser; it adds to `left_out` for each line that does not match.
 
-    One thread: the parser calls back for such lines, and from threads of its own that ended processes now and then.
+    One thread: the parser calls back for such lines, and calls from its own threads sometimes crashed processes.
     """
     names = [str(i) for i in range(len(sheet.names))]
 

@@ -1,4 +1,4 @@
-"""How a delimited text is written: encoding, delimiter, decimal mark, and its header, or its columns without one."""
+"""Format of a delimited text: encoding, delimiter, decimal mark, and its header, or its columns without one."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ COMMA_NUMBER = re.compile(r"^[+-]?\d+,\d+(?:[eE][+-]?\d+)?$")
 POINT_NUMBER = re.compile(r"^[+-]?\d*\.\d+(?:[eE][+-]?\d+)?$")
 NUMBER = re.compile(r"^[+-]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?$")
 GROUP = re.compile(r"^[+-]?[1-9]\d{0,2}[.,]\d{3}$")
-"""A number whose mark may be decimal or may group thousands."""
+"""A number whose mark may be a decimal mark or a thousands separator."""
 DATA_MARK = re.compile(r"^\s*\[data\]\s*$", re.IGNORECASE)
 JSON = re.compile(r"^(?:\{\s*[\"}]|\[\s*[\[{\"])")
 STAMP = re.compile(r"^\d{1,4}[-/.]\w{1,9}[-/.]\d{1,4}\b|^\d{1,2}:\d\d\b")
 UNNAMED = "column {}"
-"""Name of a column that has none, by its place, from 1."""
+"""Name of a column without a name, by its position, from 1."""
 QUALITIES = frozenset(WORDS["quality"]["unnamed"])
 
 
 def open_sheet(path: Path, options: ReadOptions) -> Sheet:
-    """Find out how a delimited text is written.
+    """Determine the format of a delimited text.
 
     Raises
     ------
@@ -85,10 +85,10 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
 
 
 def detect_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> tuple[str, str]:
-    """Decimal mark of most numbers with a fraction, a point where there are none; and a word where it may be another.
+    """Decimal mark of most numbers with a fraction, a point without any; and a word if it may be another.
 
-    A mark before three digits in all numbers may group thousands: it does where another mark parts fractions, and
-    where it is the comma of a file whose columns commas part.
+    A mark before three digits in all numbers may be a thousands separator: it is one if another mark separates
+    fractions, and if it is the comma of a comma-separated file.
     """
     cells = [cell.strip() for row in rows for cell in row]
     marked = {",": list(filter(COMMA_NUMBER.match, cells)), ".": list(filter(POINT_NUMBER.match, cells))}
@@ -107,7 +107,7 @@ def detect_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> tuple[str, 
 
 
 def _lines_of_head(path: Path, stated: str | None) -> tuple[str, list[str]]:
-    """Encoding of a text, and the lines of its beginning."""
+    """Encoding of a text, and its first lines."""
     with path.open("rb") as file:
         head = file.read(HISTORY.head_bytes)
     if not head.strip(b"\r\n\t \x00\xef\xbb\xbf\xff\xfe"):
@@ -126,7 +126,7 @@ def _lines_of_head(path: Path, stated: str | None) -> tuple[str, list[str]]:
 
 
 def _after_data_mark(lines: list[str]) -> tuple[list[str], int]:
-    """The first lines behind a mark such as [Data], where there is one, and how many lines stand above them."""
+    """The first lines after a mark such as [Data], if there is one, and the number of lines above them."""
     marks = [k for k, line in enumerate(lines) if DATA_MARK.match(line)]
     above = marks[-1] + 1 if marks else 0
     return lines[above : above + HISTORY.head_lines], above
@@ -141,19 +141,19 @@ def _cells(line: str, delimiter: str) -> list[str]:
 
 
 def _data_lines(lines: Sequence[str]) -> list[str]:
-    """Lines that may hold data: no comments, marks of sections or blanks."""
+    """Lines that may be data: no comments, section marks or blanks."""
     return [line for line in lines if not NO_DATA_LINE.match(line.strip())]
 
 
 def _shape(body: Sequence[str], delimiter: str) -> tuple[int, int]:
-    """How many lines a delimiter parts into the same number of columns, and how many columns; 0 and 0 where none."""
+    """Number of lines that a delimiter splits into the same number of columns, and this number; 0 and 0 if none."""
     widths = Counter(len(row) for row in _split(body, delimiter) if len(row) > 1)
     width, lines = (widths.most_common(1) or [(0, 0)])[0]
     return lines, width
 
 
 def _delimiter(path: Path, lines: Sequence[str]) -> str:
-    """The delimiter that splits most lines into the same number of columns, the header among them."""
+    """The delimiter that splits most lines into the same number of columns, including the header."""
     body = _data_lines(lines)
     shape, best = max(((_shape(body, mark), mark) for mark in DELIMITERS), key=itemgetter(0))
     if shape == (0, 0):
@@ -163,9 +163,9 @@ def _delimiter(path: Path, lines: Sequence[str]) -> str:
 
 
 def _header(path: Path, lines: Sequence[str], delimiter: str) -> tuple[int, list[str]]:
-    """Line number (from 0) and cells of the header: of the lines as wide as the table above its data the first with a
-    name of a time column; else such a line over a row of data, under a preamble that looks like data; else the first
-    of them; else one behind a comment sign. A table without a header has none."""
+    """Line number (from 0) and cells of the header: of the lines above the data with the table's width, the first
+    with a name of a time column; else such a line over a row of data, below a preamble that looks like data; else the
+    first of them; else one after a comment sign. A table without a header has none."""
     width = _shape(_data_lines(lines), delimiter)[1]
     split = ((k, _cells(line, delimiter)) for k, line in enumerate(lines) if _data_lines([line]))
     rows = [(k, cells) for k, cells in split if len(cells) >= max(2, width - 1)]
@@ -187,18 +187,18 @@ def _header(path: Path, lines: Sequence[str], delimiter: str) -> tuple[int, list
 
 
 def _names_all(cells: Sequence[str]) -> bool:
-    """Whether cells are the names of a table's columns: each another, all but one of them filled, one of a time."""
+    """Whether cells are column names: all different, all but one filled, one of them a time."""
     filled = [cell.strip() for cell in cells if cell.strip()]
     return len(filled) >= len(cells) - 1 and len({*filled}) == len(filled) and _names_time(cells)
 
 
 def _names_time(cells: Sequence[str]) -> bool:
-    """Whether one of some cells is the name of a time column; a unit alone is none."""
+    """Whether one of the cells is the name of a time column; a unit alone is not."""
     return any(is_stamp(cell.strip()) and without_unit(cell.strip()) for cell in cells)
 
 
 def _commented(path: Path, lines: Sequence[str], data: int, delimiter: str) -> tuple[int, list[str]]:
-    """A header that stands behind the last comment sign above the data."""
+    """A header after the last comment sign above the data."""
     above = _cells(lines[data - 1].lstrip("# "), delimiter) if data else []
     if len(above) == len(_cells(lines[data], delimiter)) and not _is_data(above):
         return data - 1, above
@@ -217,14 +217,14 @@ def _taken_as(lines: Sequence[str], delimiter: str) -> tuple[str, ...] | None:
     """Names for the columns of a table without a header, of tag, stamp, value and quality or of a stamp and numbers;
     None for any other.
 
-    Only where each of the first rows has the same shape: a stamp, a text that is none of the rest, and a number; or a
-    stamp first and behind it numbers alone, which are named by their places (loops.csv may tell what they are).
+    Each of the first rows must have the same shape: a stamp, a text unlike the rest, and a number; or a stamp first
+    and then only numbers, which are named by their positions (loops.csv may assign them).
     """
     rows = [row for row in _split(lines[: HISTORY.head_lines], delimiter) if row]
     if len(rows) < 3 or len({len(row) for row in rows}) != 1 or len(rows[0]) < 3:
         return None
     columns = [[cell.strip() for cell in column] for column in zip(*rows, strict=True)]
-    # of all columns at once, for the pattern is built anew each time
+    # for all columns at once, because the pattern is built each time
     first = stamps.fields(pa.array([column[0] for column in columns]))
     stamped = repeat(False) if first is None else first.readable.tolist()
     kinds = list(map(_kind_of_column, columns, stamped))
@@ -246,9 +246,9 @@ def _taken_as(lines: Sequence[str], delimiter: str) -> tuple[str, ...] | None:
 
 
 def _kind_of_column(cells: Sequence[str], stamped: bool) -> str:
-    """'stamp', 'number', 'quality' or 'text' for what all cells of a column are; '' where they are not alike.
+    """'stamp', 'number', 'quality' or 'text' if all cells of a column are of that kind; otherwise ''.
 
-    `stamped` says whether the first one can be read as a stamp.
+    `stamped` : whether the first one can be read as a stamp.
     """
     numbers = [float(cell.replace(",", ".")) for cell in cells if NUMBER.match(cell)]
     if NUMBER.match(cells[0]) and len(numbers) >= HISTORY.numbers_share * len(cells):

@@ -1,4 +1,4 @@
-"""How far the cells of a workbook's sheets are spread: a reader holds every cell between the first and the last."""
+"""Spread of the cells in a workbook's sheets: a reader keeps every cell between the first and the last in memory."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from identification.errors import InputError
 CELL = re.compile(rb"<(?:\w+:)?c\b[^>]*?\br=\"([A-Za-z]{1,7})(\d{1,9})\"")
 BLOCK_BYTES = 1 << 20
 LONGEST = 200
-"""Bytes of a cell's first tag at most, which may begin in one block and end in the next."""
+"""Maximum bytes of a cell's first tag, which may begin in one block and end in the next."""
 ROW_RECORD, CELL_RECORDS = 0, 11
-"""Kinds of records of a binary sheet (MS-XLSB): the start of a row, and the last of those of cells."""
+"""Record types of a binary sheet (MS-XLSB): the start of a row, and the last type of a cell."""
 LAST, LONGEST_HEAD = 0x7F, 10
-"""The largest last byte of a number in a record's head; bytes of a head and of the number behind it at most."""
+"""Largest last byte of a number in a record's head; maximum bytes of a head with the number after it."""
 UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, NotImplementedError)
-"""What an archive raises that is damaged, has a password or is packed as none that is known."""
+"""Exceptions for an archive that is damaged, has a password or an unknown compression."""
 
 
 @dataclass(slots=True)
 class Spread:
-    """The last row and column of a sheet that have a cell, the farthest cell, and how many cells there are."""
+    """The last row and column of a sheet with a cell, the farthest cell, and the number of cells."""
 
     name: str
     row: int = 0
@@ -63,7 +63,7 @@ def column_letters(number: int) -> str:
 
 
 def require_dense(path: Path, members: Sequence[zipfile.ZipInfo]) -> None:
-    """Raise InputError where a sheet's cells span far more cells than there are: one stray cell in a far corner."""
+    """Raise InputError if a sheet's cells span far more cells than there are: one stray cell in a far corner."""
     for info in members:
         spreads = next((read for part, read in SHEETS.items() if part.fullmatch(info.filename)), None)
         if spreads is None:
@@ -106,7 +106,7 @@ def _of_records(sheet: IO[bytes], name: str) -> Iterator[Spread]:
 
 
 def _records(sheet: IO[bytes]) -> Iterator[tuple[int, int]]:
-    """Kind of each record, and the number in the four bytes behind its head."""
+    """Type of each record, and the number in the four bytes after its head."""
     kept, at = b"", 0
     while True:
         block = sheet.read(BLOCK_BYTES)
@@ -125,7 +125,7 @@ def _records(sheet: IO[bytes]) -> Iterator[tuple[int, int]]:
 
 
 def _number(data: bytes, at: int, most: int) -> tuple[int, int]:
-    """A number of seven bits a byte, the lowest first, of so many bytes at most, and where the next begins."""
+    """A number of seven bits per byte, lowest first, of at most so many bytes, and the start of the next."""
     number = 0
     for k, byte in enumerate(data[at : at + most]):
         number |= (byte & LAST) << 7 * k
@@ -135,7 +135,7 @@ def _number(data: bytes, at: int, most: int) -> tuple[int, int]:
 
 
 class _OpenDocument:
-    """Handlers of the elements of content.xml: tables, their rows and cells, each of which may stand for many."""
+    """Handlers of the elements of content.xml: tables, their rows and cells, each possibly repeated."""
 
     def __init__(self) -> None:
         self.sheets = [Spread("")]
@@ -143,7 +143,7 @@ class _OpenDocument:
         self._rows = 1
 
     def start(self, element: str, stated: Mapping[str, str]) -> None:
-        """Take a table, a row or a cell."""
+        """Start of a table, a row or a cell."""
         if element == "table:table":
             self.sheets.append(Spread(stated.get("table:name", "")))
             self._row = 0
@@ -157,7 +157,7 @@ class _OpenDocument:
 
 
 def _times(stated: Mapping[str, str], of: str) -> int:
-    """How many rows or columns an element stands for."""
+    """Number of rows or columns that an element represents."""
     text = stated.get(f"table:number-{of}-repeated", "")
     return int(text) if text.isdecimal() and len(text) < 20 else 1
 
@@ -166,7 +166,7 @@ def _of_open_document(sheet: IO[bytes], name: str) -> Iterator[Spread]:
     """The sheets of an ods workbook."""
     found, parser = _OpenDocument(), expat.ParserCreate()
     parser.StartElementHandler = found.start
-    with suppress(expat.ExpatError):  # which its reader tells
+    with suppress(expat.ExpatError):  # which its reader reports
         parser.ParseFile(sheet)
     yield from found.sheets
 
@@ -176,4 +176,4 @@ SHEETS: dict[re.Pattern[str], Callable[[IO[bytes], str], Iterator[Spread]]] = {
     re.compile(r"xl/worksheets/[^/]+\.bin"): _of_records,
     re.compile(r"content\.xml"): _of_open_document,
 }
-"""Parts of an archive that hold sheets, and how their cells are found."""
+"""Parts of an archive with sheets, and the functions that find their cells."""

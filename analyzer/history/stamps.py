@@ -1,6 +1,6 @@
 """Written dates to seconds: one pattern for ISO, either order of day and month, month names, offsets and zones.
 
-Dates of exports, and a time that a person wrote in changes.csv, in loops.csv or on the command line.
+For dates of exports, and for times that a user wrote in changes.csv, in loops.csv or on the command line.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from analyzer.limits import HISTORY
 from identification.errors import InputError
 
 LETTER = r"[^\x00-@\[-`{-\x7f]"
-"""A letter of a month's name: whatever is no other ASCII character. The class of all letters of Unicode would make a
+"""A letter of a month's name: any character except other ASCII ones. The class of all Unicode letters would make a
 pattern that takes a hundred times as long to build, and it is built for each column."""
 PATTERN = (
     r"^\s*(?:(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun)[a-z]*\.?,?\s+)?"
@@ -37,19 +37,19 @@ PATTERN = (
     r"(?:\s*[(\[]?(?P<n>[A-Z][A-Za-z]+/[A-Za-z_/]+|[A-Z][A-Za-z]*\.?(?: [A-Za-z.]+)+)[)\]]?)?\s*$"
 )
 REARRANGED = [(way["written"].replace("LETTER", LETTER), way["meant"]) for way in WORDS["rearranged"]]
-"""Writings that are brought into the form of the pattern, and what they become."""
+"""Formats that are converted to the form of the pattern, and the results."""
 CROATIAN = dict(zip(WORDS["croatian"]["names"], WORDS["croatian"]["months"], strict=True))
 CROATIAN_ALONE = tuple(WORDS["croatian"]["alone"])
 CROATIAN_ZONES = frozenset(WORDS["croatian"]["zones"])
 MONTHS = {begins: int(month) for month, words in WORDS["months"].items() for begins in words}
 LONGEST_MONTH = max(map(len, MONTHS))
 FIRST = {"year": 0, "day": 1, "month": 2}
-"""Orders in which a date can be written, by the part that stands first."""
+"""Orders of a date, by the first part."""
 YEAR, DAY, MONTH = FIRST.values()
 OPEN = 3
-"""The order of a date whose writing leaves it open, for two numbers stand in front."""
+"""The order of an ambiguous date, with two numbers in front."""
 SHOWN = 40
-"""Characters of a time that an error shows."""
+"""Characters of a time in an error message."""
 EXAMPLE = "a time such as 2026-03-09 08:00 or 2026-03-09T08:00:00Z"
 HEADER_ZONE = re.compile(
     r"(?:^|[\s(\[_])(?P<name>(?i:UTC|GMT|Z|CEST|CET|EEST|EET)|[A-Z]{3,5})?"
@@ -67,13 +67,13 @@ SEVERAL = frozenset(WORDS["zone_letters"]["several"])
 
 @lru_cache
 def offsets_h(timezone: str | None) -> Mapping[str, float]:
-    """Hours east of Greenwich by letters, those of a stated zone among them as it means them."""
+    """Hours east of Greenwich by letters, including those of a stated zone in its own meaning."""
     return {**OFFSETS_H, **own_letters(timezone)}
 
 
 @lru_cache
 def own_letters(timezone: str | None) -> Mapping[str, float]:
-    """What a zone's clock calls itself in winter and summer, and its hours east of Greenwich then."""
+    """Abbreviations of a zone in winter and summer, and its hours east of Greenwich then."""
     if timezone is None:
         return {}
     days = [datetime(datetime.now().year, month, 1, tzinfo=ZoneInfo(timezone)) for month in (1, 7)]
@@ -83,7 +83,7 @@ def own_letters(timezone: str | None) -> Mapping[str, float]:
 
 def named_zone(text: str) -> str | None:
     """The zone at the end of a stamp or a column's name, as in '[Europe/Berlin]' or 'W. Europe Standard Time'; None
-    where none is known there."""
+    if no known zone is there."""
     worded = WORDED_ZONE.search(text[-60:])
     for k in range(len(words := worded["words"].split(" ")) if worded is not None else 0):
         if (zone := ZONE_WORDS.get(" ".join(words[k:]).lower())) is not None:
@@ -96,9 +96,9 @@ def named_zone(text: str) -> str | None:
 
 
 def header_zone(name: str, timezone: str | None = None) -> tuple[float | None, str]:
-    """The offset from UTC that a time column's name states, as in 'Time (UTC+01:00)' [s]; None where none, or where
-    it is what the stated zone calls itself, which may change within the export. And letters there that mean several
-    zones; '' where there are none, or a zone is stated."""
+    """The offset from UTC in a time column's name, as in 'Time (UTC+01:00)' [s]; None if there is none, or if it is
+    an abbreviation of the stated zone, which may change within the export. And letters there that mean several zones;
+    '' if there are none, or a zone is stated."""
     if plain(name) in ("utc", "timeutc", "utctime"):
         return 0.0, ""
     found = HEADER_ZONE.search(name[-40:])
@@ -116,8 +116,8 @@ def header_zone(name: str, timezone: str | None = None) -> tuple[float | None, s
 class Fields:
     """Parts of written stamps, arrays of shape (n,); `a`, `b`, `c` the date's parts in the order written.
 
-    `order` is each stamp's own: one file may hold stamps of several writings. `stated` is True where a stamp states
-    its zone, `short` where a year that stands last has two digits at most.
+    `order` is that of each stamp, because one file may have several formats. `stated` is True where a stamp states
+    its zone, `short` where the last part is a year of at most two digits.
     """
 
     a: NDArray[np.int64]
@@ -132,20 +132,20 @@ class Fields:
 
     @property
     def open(self) -> NDArray[np.bool_]:
-        """Where the writing leaves open which number is the day."""
+        """Where it is ambiguous which number is the day."""
         return np.asarray(self.readable & (self.order == OPEN))
 
     @property
     def year_may_begin(self) -> NDArray[np.bool_]:
-        """Where a year of two digits may stand in front: 24-11-21 as 21 November 2024."""
+        """Where a year of two digits may be first: 24-11-21 as 21 November 2024."""
         fits = (self.b >= 1) & (self.b <= 12) & (self.c >= 1) & (self.c <= 31)
         return np.asarray(self.open & self.short & fits)
 
 
 def fields(texts: pa.Array, timezone: str | None = None) -> Fields | None:
-    """Take written stamps apart, shape (n,); None where not one of them can be read.
+    """Parse written stamps, shape (n,); None if none of them can be read.
 
-    Letters behind stamps mean what they mean in the stated zone (IANA name), else what they mean everywhere.
+    Letters after stamps have their meaning in the stated zone (IANA name), else their general meaning.
     """
     parts = pc.extract_regex(texts, PATTERN)
     if parts.null_count > texts.null_count:
@@ -177,7 +177,7 @@ def _numpy(array: pa.Array) -> NDArray[Any]:
 
 
 def _readable(parts: pa.Array, part: dict[str, pa.Array], known: Mapping[str, float]) -> NDArray[np.bool_]:
-    """Stamps that the pattern knows, and whose zone is none of letters or words that mean nothing."""
+    """Stamps that match the pattern, without unknown letters or words as zone."""
     letters = pc.match_substring_regex(part["z"], "^[A-Z]+$")
     meant = pc.or_(pc.invert(letters), pc.is_in(pc.utf8_lower(part["z"]), value_set=pa.array(known)))
     told = pc.and_(pc.is_valid(parts), meant)
@@ -193,7 +193,7 @@ def _readable(parts: pa.Array, part: dict[str, pa.Array], known: Mapping[str, fl
 def stamp_seconds(parts: Fields, first: str = "month") -> NDArray[np.float64]:
     """Seconds since 1970-01-01 of the stamps, offsets removed; NaN where unreadable or no such date.
 
-    `first` (of `FIRST`) stands first in dates whose writing leaves it open.
+    `first` (of `FIRST`) is the first part of ambiguous dates.
     """
     order = np.where(parts.order == OPEN, FIRST[first], parts.order)
     year = np.where(order == YEAR, parts.a, parts.c)
@@ -210,7 +210,7 @@ def stamp_seconds(parts: Fields, first: str = "month") -> NDArray[np.float64]:
 
 
 def midnights_told(second: NDArray[np.float64], parts: Fields) -> NDArray[np.float64]:
-    """Stamps of one file [s], whose 24:00 ends its day, or begins it where only so the stamps run on."""
+    """Stamps of one file [s]; 24:00 is the end of its day, or its beginning if only then the stamps increase."""
     midnight = parts.clock_s == 86400.0
     if not midnight.any():
         return second
@@ -221,7 +221,7 @@ def midnights_told(second: NDArray[np.float64], parts: Fields) -> NDArray[np.flo
 
 
 def _written_order(part: dict[str, pa.Array]) -> NDArray[np.int8]:
-    """The order of each stamp, as far as its writing tells."""
+    """The order of each stamp, as far as it is unambiguous."""
     digits_a, digits_b = (_numpy(pc.utf8_is_digit(part[name])) for name in "ab")
     long_a = _numpy(pc.equal(pc.utf8_length(part["a"]), 4))
     written = np.select([long_a & digits_a, ~digits_a, ~digits_b], [YEAR, MONTH, DAY], OPEN)
@@ -233,7 +233,7 @@ def _whole_numbers(texts: pa.Array) -> NDArray[np.int64]:
 
 
 def _number_or_month(texts: pa.Array, timezone: str | None) -> NDArray[np.int64]:
-    """Numbers, and months by their names; 0 for what is neither."""
+    """Numbers, and months by their names; 0 for others."""
     if pc.all(pc.or_(pc.utf8_is_digit(texts), pc.equal(texts, ""))).as_py():
         return _whole_numbers(texts)
     kinds = pc.dictionary_encode(texts)
@@ -250,8 +250,8 @@ def _month(name: str, known: Mapping[str, int]) -> int:
 
 
 def _clock(part: dict[str, pa.Array]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Time of day [s], 12 h clocks by their first letter; and where a clock shows it, midnight of a
-    day's end and leap seconds among them."""
+    """Time of day [s], 12 h clocks by their first letter; and where it is valid, including midnight at the end of a
+    day and leap seconds."""
     hour, minute, second = (_whole_numbers(part[name]) for name in "hms")
     letter = pc.utf8_lower(part["p"])
     noon = _numpy(pc.equal(letter, "p"))
@@ -274,23 +274,23 @@ def _offset(zone: pa.Array, known: Mapping[str, float]) -> NDArray[np.float64]:
 
 
 def parse_time(text: str, where: str, zone: str = UTC_NAME, day_first: bool | None = None) -> float:
-    """A time that a person wrote as seconds since 1970-01-01 UTC; one that states no zone is of the plant's clock.
+    """A time written by a user as seconds since 1970-01-01 UTC; without a stated zone on the plant's clock.
 
     Parameters
     ----------
     text : str
-        ISO, or as exports write stamps; dates with points have the day first.
+        ISO, or a format of exports; dates with points have the day first.
     where : str
-        Place in the message of an error.
+        Location for the error message.
     zone : str
         The plant's time zone.
     day_first : bool or None
-        Order of dates such as 03/04/2026; None: unknown, and such dates are refused.
+        Order of dates such as 03/04/2026; None: unknown, and such dates are rejected.
 
     Raises
     ------
     InputError
-        It is no time, could be read two ways, or lies outside 1970 to 2099.
+        It is no time, is ambiguous, or is outside 1970 to 2099.
     """
     return float(parse_times([text], [where], zone, day_first)[0])
 
@@ -298,7 +298,7 @@ def parse_time(text: str, where: str, zone: str = UTC_NAME, day_first: bool | No
 def parse_times(
     texts: Sequence[str], where: Sequence[str], zone: str = UTC_NAME, day_first: bool | None = None
 ) -> NDArray[np.float64]:
-    """The same of one or more times at once, shape (n,); the first that is none, or reads two ways, is refused."""
+    """The same for one or more times at once, shape (n,); the first invalid or ambiguous one raises."""
     trimmed = [text.strip() for text in texts]
     parts = fields(pa.array(trimmed, pa.string()))
 

@@ -1,4 +1,4 @@
-"""A file of named columns, whatever its format, what historians call them, and what a user may state about it."""
+"""A file of named columns in any format, the column names of historians, and options that a user may state."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from analyzer.limits import HISTORY
 from identification.errors import InputError
 
 HEAD_ROWS = 1000
-"""Rows by which a table is known before it is read."""
+"""Rows from which a table's format is detected."""
 WORDS: dict[str, Any] = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
 INTERVAL = re.compile(r"^\s*(?P<number>\d+(?:[.,]\d+)?)\s*(?P<unit>[A-Za-zµμ]*)\s*$")
 UNITS_S = {unit: scale["unit_s"] for unit, scale in WORDS["since_start"].items()}
@@ -31,7 +31,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {kind: tuple(names) for kind, names in WOR
 
 @dataclass(frozen=True, slots=True)
 class ReadOptions:
-    """How exports are written; None means: find out from the file.
+    """Format of exports; None means: detect from the file.
 
     Parameters
     ----------
@@ -42,17 +42,17 @@ class ReadOptions:
     date_format : str or None
         Format of the stamps in the notation of `datetime.strptime`.
     timezone : str or None
-        IANA name of the zone of stamps that state none; None takes them as UTC.
+        IANA name of the zone of stamps that state none; None: UTC.
     interval : str or None
         Time between rows, such as 30s or 5 min, of a table whose stamps do not advance.
     time_column, quality_column : str or None
-        Names of the columns of stamps and, in long tables, of quality codes as they stand in the header.
+        Names of the columns of stamps and, in long tables, of quality codes as in the header.
     good_quality : tuple of str or None
-        Quality codes or texts that count as good, in place of the detected scheme.
+        Quality codes or texts that count as good, instead of the detected scheme.
     stated : frozenset of str
-        Tags that loops.csv states: columns of these names hold neither stamps nor quality codes.
+        Tags stated in loops.csv: columns of these names contain neither stamps nor quality codes.
     scratch : Path or None
-        Directory for plain copies of packed files; None: this process's own, gone with it.
+        Directory for plain copies of packed files; None: a temporary one of this process.
     """
 
     delimiter: str | None = None
@@ -70,7 +70,7 @@ class ReadOptions:
 
     @property
     def interval_s(self) -> float:
-        """The stated time between rows [s], 0 where none is stated. Raises InputError where it is no such time."""
+        """The stated time between rows [s], 0 if none is stated. Raises InputError for an invalid one."""
         if self.interval is None:
             return 0.0
         found = INTERVAL.match(self.interval)
@@ -85,7 +85,7 @@ class ReadOptions:
 
     @property
     def place(self) -> Path:
-        """Where copies are laid."""
+        """Folder for copies."""
         return self.scratch or own_scratch()
 
 
@@ -93,11 +93,11 @@ class ReadOptions:
 class Table(ABC):
     """Columns of a file by position; `read` touches no other column.
 
-    `path` is the file, `names` and `types` are of its columns, `found` what was found out about its format,
-    `decimal` the mark in numbers that stand among texts, `first_row` the number of the first row of data as
-    an editor counts them (None for binary files), `tags` the tags of a long table in the order in which they were
-    met, where these are known. What was found out does not tell two tables of one file apart, so that a read that is
-    kept serves both; and its `repr` says how a file is written, not where it lies or when it came there.
+    `path` is the file, `names` and `types` are of its columns, `found` are notes on its format, `decimal` the mark in
+    numbers among texts, `first_row` the number of the first row of data as an editor counts them (None for binary
+    files), `tags` the tags of a long table in order of first occurrence, if known. `found` does not distinguish two
+    tables of one file, so that a cached read serves both; and its `repr` describes the format of a file, not its
+    place or date.
     """
 
     path: Path = field(repr=False)
@@ -110,7 +110,7 @@ class Table(ABC):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is to be told of the format."""
+        """Notes on the format."""
         return self.found
 
     @abstractmethod
@@ -119,15 +119,15 @@ class Table(ABC):
 
     @abstractmethod
     def read(self, columns: Sequence[int], where: tuple[int, Sequence[str]] | None = None) -> list[pa.Array]:
-        """Whole columns, or only the rows where column `where[0]` holds one of `where[1]`."""
+        """Whole columns, or only the rows where column `where[0]` contains one of `where[1]`."""
 
     def each(self, columns: Sequence[int]) -> Iterator[list[pa.Array]]:
-        """Whole columns, piece by piece where the table lies in several files."""
+        """Whole columns, piece by piece if the table is in several files."""
         yield self.read(columns)
 
 
 def any_of(kind: str) -> str:
-    """A pattern of any word of a kind in the name of a column, between the marks of a group."""
+    """A pattern of all words of a kind in column names, without an enclosing group."""
     return "|".join(WORDS["in_names"][kind])
 
 
@@ -137,18 +137,18 @@ def plain(name: str) -> str:
 
 
 def first_named(names: Sequence[str], wanted: Iterable[str]) -> int | None:
-    """Index of the column whose plain name comes first in `wanted`, or None."""
+    """Index of the column whose plain name is the first match in `wanted`, or None."""
     plains = [plain(name) for name in names]
     return next((plains.index(name) for name in wanted if name in plains), None)
 
 
 def stated_column(path: Path, names: Sequence[str], stated: str, kind: str) -> int:
-    """Index of the column that the user names as that of a kind, time or quality.
+    """Index of the column that the user states as that of a kind, time or quality.
 
     Raises
     ------
     InputError
-        There is none of that name.
+        There is no column of that name.
     """
     if stated not in names:
         seen = f"{path}: no column '{stated}' among {', '.join(names[:8])}"
@@ -158,14 +158,14 @@ def stated_column(path: Path, names: Sequence[str], stated: str, kind: str) -> i
 
 
 def check_once(path: Path, names: Sequence[str]) -> None:
-    """Raise InputError where a column's name stands twice, for then its tag is not clear."""
+    """Raise InputError for duplicate column names, because their tag is ambiguous."""
     name, count = max(Counter(names).items(), key=lambda item: item[1], default=("", 1))
     if count > 1:
         raise InputError(f"{path}: column '{name}' stands twice", "each tag once", "rename or remove one")
 
 
 def is_text(kind: pa.DataType) -> bool:
-    """True for the types that hold text."""
+    """True for types of text."""
     if pa.types.is_dictionary(kind):
         return is_text(kind.value_type)
     return str(kind) in ("string", "large_string", "string_view")
@@ -187,7 +187,7 @@ def numbers(column: pa.Array) -> NDArray[np.float64]:
 
 
 def distinct(column: pa.Array) -> tuple[pa.Array, NDArray[np.int64], NDArray[np.int64]]:
-    """The distinct cells of a column, an empty one last; where each cell is among them; and how often each comes."""
+    """The distinct cells of a column, an empty one last; the index of each cell among them; and their counts."""
     encoded = column if pa.types.is_dictionary(column.type) else pc.dictionary_encode(column)
     kinds = pa.concat_arrays([encoded.dictionary, pa.nulls(1, encoded.dictionary.type)])
     place = pc.fill_null(encoded.indices, len(kinds) - 1).to_numpy(zero_copy_only=False)
@@ -200,7 +200,7 @@ def one_array(column: pa.Array | pa.ChunkedArray) -> pa.Array:
 
 
 def trimmed(column: pa.Array | pa.ChunkedArray, unquoted: bool) -> pa.Array:
-    """A column of delimited text in one piece; texts trimmed, of quotes too where those were taken as they stand."""
+    """A column of delimited text in one piece, trimmed, also of quotes if these have no special meaning."""
     array = one_array(column)
     if not pa.types.is_string(array.type):
         return array

@@ -1,4 +1,4 @@
-"""Finding the time columns of a table and deciding how they are written."""
+"""Detection of the time columns of a table and of their format."""
 
 from __future__ import annotations
 
@@ -46,18 +46,18 @@ from analyzer.limits import HISTORY
 from identification.errors import InputError
 
 DAY_FIRST_ZONES = ("Europe/", "Africa/", "Australia/", "Asia/")
-"""Zones in which dates have the day first where figures alone would read either way."""
+"""Zones in which ambiguous dates have the day first."""
 TIME_OF_DAY = r"^\s*\d{1,2}(:\d\d(:\d\d([.,;]\d+)?)?|\.\d\d\.\d\d([.,]\d+)?)\s*([AaPp]\.?[Mm]\.?)?\s*$"
 LIKE_STAMP = re.compile(
     r"\d[-/. ]\.?\s*\w{1,12}[-/. ,]|\d:\d\d|[^\W\d]{3}\.? \d{1,2}\b|^\s*\d{8}|\d\.\d\d\.\d\d|\d[年년]"
 )
 LETTERS_BEHIND = re.compile(r"\b([A-Z]{3,5})\W*$")
 SHOWN = 60
-"""Characters of a cell that an error shows."""
+"""Characters of a cell in an error message."""
 FINER = "timems"
-"""Column of WinCC that holds its text's stamp to the microsecond, in millions of Excel days."""
+"""Column of WinCC with its text's stamp to the microsecond, in millions of Excel days."""
 BELOW_SECOND = {name: float(unit_s) for unit_s, names in WORDS["below_second"].items() for name in names}
-"""Columns that hold the rest of a stamp below the second, and their unit [s]."""
+"""Columns with the fraction of a second of a stamp, and their unit [s]."""
 UNIT_IN_NAME = re.compile(
     rf"(?:^|[\s_(\[.,-]+)(?:{'|'.join(f'(?P<{unit}>{any_of(unit)})' for unit in SINCE_START)})[)\].]*$",
     re.IGNORECASE,
@@ -66,18 +66,18 @@ RANK = {name: i for i, name in enumerate((*COLUMNS["stamp"], *COLUMNS["time_of_d
 
 
 def time_unit(name: str) -> str:
-    """The unit that a time column's name states, as in 'Time (min)' or 't_h': ms, s, min, h or d; '' where none."""
+    """The unit in a time column's name, as in 'Time (min)' or 't_h': ms, s, min, h or d; '' if none."""
     found = UNIT_IN_NAME.search(name[: HISTORY.name_length])
     return "" if found is None else str(found.lastgroup)
 
 
 def without_unit(name: str) -> str:
-    """A time column's name without the unit that stands behind it."""
+    """A time column's name without its unit."""
     return UNIT_IN_NAME.sub("", name[: HISTORY.name_length])
 
 
 def is_stamp(name: str) -> bool:
-    """Whether a column is named as stamps are, with or without a unit behind the name."""
+    """Whether a column has a name for stamps, with or without a unit."""
     if not plain(name):
         return False
     bare = plain(without_unit(name))
@@ -85,12 +85,12 @@ def is_stamp(name: str) -> bool:
 
 
 def find_clock(table: Table, options: ReadOptions, tag: int = -1) -> Clock:
-    """The time columns of a table, and how they are written; `tag` is the column of the tags of a long table.
+    """The time columns of a table, and their format; `tag` is the column of the tags of a long table.
 
     Raises
     ------
     InputError
-        No column holds a time, or the one that is named so cannot be read, or its stamps have lost their seconds.
+        No column contains a time, or the column of that name cannot be read, or its stamps have lost their seconds.
     """
     columns = _time_candidates(table, options)
     heads = dict(zip(columns, table.head(columns), strict=True))
@@ -117,7 +117,7 @@ def find_clock(table: Table, options: ReadOptions, tag: int = -1) -> Clock:
 
 
 def stamps_clock(table: Table, column: int, options: ReadOptions, name: str) -> Clock:
-    """The clock of one column that is known to hold stamps, under a name that may state their zone."""
+    """The clock of one column that is known to contain stamps, under a name that may state their zone."""
     head = table.head([column])[0]
     scale = time_scale_of(head, time_unit(table.names[column])) if is_number(head.type) else None
     clock = _with_order(table, Clock((column,), timezone=options.timezone, scale=scale), options)
@@ -125,7 +125,7 @@ def stamps_clock(table: Table, column: int, options: ReadOptions, name: str) -> 
 
 
 def _stands(table: Table, second: NDArray[np.float64], tag: int) -> bool:
-    """Whether all first rows have one stamp [s], each of the tags in more than one of them."""
+    """Whether all first rows have the same stamp [s], with several rows for each tag."""
     known = second[np.isfinite(second)]
     if known.size < HISTORY.minutes_rows or np.ptp(known) > 0.0:
         return False
@@ -133,8 +133,8 @@ def _stands(table: Table, second: NDArray[np.float64], tag: int) -> bool:
 
 
 def _check_seconds(table: Table, second: NDArray[np.float64], tag: int) -> None:
-    """Raise InputError where the first stamps [s] have lost their seconds, so that the samples of a minute share one;
-    `tag` is the column of the tags of a long table, -1 of a wide one."""
+    """Raise InputError if the first stamps [s] have lost their seconds, so that all samples of a minute have the same
+    one; `tag` is the column of the tags of a long table, -1 for a wide one."""
     known = np.isfinite(second)
     if known.sum() < HISTORY.minutes_rows or (second[known] % 60.0 != 0).any():
         return
@@ -150,8 +150,8 @@ def _check_seconds(table: Table, second: NDArray[np.float64], tag: int) -> None:
 
 
 def holds_stamps(head: pa.Array, timed: bool, above: bool) -> bool:
-    """Whether the first rows of a column are stamps; numbers only where the column is named as stamps are, or where a
-    tag stands above them: then they must lie in our time, else they may count from the start of the export."""
+    """Whether the first rows of a column are stamps; numbers only if the column has a name for stamps, or a tag above
+    it: then they must be recent, otherwise they may count from the start of the export."""
     filled = head.drop_null()
     kind = _kind_of_time("", filled) if len(filled) else ""
     if is_number(head.type):
@@ -160,7 +160,7 @@ def holds_stamps(head: pa.Array, timed: bool, above: bool) -> bool:
 
 
 def _with_order(table: Table, clock: Clock, options: ReadOptions) -> Clock:
-    """The clock with what stands first in its dates, decided from as much of the column as it takes."""
+    """The clock with the order of its dates, decided from as much of the column as needed."""
     if options.day_first is not None:
         return replace(clock, order=DateOrder("day" if options.day_first else "month", "as stated"))
     head = date_and_time(table.head(clock.columns))
@@ -177,7 +177,7 @@ def _with_order(table: Table, clock: Clock, options: ReadOptions) -> Clock:
 def _date_order(parts: stamps.Fields, example: str, timezone: str | None) -> DateOrder:
     """The order of all dates of a file, one of which is `example`, in a stated zone.
 
-    Where nothing in them tells, the month first may lie ahead of us, or the day first be usual in the zone.
+    If all are ambiguous, the order with the month first may give future dates, or day first is usual in the zone.
     """
     date = example.split(" ")[0]
     pointed = "." in date
@@ -198,10 +198,10 @@ def _date_order(parts: stamps.Fields, example: str, timezone: str | None) -> Dat
 
 
 def _with_short_year(parts: stamps.Fields, pointed: bool) -> DateOrder | None:
-    """What is decided of dates with years of two digits that may stand in front; None where they do not.
+    """The order of dates with years of two digits that may be first; None if they are not.
 
-    Dates with points have the year in front only where no other reading fits as well; of others that read several
-    ways the latest counts, for exports are of late.
+    Dates with points have the year first only if no other reading fits as well; of other ambiguous ones the latest is
+    used, because exports are recent.
     """
     if not parts.open.any() or not parts.short.all() or (parts.open & ~parts.year_may_begin).any():
         return None
@@ -232,7 +232,7 @@ def _with_short_year(parts: stamps.Fields, pointed: bool) -> DateOrder | None:
 
 
 def _with_fraction(table: Table, clock: Clock) -> Clock:
-    """The clock with a column beside it that holds what is below the second, where one is named so."""
+    """The clock with an additional column of fractions of a second, if there is one of that name."""
     for i, name in enumerate(table.names):
         unit = BELOW_SECOND.get(plain(name), 0.0)
         if i in clock.columns or unit == 0.0 or not is_number(table.types[i]):
@@ -244,8 +244,8 @@ def _with_fraction(table: Table, clock: Clock) -> Clock:
 
 
 def _in_zone(table: Table, clock: Clock, name: str) -> Clock:
-    """The clock with the zone that a name or its stamps state, where these are local, marked where they show that it
-    keeps the zone's winter time all the year."""
+    """The clock with the zone stated by a name or by its stamps, if these are local, marked if they show that it
+    keeps the zone's winter time all year."""
     head = table.head(clock.columns[:1])[0].drop_null()
     text = str(head[0].as_py()) if clock.local and is_text(head.type) and len(head) else ""
     zone = stamps.named_zone(name) or stamps.named_zone(text) or clock.timezone
@@ -261,7 +261,7 @@ def _in_zone(table: Table, clock: Clock, name: str) -> Clock:
 def _is_doubtful(
     table: Table, clock: Clock, kinds: Mapping[int, str | TimeScale], heads: Mapping[int, pa.Array]
 ) -> bool:
-    """Whether what was chosen stands in for a time column that cannot be read, or merely counts the rows."""
+    """Whether the chosen column replaces an unreadable time column, or only counts the rows."""
     chosen = clock.columns[0]
     if is_stamp(table.names[chosen]):
         return False
@@ -273,7 +273,7 @@ def _is_doubtful(
 
 
 def _time_candidates(table: Table, options: ReadOptions) -> list[int]:
-    """Columns that may hold a time: the stated one, else by type, by name, and columns of text."""
+    """Columns that may contain a time: the stated one, else by type, by name, and columns of text."""
     if options.time_column is not None:
         return [stated_column(table.path, table.names, options.time_column, "time")]
     named = (is_stamp(n) or n in ("", "index") or n.startswith("__index_level_") for n in table.names)
@@ -283,7 +283,7 @@ def _time_candidates(table: Table, options: ReadOptions) -> list[int]:
 
 
 def _kind_of_time(name: str, head: pa.Array, timezone: str | None = None) -> str | TimeScale:
-    """'full', 'date', 'time of day' or '' for what the first rows hold, or how their numbers mean a time."""
+    """'full', 'date', 'time of day' or '' for the contents of the first rows, or the meaning of numbers as a time."""
     if pa.types.is_timestamp(head.type):
         return "full"
     if pa.types.is_date(head.type):
@@ -299,7 +299,7 @@ def _kind_of_time(name: str, head: pa.Array, timezone: str | None = None) -> str
 
 def _text_kind(texts: pa.Array, timezone: str | None = None) -> str:
     if not any(LIKE_STAMP.search(text) for text in texts.slice(0, HISTORY.glance).to_pylist()):
-        return ""  # most columns of text are modes: the patterns below cost more than the rest of opening
+        return ""  # most columns of text are modes: the patterns below take most of the opening time
     of_day = pc.cast(pc.match_substring_regex(texts, TIME_OF_DAY), pa.float64())
     if pc.mean(of_day).as_py() > HISTORY.unreadable_share:
         return "time of day"
@@ -312,8 +312,8 @@ def _text_kind(texts: pa.Array, timezone: str | None = None) -> str:
 def _chosen(
     table: Table, kinds: Mapping[int, str | TimeScale], heads: Mapping[int, pa.Array], options: ReadOptions
 ) -> Clock | None:
-    """The clock of the column, or of the columns of date and time of day, that say most; of times without a date such
-    as count from the start: they begin with zero or pass a day."""
+    """The clock of the column, or of the columns of date and time of day, with the most information; of times without
+    a date those that count from the start: they begin with zero or exceed a day."""
     clock = Clock((0,), date_format=options.date_format, timezone=options.timezone)
     if options.date_format is not None:
         named = _by_name(table, [i for i in kinds if is_stamp(table.names[i])] or list(kinds))
@@ -340,7 +340,7 @@ def _chosen(
 
 
 def _by_name(table: Table, columns: Sequence[int]) -> list[int]:
-    """Columns whose names mean a time first, in the order of the dictionary of names."""
+    """Columns with a name for a time first, in the order of the dictionary of names."""
     return sorted(columns, key=lambda i: (RANK.get(plain(without_unit(table.names[i])), len(RANK)), i))
 
 

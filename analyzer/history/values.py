@@ -1,4 +1,4 @@
-"""Values as they stand in exports: numbers, texts among numbers, blanks, text tags."""
+"""Values in exports: numbers, texts among numbers, blanks, text tags."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ ERROR_TEXTS = frozenset(WORDS["values"]["none"])
 ERROR_SHAPES = re.compile(
     r"^(?:\?+|\[-?\d+\].*|#.*|[+-]?1?\.?#(?:qnan|snan|ind|inf).*|[+-]?1\.#.*|<.*>)$", re.IGNORECASE
 )
-"""What a historian writes in place of a value that it does not have."""
+"""Texts that a historian writes for a missing value."""
 MINUS = str.maketrans({"\u2212": "-", "\u2013": "-", "\u2012": "-", "\ufe63": "-", "\uff0d": "-"})
-"""Signs that stand for a minus."""
+"""Characters used as a minus sign."""
 MINUS_BEHIND = re.compile(r"^([\d.,' \u00a0\u2007\u2009\u202f]*\d[.,]?)\s?-$")
-"""A number with its minus behind it."""
+"""A number followed by its minus."""
 SPACES = re.compile("[\u00a0\u2007\u2009\u202f' ]")
-"""Marks that group thousands, besides comma and point."""
+"""Thousands separators, besides comma and point."""
 NUMBER = re.compile(r"^[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?$")
 GROUPED = {
     ".": re.compile(r"^[+-]?\d{1,3}(?:,\d{3})+(?:\.\d+)?$"),
     ",": re.compile(r"^[+-]?\d{1,3}(?:\.\d{3})+(?:,\d+)?$"),
 }
-"""Numbers with their thousands grouped, by decimal mark."""
+"""Numbers with thousands separators, by decimal mark."""
 SPACED = re.compile(r"^[+-]?\d{1,3}(?: \d{3})+(?:[.,]\d+)?$")
 COMMA_FRACTION = re.compile(r"^[+-]?\d+,(?:\d{1,2}|\d{4,})(?:[eE][+-]?\d+)?$|^[+-]?0,\d+$")
-"""A decimal comma that can be nothing else."""
+"""An unambiguous decimal comma."""
 WITH_UNIT = re.compile(r"^(?P<number>[+-]?[\d.,]*\d(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.,+-][^\d]{0,11})$")
 SHOWN = 60
-"""Characters of a text that notes show."""
+"""Characters of a text in notes."""
 LIKE_NUMBER = re.compile(r"^[^\w]*\d")
-"""A text that begins as a number does, and so was meant as one."""
+"""A text that begins like a number, and was probably meant as one."""
 
 
 def values(stamp_s: NDArray[np.float64], column: pa.Array, decimal: str) -> Series:
@@ -50,9 +50,9 @@ def values(stamp_s: NDArray[np.float64], column: pa.Array, decimal: str) -> Seri
     stamp_s : ndarray, shape (n,)
         Their stamps [s since 1970-01-01 UTC].
     column : pyarrow.Array, shape (n,)
-        Numbers, or texts that may hold numbers.
+        Numbers, or texts that may contain numbers.
     decimal : str
-        Decimal mark of numbers that stand as text.
+        Decimal mark of numbers in text.
     """
     if is_text(column.type):
         return _from_texts(stamp_s, column, decimal)
@@ -64,7 +64,7 @@ def values(stamp_s: NDArray[np.float64], column: pa.Array, decimal: str) -> Seri
 
 
 def _from_texts(stamp_s: NDArray[np.float64], column: pa.Array, decimal: str) -> Series:
-    """Every distinct text is read once; the samples refer to it by number."""
+    """Samples from texts: every distinct text is read once; the samples refer to it by index."""
     cells, place, count = distinct(column)
     kinds = [str(text or "").strip() for text in cells.to_pylist()]
     number, notes = parsed(kinds, decimal)
@@ -84,10 +84,10 @@ def _from_texts(stamp_s: NDArray[np.float64], column: pa.Array, decimal: str) ->
 
 
 def parsed(texts: list[str], decimal: str) -> tuple[NDArray[np.float64], list[str]]:
-    """Texts as numbers, shape (n,), NaN where none; and sentences on how they were read, without their count.
+    """Texts as numbers, shape (n,), NaN for others; and sentences on how they were read, without their count.
 
-    A minus may be any dash, thousands may be grouped, a unit may stand behind if it is the same everywhere, and a
-    comma that can only be decimal decides for the column.
+    A minus may be any dash, thousands may be grouped, a unit may follow if it is the same everywhere, and an
+    unambiguous decimal comma decides for the column.
     """
     plain = [MINUS_BEHIND.sub(r"-\1", text.translate(MINUS)) for text in texts]
     plain, unit = _without_unit(plain)
@@ -103,7 +103,7 @@ def parsed(texts: list[str], decimal: str) -> tuple[NDArray[np.float64], list[st
 
 
 def _number_and_grouping(text: str, decimal: str) -> tuple[float, bool]:
-    """A text as a number, NaN where it is none, and whether its thousands are grouped."""
+    """A text as a number, NaN if it is none, and whether its thousands are grouped."""
     if len(text) > HISTORY.number_length:
         return math.nan, False
     spaced = SPACES.sub(" ", text)
@@ -116,7 +116,7 @@ def _number_and_grouping(text: str, decimal: str) -> tuple[float, bool]:
 
 
 def _without_unit(texts: list[str]) -> tuple[list[str], str]:
-    """The texts without a unit that stands behind every number, and that unit; as they are where there is none."""
+    """The texts without a unit that follows every number, and that unit; unchanged if there is none."""
     found = [WITH_UNIT.match(text) for text in texts]
     units = {m["unit"].strip() for m in found if m is not None}
     bare = any(NUMBER.match(text.replace(",", ".")) for text in texts)
@@ -126,7 +126,7 @@ def _without_unit(texts: list[str]) -> tuple[list[str], str]:
 
 
 def _as_bad(kinds: list[str], count: NDArray[np.int64], which: NDArray[np.bool_]) -> Counter[str]:
-    """How often each of some texts was met, in words."""
+    """Count of each kind of bad text, in words."""
     found: Counter[str] = Counter()
     for i in np.flatnonzero(which & (count > 0)):
         found[f"values are the text '{kinds[i][:SHOWN]}', taken as bad"] += int(count[i])

@@ -1,1 +1,1 @@
-"""Why a loop is worth a look: one object a lane."""
+"""Reasons why a loop needs a look: one object per lane."""

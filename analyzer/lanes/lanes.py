@@ -1,8 +1,8 @@
-"""Why a loop is worth a look: oscillating, in manual, at a limit, off its set point, frozen, sluggish, moving
-its valve much, or wearing it, which nights together tell (analyzer/belief/wear.py). Each lane is one object:
-its figure and limit, what hides it, what it says, and what it asks for.
+"""Reasons why a loop needs a look: oscillating, in manual, at a limit, off its set point, frozen, sluggish, with high
+valve travel, or with valve wear, found over several nights (analyzer/belief/wear.py). Each lane is one object: its
+figure and limit, the lanes that hide it, its text, and its action.
 
-A loop may stand in several. Nothing of the analysis is imported, so that a list is quick.
+A loop may be in several. Nothing of the analysis is imported, so that a list is fast.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 class Rule:
     """One lane.
 
-    figure : the column that it is ranked by, the largest first; said : its clause of the reason, None where the
-    reason says it anyway; limit : the limit over which the figure puts a loop in, of the same name where ''; judged :
-    whether a loop stands in it where that takes more; hidden_by : lanes beside which it says nothing new;
-    of_measurement : whether it asks for a look at the measurement.
+    figure : the column of its ranking, largest first; said : its clause of the reason, None if the reason includes it
+    anyway; limit : the limit above which the figure puts a loop in, of the same name if ''; judged : condition for
+    the lane if that is more complex; hidden_by : lanes with which it gives no additional information; of_measurement
+    : whether the measurement must be checked.
     """
 
     lane: Lane
@@ -38,19 +38,19 @@ class Rule:
     of_measurement: bool = False
 
     def stands(self, found: Finding, limits: LaneLimits) -> bool:
-        """Whether a loop stands in the lane, whatever hides it."""
+        """Whether a loop is in the lane, even if hidden."""
         if self.judged is not None:
             return self.judged(found, limits)
         return found.number(self.figure) > float(getattr(limits, self.limit or self.figure))
 
 
 def _rests(found: Finding, limits: LaneLimits) -> bool:
-    """Whether OP rests at a limit; an OP that switches is at one all the time."""
+    """Whether OP is at a limit permanently; a switching OP always is."""
     return found.lack is not MissingData.SWITCHES and found.number("at_limits_pct") > limits.at_limits_pct
 
 
 def _offset(found: Finding) -> bool:
-    """Whether a lasting error is what the controller leaves: of gain alone, or one that switches."""
+    """Whether the controller itself leaves a lasting error: proportional only, or switching."""
     return found.known.get("ti") == 0.0 or found.lack is MissingData.SWITCHES
 
 
@@ -58,12 +58,12 @@ def _at_limit(found: Finding) -> str:
     mean = found.known.get("op_mean_pct")
     side = "" if not isinstance(mean, float) else " lower" if mean < 50 else " upper"
     text = f"OP rests at its{side} limit for {found.number('at_limits_pct'):.0f} % of the time"
-    from_end_to_end = found.cause is Cause.TUNING  # then nothing is wrong with the valve's size
+    from_end_to_end = found.cause is Cause.TUNING  # then the valve is not undersized
     return text if from_end_to_end else f"{text}; look at the valve's size and at what feeds it"
 
 
 def _side(found: Finding) -> str:
-    """On which side of SP PV stays; 'off' where the means are not known."""
+    """Side of SP on which PV stays; 'off' if the means are unknown."""
     sp, pv = found.known.get("sp_mean_pct"), found.known.get("pv_mean_pct")
     if not isinstance(sp, float) or not isinstance(pv, float):
         return "off"
@@ -79,7 +79,7 @@ def _lasting(found: Finding) -> str:
 
 
 def _slow(found: Finding, limits: LaneLimits) -> bool:
-    """Whether errors last long; shorter where the process bears more gain."""
+    """Whether errors last long; the limit is shorter where the process allows more gain."""
     if found.remedy.action is Action.RETUNE and found.cause is Cause.NONE:
         return True
     memory, room = found.number("error_memory_ti"), found.number("gain_room")
@@ -121,15 +121,15 @@ RULES = (
     Rule(Lane.WEAR, "wear_pct_per_month", judged=lambda f, limits: f.number("wear_pct_per_month") > 0.0),
     Rule(Lane.WINDUP, "winds_up_pct", _winds_up),
 )
-"""All lanes in the order in which they are told."""
+"""All lanes in reporting order."""
 FIGURE: Mapping[Lane, str] = {r.lane: r.figure for r in RULES}
-"""The column that each lane is ranked by, the largest first."""
+"""The column of each lane's ranking, largest first."""
 SAID: Mapping[Lane, Callable[[Finding], str]] = {r.lane: r.said for r in RULES if r.said is not None}
-"""One clause a lane."""
+"""One clause per lane."""
 
 
 def in_lanes(found: Finding, limits: LaneLimits) -> Finding:
-    """A loop with the lanes that its figures put it into, and what they make of its action."""
+    """A loop with its lanes by figures, and their effect on its action."""
     standing = {r.lane for r in RULES if r.stands(found, limits)}
     lanes = tuple(r.lane for r in RULES if r.lane in standing and not r.hidden_by & standing)
     told = replace(found, lanes=lanes)
@@ -137,12 +137,12 @@ def in_lanes(found: Finding, limits: LaneLimits) -> Finding:
 
 
 def is_doubtful(found: Finding) -> bool:
-    """Whether a loop's lanes ask for a look at its measurement."""
+    """Whether a loop's lanes require a check of its measurement."""
     asks = [r.lane for r in RULES if r.of_measurement and r.lane in found.lanes]
     explained = Lane.AT_LIMIT in found.lanes or _offset(found)
     return bool(asks) and not (asks == [Lane.LASTING_ERROR] and explained)
 
 
 def lanes_in(row: Mapping[str, Any]) -> tuple[str, ...]:
-    """The lanes of a row, as its column `lanes` states them."""
+    """The lanes of a row, from its column `lanes`."""
     return tuple(name for name in (row["lanes"] or "").split(", ") if name)

@@ -1,5 +1,5 @@
-"""The figures that lanes rest on: of samples as logged, so that a loop that cannot be assessed, all in manual for
-example, has its lane all the same."""
+"""The figures of lanes: from samples as logged, so that a loop that cannot be assessed, for example all in manual,
+still has its lane."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from identification.signals.correlation import correlation_time
 from identification.signals.setpoint_response import moves
 
 AVERAGING = "level"
-"""Type of loops that are slow on purpose: a level buffers flow."""
+"""Loop type that is slow on purpose: a level buffers flow."""
 
 
 def _percent(part: np.ndarray, whole: np.ndarray) -> float | None:
@@ -26,12 +26,12 @@ def _percent(part: np.ndarray, whole: np.ndarray) -> float | None:
 
 
 def _lasting_error(record: LoopRecord, limits: LaneLimits) -> float | None:
-    """The typical hour's mean error, ramps of a programme left out; None without a recorded set point or without an
+    """The typical hour's mean error, without ramps of a programme; None without a recorded set point or without an
     hour that is half usable."""
     if record.sp_estimated:
         return None
     moving = moves(record.sp)
-    holds = moving.mean() <= limits.programme  # a slave's set point never does
+    holds = moving.mean() <= limits.programme  # a slave's set point is never constant
     use, error = record.usable & ~(moving & holds), record.error
     hours = [
         abs(float(error[a:b][use[a:b]].mean()))
@@ -42,8 +42,8 @@ def _lasting_error(record: LoopRecord, limits: LaneLimits) -> float | None:
 
 
 def _memory(prepared: Prepared, controller: Pid | None, kind: str, config: Config) -> float | None:
-    """The error's correlation time in Ti; None where it says nothing, for the loop is at its set point as far as a
-    transmitter or PV's own grid and noise tell, or compression would make it longer."""
+    """The error's correlation time in Ti; None if it is not meaningful, because the loop is at its set point within
+    the resolution or noise of PV, or because compression would increase it."""
     record, use = prepared.record, prepared.record.usable
     if controller is None or kind == AVERAGING or prepared.compressed_share > config.lanes.straight_share:
         return None
@@ -61,12 +61,12 @@ def _memory(prepared: Prepared, controller: Pid | None, kind: str, config: Confi
 def standing(
     prepared: Prepared, controller: Pid | None, kind: str, config: Config
 ) -> dict[str, float | None]:
-    """The figures of one prepared record by column; None where they cannot be told.
+    """The figures of one prepared record by column; None if unknown.
 
-    manual_pct, at_limits_pct : shares of the good time [%], the latter of that in automatic where there is any;
-    frozen_pct : share of the time in which PV stands while OP moves [%]; lasting_error_pct : median over the hours of
-    the size of the hour's mean error [% of span]; error_memory_ti : correlation time of the error in Ti [-]. Without
-    a controller, the settings in force, nothing is sluggish; `kind` is the loop's type.
+    manual_pct, at_limits_pct : shares of the good time [%], the latter of that in automatic if there is any;
+    frozen_pct : share of the time in which PV is constant while OP moves [%]; lasting_error_pct : median over the
+    hours of the size of the hour's mean error [% of span]; error_memory_ti : correlation time of the error in Ti [-].
+    Without a controller, the settings in force, no loop is sluggish; `kind` is the loop's type.
     """
     record, op = prepared.record, prepared.op_known
     scaled = op and prepared.op_scaled

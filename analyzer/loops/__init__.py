@@ -1,1 +1,1 @@
-"""What is known of the loops: loops.csv, changes.csv, tags and their endings."""
+"""Information on loops: loops.csv, changes.csv, tags and their endings."""

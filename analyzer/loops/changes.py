@@ -1,5 +1,5 @@
-"""Changes of controllers: read from changes.csv, given on the command line, or seen in a loop's behaviour; and which
-settings were in force at a time, by them and by the dates of loops.csv."""
+"""Changes of controllers, from changes.csv, from the command line, or detected in a loop's behaviour; and the
+settings in force at a time, from them and from the dates of loops.csv."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ SETTINGS = (
     ),
     *("op_rate", "op_lo_limit", "op_hi_limit", "sp_weight", "td_filter"),
 )
-"""What a dated row of loops.csv changes; tags, ranges and texts are those of the last row."""
+"""Columns that a dated row of loops.csv changes; tags, ranges and texts are those of the last row."""
 
 
 @dataclass(frozen=True, slots=True)
 class TuningChange:
     """New settings of one controller: when [s since 1970-01-01 UTC], from what to what as stated, by whom.
 
-    `seen` says how the change was noticed where nobody stated it; it is then offered, not believed.
+    `seen` describes how an unstated change was detected; it is then only proposed.
     """
 
     loop: str
@@ -58,16 +58,15 @@ class TuningChange:
 
 
 def read_changes(path: Path, zone: str = UTC_NAME, day_first: bool | None = None) -> tuple[TuningChange, ...]:
-    """Read changes.csv: loop and time are required, the settings and `who` are shown where they are given.
+    """Read changes.csv: loop and time are required, the settings and `who` are optional.
 
-    Times that state no zone are of the plant's clock, in `zone`; dates such as 03/04/2026 are read as `day_first`
-    says, and refused where it says nothing.
+    Times without a stated zone are on the plant's clock, in `zone`; dates such as 03/04/2026 are read according to
+    `day_first`, and rejected if it is None.
 
     Raises
     ------
     InputError
-        Where the file cannot be opened, holds no change, lacks a column, or a cell is neither time nor
-        number.
+        The file cannot be opened, contains no change, lacks a column, or a cell is neither time nor number.
     """
     header, rows = csv_table(path, "change")
     for required in ("loop", "time"):
@@ -85,7 +84,7 @@ def read_changes(path: Path, zone: str = UTC_NAME, day_first: bool | None = None
 
 
 def _settings(cells: Mapping[str, str], where: str) -> dict[str, Any]:
-    """Old and new settings of a row, as far as they are given."""
+    """Old and new settings of a row, if given."""
     found: dict[str, Any] = {}
     for column, text in ((c, cells[c]) for c in COLUMNS[2:6] if cells.get(c)):
         try:
@@ -103,8 +102,8 @@ def stated_changes(rows: Sequence[Mapping[str, Any]]) -> list[TuningChange]:
     Parameters
     ----------
     rows : sequence of mapping
-        The loop's rows of the nights in their order, with loop, start_s, settings_changed_s (None where nothing was
-        typed in within the night, which then begins with its settings), kp and ti.
+        The loop's rows of the nights in their order, with loop, start_s, settings_changed_s (None without a change
+        within the night; the change is then at its start), kp and ti.
     """
     known = [r for r in rows if r["start_s"] is not None and r["kp"] is not None]
     seen = "the settings stated in loops.csv differ from the night before"
@@ -118,11 +117,11 @@ def stated_changes(rows: Sequence[Mapping[str, Any]]) -> list[TuningChange]:
 
 
 def behaviour_change(loop: str, hours: Mapping[str, Floats], config: Config) -> TuningChange | None:
-    """The hour at which a loop's controller began to answer differently, or None.
+    """The hour at which the response of a loop's controller changed, or None.
 
-    What a controller does to OP for a given error is its tuning's doing: valve travel over variability is
-    steady under changing load and steps when somebody types in new settings. The split that explains most is
-    offered where the step is large and clear against how days differ by themselves.
+    The motion of OP for a given error depends on the tuning: valve travel over variability is constant under changing
+    load and steps when settings are changed. The best split is proposed if the step is large and clear compared with
+    the variation between days.
     """
     limits, least_s = config.changes, config.before_after.least_days * DAY_S
     travel, spread = hours["valve_travel_pct_per_h"], hours["variability_pct"]
@@ -153,7 +152,7 @@ def _daily_spread(y: Floats, at: Floats) -> float:
 
 
 def _valid_at(spec: LoopSpec, at_s: float) -> LoopSpec:
-    """A loop with the settings of the last of its rows that was valid at a time, of the first where none was."""
+    """A loop with the settings of its last row valid at a time, or of the first row."""
     if not spec.earlier:
         return spec
     valid = [s for s in (*spec.earlier, spec) if s.valid_from_s is None or s.valid_from_s <= at_s]
@@ -164,10 +163,10 @@ def _valid_at(spec: LoopSpec, at_s: float) -> LoopSpec:
 
 
 def in_force(spec: LoopSpec, changes: Sequence[TuningChange], at_s: float) -> LoopSpec:
-    """A loop with the settings that were in force at a time [s since 1970-01-01 UTC], after changes of any loops.
+    """A loop with the settings in force at a time [s since 1970-01-01 UTC], after changes of any loops.
 
-    Those of its row of loops.csv that was valid then, and of the last change before it; before the first change the
-    old ones that it states; where neither is known, those of loops.csv.
+    They are those of its row of loops.csv valid then, and of the last change before; before the first change the old
+    ones stated in it; if neither is known, those of loops.csv.
     """
     spec = _valid_at(spec, at_s)
     own = sorted((c for c in changes if c.loop == spec.loop), key=lambda c: c.time_s)
@@ -184,9 +183,9 @@ def in_force(spec: LoopSpec, changes: Sequence[TuningChange], at_s: float) -> Lo
 def settings_before(
     spec: LoopSpec, changes: Sequence[TuningChange], first_s: float, last_s: float
 ) -> tuple[tuple[float, LoopSpec], ...]:
-    """What was in force within a span before its last settings: until when [s], and the loop with them, oldest first.
+    """Settings in force within a span before its last ones: their end [s], and the loop with them, oldest first.
 
-    `spec` is as loops.csv states it, the ends of the span are in s since 1970-01-01 UTC.
+    `spec` is as in loops.csv, the ends of the span are in s since 1970-01-01 UTC.
     """
     dated = [s.valid_from_s for s in (*spec.earlier, spec) if s.valid_from_s is not None]
     times = {*dated, *(c.time_s for c in changes if c.loop == spec.loop)}
@@ -200,9 +199,9 @@ def settings_before(
 
 
 def settings_from(spec: LoopSpec, changes: Sequence[TuningChange], at_s: float, zone: str) -> str:
-    """Where the settings in force at a time stand, with the date from which they hold; '' where none are stated.
+    """Source of the settings in force at a time, with the date from which they are valid; '' if none are stated.
 
-    `spec` is as loops.csv states it, the date is the plant's.
+    `spec` is as in loops.csv, the date is the plant's.
     """
     now = in_force(spec, changes, at_s)
     if now.kp is None and now.ti is None:

@@ -1,4 +1,4 @@
-"""Which loop and which of its signals a tag is, by its name: the endings of control systems, words, ISA letters."""
+"""Loop and role of a tag from its name: by the endings of control systems, words, and ISA letters."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from analyzer.loops.spec import ROLES, STATED
 ENDINGS: Mapping[str, Mapping[str, Sequence[str]]] = STATED["endings"]
 """By control system and role."""
 WORDS: Mapping[str, Mapping[str, Sequence[str]]] = STATED["words"]
-"""The same of words that a tag of no loop may hold too: they count where two of them stand together."""
+"""The same for words that also occur in other tags: they count only if two of them occur together."""
 SYSTEMS = (*ENDINGS.values(), *WORDS.values())
 
 
@@ -25,19 +25,19 @@ _BEHIND = re.compile(rf"^(?P<loop>.+?)(?P<mark>[._:/#|!\\-]| )(?P<ending>{_ENDIN
 _BEFORE = re.compile(rf"^(?P<ending>{_ENDINGS})[._:/ -](?P<loop>.*\d.*)$", re.IGNORECASE)
 _BARE = re.compile(rf"^(?P<ending>{_ENDINGS})$", re.IGNORECASE)
 _NO_NAME = re.compile("|".join(STATED["naming"]["no_name"]), re.IGNORECASE)
-"""What stands around a name and is none of it: units, the word value, the domain of a home's sensor."""
+"""Parts around a name that do not belong to it: units, the word value, the domain of a home's sensor."""
 _BLOCK = re.compile(rf"^(?P<module>.+)/(?:{'|'.join(STATED['naming']['blocks'])})$", re.IGNORECASE)
 _ISA = re.compile(
     r"^(?P<area>.*?)(?<![A-Za-z])(?P<kind>[A-Z])(?P<function>[A-Z]{1,2})(?P<mark>[-_. ]?)(?P<number>\d+[A-Z]?)$"
 )
 ISA: Mapping[str, Sequence[str]] = STATED["isa"]
-"""Functions of ISA-5.1 by role: FT_211 measures what FV_211 moves."""
+"""Functions of ISA-5.1 by role: FT_211 measures the loop that FV_211 moves."""
 
 
 def loops_of(tags: Iterable[str]) -> dict[str, dict[str, str]]:
     """Loops with at least a PV: name to the tag of each role ('sp', 'pv', 'op', 'mode', 'position').
 
-    A function block is left out of the name where its module has no other: FIC1/PID1/PV.CV is of loop FIC1.
+    A function block is left out of the name if it is the only one of its module: FIC1/PID1/PV.CV is of loop FIC1.
     """
     groups: dict[str, dict[str, str]] = {}
     others = []
@@ -54,7 +54,7 @@ def loops_of(tags: Iterable[str]) -> dict[str, dict[str, str]]:
 
 
 def _parted(tag: str) -> tuple[str, str] | None:
-    """Loop and ending of a tag; the loop is '' where the tag is an ending alone."""
+    """Loop and ending of a tag; the loop is '' if the tag is only an ending."""
     name = _NO_NAME.sub("", tag).strip()
     found = _BEHIND.match(name)
     if found is not None and (
@@ -69,7 +69,7 @@ def _parted(tag: str) -> tuple[str, str] | None:
 
 
 def _plain(ending: str) -> str:
-    """An ending as the table has it."""
+    """An ending in the table's form."""
     upper = ending.upper()
     if upper in _SPELLED:
         return upper
@@ -81,17 +81,17 @@ _BY_LETTERS = {ending.replace("_", ""): ending for ending in _SPELLED}
 
 
 def _is_loop(loop: str, roles: Mapping[str, str], endings: Mapping[str, str]) -> bool:
-    """Whether tags of one name are a loop: with a PV, and beside one of a word alone, or of no name, another."""
+    """Whether tags of one name are a loop: with a PV, and, if one has only a word or no name, with another one."""
     if "pv" not in roles:
         return False
     ending = next(ending for ending, tag in endings.items() if tag == roles["pv"])
-    if len(ending) == 1:  # X, Y and Z are places too
+    if len(ending) == 1:  # X, Y and Z are also coordinates
         return "sp" in roles and "op" in roles
     return "sp" in roles or "op" in roles or (ending in SURE and loop != "")
 
 
 def _roles(endings: Mapping[str, str]) -> dict[str, str]:
-    """Tags by role, as the control system has it that explains most endings."""
+    """Tags by role, for the control system that explains most endings."""
     readings = [
         {
             role: next(endings[e] for e in system[role] if e in endings)
@@ -117,7 +117,7 @@ def _without_blocks(loops: dict[str, dict[str, str]]) -> dict[str, dict[str, str
 
 
 def _isa_pairs(tags: Iterable[str]) -> dict[str, dict[str, str]]:
-    """Loops of tags of one letter and number, one that measures and one that moves: FT_211 and FV_211 are FIC211."""
+    """Loops of tags with one letter and number, one measuring and one moving: FT_211 and FV_211 are FIC211."""
     found: dict[str, dict[str, str]] = {}
     for tag in tags:
         parts = _ISA.match(_NO_NAME.sub("", tag).strip())

@@ -1,4 +1,4 @@
-"""Which slip of the pen in loops.csv would make its settings those that a record shows: a unit, or a form."""
+"""Typing errors in loops.csv (a unit, or a form) that would explain the recorded settings."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from identification.errors import InputError
 from identification.models import Form, Pid
 
 WITHIN = 1.3
-"""Factor within which settings count as those recorded; ours: the check of settings tells no less."""
+"""Factor within which settings count as the recorded ones; ours: the resolution of the settings check."""
 
 
 def _readings(spec: LoopSpec) -> Iterator[tuple[dict[str, str], LoopSpec]]:
-    """The row with another unit of time or of gain or another form, those that change least first."""
+    """The row with another unit of time or of gain or another form, smallest changes first."""
     every = product(CHOICES["ti_unit"], CHOICES["gain_unit"], CHOICES["form"])
     own = (spec.ti_unit, spec.gain_unit, str(spec.form))
     for other in sorted(every, key=lambda x: sum(a != b for a, b in zip(x, own, strict=True))):
@@ -29,14 +29,14 @@ def _readings(spec: LoopSpec) -> Iterator[tuple[dict[str, str], LoopSpec]]:
 
 
 def slip(spec: LoopSpec, found: Pid, pv_span: float | None) -> dict[str, str]:
-    """The columns and what to write into them, with which the stated figures are the settings found; empty for none.
+    """The columns and new values with which the stated figures agree with the identified settings; empty for none.
 
     found : in percent and seconds; pv_span : in the PV's own unit.
     """
     for changed, reading in _readings(spec):
         try:
             pid = controller(reading, pv_span)
-        except InputError:  # a gain in engineering units, and no range
+        except InputError:  # gain in engineering units without a range
             continue
         if pid is not None and _apart(pid.kp, found.kp) <= WITHIN and _apart(pid.ti_s, found.ti_s) <= WITHIN:
             return changed
@@ -44,7 +44,7 @@ def slip(spec: LoopSpec, found: Pid, pv_span: float | None) -> dict[str, str]:
 
 
 def _apart(a: float, b: float) -> float:
-    """How many times one is the other, at least 1; inf where one is nothing or the signs differ."""
+    """Ratio of two numbers, at least 1; inf if one is zero or the signs differ."""
     if a == b:
         return 1.0
     return max(a / b, b / a) if a * b > 0 and math.isfinite(a) and math.isfinite(b) else math.inf

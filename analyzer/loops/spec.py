@@ -1,4 +1,4 @@
-"""loops.csv: what the plant states about each loop."""
+"""loops.csv: the plant's statements about each loop."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from identification.errors import InputError
 from identification.models import ErrorForm, Form
 
 STATED: dict[str, Any] = tomllib.loads(Path(__file__).with_name("loops.toml").read_text(encoding="utf-8"))
-"""What tags end in, what columns may hold and other systems call them, and what is assumed where a row is silent."""
+"""Endings of tags, allowed contents of columns and their names in other systems, and defaults for empty cells."""
 ROLES = ("sp", "pv", "op", "mode", "position")
 CELLS: Mapping[str, Any] = STATED["cells"]
 NUMBERS: Mapping[str, tuple[float, float]] = CELLS["numbers"]
 CHOICES: Mapping[str, Sequence[str]] = CELLS["choices"]
 VALID_FROM = "valid_from"
 RECORDED = "recorded"
-"""What a draft writes into the column `ranges` of a row whose PV range is what was recorded: none that is stated."""
+"""Value of the column `ranges` in a draft row whose PV range is only the recorded one, and so is not stated."""
 COLUMNS = (*CELLS["texts"], *ROLES, *NUMBERS, *CHOICES, VALID_FROM)
 OWN_COLUMNS = ("op_unit", "sp_unit", "ranges", "found_by", "sure_pct", "says")
-"""Near to a known name, and yet none misspelt; and what `triage loops` writes beside a row."""
+"""Columns similar to a known name but not misspelt; and columns that `triage loops` adds."""
 OTHER_NAMES = {other: ours for ours, others in STATED["other_names"].items() for other in others}
 
 
@@ -48,18 +48,18 @@ class Output:
 class LoopSpec:
     """One row of loops.csv, or one loop found by its tags.
 
-    Tags are None where the row is silent, and after `tags.match` where the export lacks them; `wanted_pv` is then
-    the tag that was looked for. `master` is the loop whose output is this loop's set point, `ratio_of` the one to
+    Tags are None if not stated, and after `tags.match` if missing in the export; `wanted_pv` is then
+    the requested tag. `master` is the loop whose output is this loop's set point, `ratio_of` the one to
     whose PV it keeps a ratio, `split_of` the controller of whose split range it is a half, `override_with` the one
     with which it shares a valve by a select; `beside` is the output of one of the latter two. `feedforward` is a loop
-    or tag that acts on OP beside the error, `feed` its tag where the export has it. `kp`, `ti`, `td` are as stated,
-    in `gain_unit`, `ti_unit` and `form`; `pv_lo`, `pv_hi` and `gap` in the PV's own unit, `op_lo`, `op_hi`, the
-    limits of OP and of its rate (a second) in the OP's. `kp` is 0 where the integral acts alone.
-    `upstream` is the loop (its PV) or tag that is this loop's measured load, `load` its tag where the export has it.
-    `in_ma` is True where OP looks like a current of 4 to 20 mA and no range of it is stated.
-    `extra` holds columns of the plant's own, `stated` the names of the columns that the row fills. `valid_from_s` is
-    when the row's settings came into force [s since 1970-01-01 UTC], None where it does not say; `earlier` holds the
-    loop's rows before it, the oldest first.
+    or tag that acts on OP in addition to the error, `feed` its tag if the export has it. `kp`, `ti`, `td` are as
+    stated, in `gain_unit`, `ti_unit` and `form`; `pv_lo`, `pv_hi` and `gap` in the PV's own unit, `op_lo`, `op_hi`,
+    the limits of OP and of its rate (per second) in the OP's. `kp` is 0 for integral action alone.
+    `upstream` is the loop (its PV) or tag of this loop's measured load, `load` its tag if the export has it.
+    `in_ma` is True if OP looks like a current of 4 to 20 mA without a stated range.
+    `extra` are columns of the plant's own, `stated` the names of the filled columns. `valid_from_s` is the time from
+    which the row's settings are valid [s since 1970-01-01 UTC], None if not stated; `earlier` are the
+    loop's rows before it, oldest first.
     """
 
     loop: str
@@ -111,37 +111,37 @@ class LoopSpec:
 
     @property
     def tags(self) -> tuple[str, ...]:
-        """The tags of the loop that are known, with those of what it is judged beside."""
+        """The known tags of the loop, including those with which it is judged."""
         own = (*(getattr(self, role) for role in ROLES), self.beside.tag if self.beside else None, self.feed)
         return tuple(dict.fromkeys(tag for tag in own if tag is not None))
 
     @property
     def op_unit(self) -> str:
-        """What one unit of OP is called: percent where its range is 0 to 100, else OP, in a unit of its own."""
+        """Name of the unit of OP: percent if its range is 0 to 100, else OP, in its own unit."""
         return "%" if (self.op_lo, self.op_hi) == (0.0, 100.0) else "OP"
 
     @property
     def has_pv_range(self) -> bool:
-        """Whether the row states what percent of the PV means; else it is percent of what was recorded."""
+        """Whether the row states the PV range for percent; otherwise percent is of the recorded range."""
         return self.pv_lo is not None and self.pv_hi is not None
 
     @property
     def defaults(self) -> tuple[str, ...]:
-        """What is assumed because the row is silent, for the output to say."""
+        """Defaults used for empty cells, for the output."""
         return tuple(text for column, text in STATED["defaults"].items() if column not in self.stated)
 
 
 def read_loops(path: Path, zone: str = UTC_NAME, day_first: bool | None = None) -> tuple[LoopSpec, ...]:
-    """Read loops.csv: one loop a row, decimal point or comma, columns in any order.
+    """Read loops.csv: one loop per row, decimal point or comma, columns in any order.
 
-    A loop may have several rows where each but the first says with `valid_from` when its settings came into force, on
-    the plant's clock where it states no zone; its last row is returned, with the `earlier` ones.
+    A loop may have several rows if each but the first states in `valid_from` from when its settings are valid, on the
+    plant's clock unless a zone is stated; its last row is returned, with the `earlier` ones.
 
     Raises
     ------
     InputError
         The file is missing or empty, lacks the column `loop`, misspells a column, names a loop twice at one
-        time, or holds what is no number, no known form or unit, or a range that does not rise.
+        time, or contains an invalid number, an unknown form or unit, or a range that does not rise.
     """
     header, rows = csv_table(path, "loop")
     _check_header(path, header)
@@ -164,17 +164,17 @@ def read_loops(path: Path, zone: str = UTC_NAME, day_first: bool | None = None) 
 
 
 def unknown_columns(specs: Sequence[LoopSpec]) -> tuple[str, ...]:
-    """Columns of loops.csv that mean nothing here and are kept as the plant's own."""
+    """Columns of loops.csv without a meaning here, which are kept as the plant's own."""
     return tuple(dict.fromkeys(name for spec in specs for name in spec.extra if name not in OWN_COLUMNS))
 
 
 def csv_table(path: Path, of: str) -> tuple[list[str], list[tuple[int, dict[str, str]]]]:
-    """Header in lower case of a CSV of loops or of changes, and its filled rows with their numbers in an editor.
+    """Header in lower case of a CSV of loops or of changes, and its filled rows with their line numbers.
 
     Raises
     ------
     InputError
-        It cannot be opened, is empty, or has a line beyond all measure.
+        It cannot be opened, is empty, or has a line above the size limit.
     """
     try:
         data = Path(path).read_bytes()
@@ -216,7 +216,7 @@ def _check_header(path: Path, header: Sequence[str]) -> None:
 
 
 def _spec(where: str, cells: Mapping[str, str], zone: str, day_first: bool | None) -> LoopSpec:
-    """The loop of a row, of which `where` tells the place."""
+    """The loop of a row; `where` is its location for messages."""
     filled = {name: cell for name, cell in cells.items() if cell}
     if "loop" not in filled:
         raise InputError(f"{where}: no loop name", "a name in column 'loop'", "name the loop")
@@ -275,7 +275,7 @@ def spec_of(specs: Sequence[LoopSpec], loop: str) -> LoopSpec:
     Raises
     ------
     InputError
-        Where there is no such loop; the nearest names are told.
+        There is no such loop; the message lists the nearest names.
     """
     for spec in specs:
         if spec.loop == loop:

@@ -24,23 +24,23 @@ def find_loops(tags: Iterable[str]) -> tuple[LoopSpec, ...]:
 
 
 def no_loops(tags: Sequence[str]) -> InputError:
-    """What is said of an export whose tags name no loop."""
+    """Error for an export whose tags name no loop."""
     seen = f"no loops in the export, whose tags are {', '.join(tags[:8])}{', ...' if len(tags) > 8 else ''}"
     remedy = "let 'triage loops' look for them in the data, or state them with --loops loops.csv"
     return InputError(seen, "tags such as LOOP.PV", remedy)
 
 
 def match(specs: Sequence[LoopSpec], tags: Iterable[str]) -> tuple[tuple[LoopSpec, ...], tuple[str, ...]]:
-    """Give each loop the tags that the export has for it.
+    """Give each loop its tags in the export.
 
-    A tag that the row does not state is found by its ending, LOOP.SP and so on by default.
+    A tag that is not stated in the row is found by its ending, LOOP.SP and so on by default.
 
     Returns
     -------
     tuple of LoopSpec
-        All of `specs`; `pv` is None where the export lacks it.
+        All of `specs`; `pv` is None if it is missing in the export.
     tuple of str
-        A sentence for every loop and tag that is missing, and one for loops that only the export has.
+        A sentence for every missing loop and tag, and one for loops only in the export.
     """
     known = dict.fromkeys(tags)
     specs, by_place = in_order(specs, tuple(known))
@@ -61,8 +61,8 @@ def match(specs: Sequence[LoopSpec], tags: Iterable[str]) -> tuple[tuple[LoopSpe
 
 
 def in_order(specs: Sequence[LoopSpec], tags: Sequence[str]) -> tuple[Sequence[LoopSpec], tuple[str, ...]]:
-    """Loops with the columns of a table without a header for their tags, in the order in which loops.csv states them,
-    and a sentence on it; the loops as they are where the columns have names or are not as many."""
+    """Loops with the columns of a table without a header as tags, in the order of loops.csv, and a sentence on it;
+    unchanged loops if the columns have names or a different number."""
     roles = ([role for role in ROLES if getattr(spec, role)] or ROLES[:3] for spec in specs)
     stated = [(k, role) for k, own in enumerate(roles) for role in own]
     if not tags or not all(UNNAMED.fullmatch(tag) for tag in tags) or len(stated) != len(tags):
@@ -83,7 +83,7 @@ def _matched(spec: LoopSpec, known: Mapping[str, None], found: Mapping[str, str]
 
 
 def _with_tags_beside(spec: LoopSpec, by_loop: Mapping[str, LoopSpec], known: Mapping[str, None]) -> LoopSpec:
-    """A loop with the tags of those that it is judged beside or loaded by, where the export has them."""
+    """A loop with the tags of the loops with which it is judged or by which it is loaded, if the export has them."""
     beside = spec.override_with or spec.split_of
     other = by_loop.get(beside) if beside != spec.loop else None
     feed, load = (_tag_of(name, by_loop, known) for name in (spec.feedforward, spec.upstream))
@@ -92,12 +92,12 @@ def _with_tags_beside(spec: LoopSpec, by_loop: Mapping[str, LoopSpec], known: Ma
 
 
 def _tag_of(name: str, by_loop: Mapping[str, LoopSpec], known: Mapping[str, None]) -> str | None:
-    """The PV of a loop, or a tag, of this name; None where the export has neither."""
+    """The PV of a loop, or a tag, of this name; None if the export has neither."""
     return by_loop[name].pv if name in by_loop else name if name in known else None
 
 
 def spelling(tag: str) -> str:
-    """A tag without what differs between two spellings of it: capitals, blanks and marks."""
+    """A tag without the differences between spellings: capitals, blanks and marks."""
     return re.sub(r"[\W_]+", "", tag).casefold()
 
 
@@ -127,19 +127,19 @@ def _missing(before: LoopSpec, after: LoopSpec, alike: Mapping[str, str]) -> lis
 def controller(spec: LoopSpec, pv_span: float | None) -> Pid | None:
     """The stated controller in percent, seconds and ideal form; None without gain or integral time.
 
-    Laws, with Kp, Ti, Td as loops.csv states them and e = SP - PV:
+    Laws, with Kp, Ti, Td as in loops.csv and e = SP - PV:
     ideal     Kp (e + 1/Ti int e dt + Td de/dt)
     series    Kp (1 + 1/(Ti s)) (1 + Td s) e
     parallel  Kp e + 1/Ti int e dt + Td de/dt, the latter two with the sign of Kp and in the units of Kp
-    A band is 100/Kp in percent. An integral time of 0 means that there is no integral action. Derivative time
-    is in the unit of the integral time, in minutes where that is repeats/min. A kp of 0 with an integral time is the
-    law 1/Ti int e dt, negative where OP rises with PV.
+    A band is 100/Kp in percent. An integral time of 0 means no integral action. Derivative time
+    is in the unit of the integral time, in minutes if that is repeats/min. A kp of 0 with an integral time is the
+    law 1/Ti int e dt, negative if OP rises with PV.
 
     Parameters
     ----------
     spec : LoopSpec
     pv_span : float or None
-        Span of the PV in its own unit; needed where the gain is stated in engineering units.
+        Span of the PV in its own unit; needed if the gain is stated in engineering units.
 
     Raises
     ------
@@ -162,7 +162,7 @@ def controller(spec: LoopSpec, pv_span: float | None) -> Pid | None:
 
 
 def _with_extras(pid: Pid, spec: LoopSpec, pv_span: float | None) -> Pid:
-    """The controller with what else its row states, in percent and seconds."""
+    """The controller with the other settings of its row, in percent and seconds."""
     op_span = spec.op_hi - spec.op_lo
     limits = ((spec.op_lo_limit, pid.op_lo), (spec.op_hi_limit, pid.op_hi))
     low, high = (other if own is None else 100.0 * (own - spec.op_lo) / op_span for own, other in limits)
@@ -182,10 +182,10 @@ def _with_extras(pid: Pid, spec: LoopSpec, pv_span: float | None) -> Pid:
 
 
 def as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> tuple[float, float]:
-    """Gain and integral time of `pid` in the units and the form of `spec`, to be typed into the controller.
+    """Gain and integral time of `pid` in the units and the form of `spec`, for entry in the controller.
 
-    The inverse of `controller`. No integral action is stated as 0. The series form knows no Ti < 4 Td; there
-    it gets the nearest, both its times alike.
+    The inverse of `controller`. No integral action is stated as 0. The series form does not allow Ti < 4 Td; then the
+    nearest settings, with both times equal, are used.
     """
     if pid.kp == 0.0:
         alone_s = pid.ti_s * unit_ratio(spec, pv_span)
@@ -216,12 +216,12 @@ def unit_ratio(spec: LoopSpec, pv_span: float | None) -> float:
 
 
 def _unit_s(spec: LoopSpec) -> float:
-    """The unit of the stated times [s]; of the derivative time alone where the integral time is in repeats/min."""
+    """The unit of the stated times [s]; only of the derivative time if the integral time is in repeats/min."""
     return 1.0 if spec.ti_unit == "s" else 60.0
 
 
 def _series_share(pid: Pid, spec: LoopSpec) -> float:
-    """Gain and integral time of the series form over those of the ideal form; 1 of any other form."""
+    """Gain and integral time of the series form over those of the ideal form; 1 for any other form."""
     if spec.form is not Form.SERIES or pid.td_s == 0 or math.isinf(pid.ti_s):
         return 1.0
     return (1 + math.sqrt(max(0.0, 1 - 4 * pid.td_s / pid.ti_s))) / 2

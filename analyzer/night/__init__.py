@@ -1,1 +1,1 @@
-"""Many loops over a night: in chunks, on workers, put together and resumed."""
+"""Batch run over many loops and a night: in chunks, on workers, combined and resumed."""

@@ -1,4 +1,4 @@
-"""What is asked of an export: files and loops, changes of settings, a span of time, limits. Nothing heavy is imported
+"""The request for an export: files and loops, changes of settings, a span of time, limits. Nothing slow is imported
 before it is known."""
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ ALWAYS: Span = (-math.inf, math.inf)
 class Asked:
     """Files, loops.csv, changes of settings, span of time [s since 1970-01-01 UTC] and limits.
 
-    zone : the plant's time zone, of nights, pages and options; reading : how text exports are read, as in
-    analyzer.history.table; finding : whether, without loops.csv, loops are looked for in the data as well.
+    zone : the plant's time zone, of nights, pages and options; reading : format options of text exports, as in
+    analyzer.history.table; finding : whether, without loops.csv, loops are also searched in the data.
     """
 
     export: tuple[Path, ...]
@@ -48,7 +48,7 @@ def asked_of(
     finding: bool = False,
     **reading: Any,
 ) -> Asked:
-    """What a command line or a notebook asks; times that state no zone are of the plant's clock."""
+    """The request of a command line or a notebook; times without a stated zone are on the plant's clock."""
     zone = str(zone_of(reading.get("timezone")))
     reading["good_quality"] = tuple(reading.get("good_quality") or ()) or None
     dated = () if changes is None else read_changes(changes, zone, reading.get("day_first"))

@@ -1,7 +1,7 @@
-"""A night over many loops: in chunks on worker processes, pieces kept as they come, then put together.
+"""Batch run of a night over many loops: in chunks on worker processes, with pieces stored at once and combined later.
 
-A killed run goes on where it stood; a worker that dies costs the loop in hand at most. The plant-wide pass and the
-joining happen once all pieces are there.
+A killed run can be resumed; a worker that dies loses at most the current loop. The plant-wide pass and the
+combination follow once all pieces exist.
 """
 
 from __future__ import annotations
@@ -39,19 +39,19 @@ from analyzer.store.table import OF_A_NIGHT, DamagedError
 from identification.errors import InputError
 
 CHUNKS, FEWEST, MOST = 16, 4, 32
-"""Tasks of a run that is small, and loops per task: enough to carry its four small tables, few enough for a smooth
-progress bar and for workers that end together."""
+"""Tasks of a small run, and loops per task: enough that a task's four small tables are worth it, few enough for a
+smooth progress bar and a simultaneous end of the workers."""
 PACKAGES = ("identification", "tuning", "analyzer", "reports")
 Identity = Mapping[str, Any]
-"""A run as it is written down beside its pieces: fingerprint, and words for people (export, loops, begun)."""
+"""A run as stored with its pieces: fingerprint, and texts for people (export, loops, begun)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a run did.
+    """The result of a run.
 
     nights, those written, oldest first; unassessed and failed, loop and reason in the last of them; notes, sentences
-    on what was read and on what the store had already.
+    on the data read and on the previous contents of the store.
     """
 
     nights: tuple[Night, ...]
@@ -66,10 +66,10 @@ def chunk_size(loops: int) -> int:
 
 
 def _tasks(plant: Plant, store: Store, nights: Sequence[Night], known: set[str]) -> list[Task]:
-    """Chunks of the loops that no piece of the last night holds yet."""
+    """Chunks of the loops that are not yet in a piece of the last night."""
     left = [s for s in plant.specs if s.loop not in known]
     size = chunk_size(len(left))
-    mark = uuid.uuid4().hex[:8]  # a worker of a killed run may write yet; its pieces have another mark
+    mark = uuid.uuid4().hex[:8]  # a worker of a killed run may still write; its pieces have another mark
     held = held_pairs(store, nights[0].name)
     whole = Task(replace(plant, notes=()), tuple(nights), store, mark)
     tasks = []
@@ -83,8 +83,8 @@ def _tasks(plant: Plant, store: Store, nights: Sequence[Night], known: set[str])
 def _results(
     tasks: Sequence[Task], jobs: int, config: Config, scheduler: str | None, watch: Callable[[int], None]
 ) -> Iterator[Done]:
-    """What the chunks give, on a cluster, on worker processes or, with no jobs, in this process, unprotected; `watch`
-    is told now and then how many loops of the chunks in hand are done."""
+    """The results of the chunks, on a cluster, on worker processes or, with no jobs, unprotected in this process;
+    `watch` is called from time to time with the number of finished loops in the current chunks."""
     with executor(jobs, len(tasks), chunk.work, config.workers, scheduler) as workers:
         workers.watch = watch
         for task in tasks:
@@ -94,8 +94,8 @@ def _results(
 
 
 def _retry_or_give_up(workers: Executor[Task, Done], died: WorkerDeath[Task]) -> Iterator[Done]:
-    """The loop that was in hand is tried once alone, then given up with the reason; others go to other workers. Where
-    it is not known which it was, each is tried by itself."""
+    """Try the current loop once alone, then give it up with the reason; the others go to other workers. If the
+    current loop is unknown, each is tried alone."""
     task, at = died.task, died.at
     if at is None and len(task.specs) > 1:
         for k, spec in enumerate(task.specs):
@@ -113,7 +113,7 @@ def _retry_or_give_up(workers: Executor[Task, Done], died: WorkerDeath[Task]) ->
 
 def in_one_order(value: object) -> bytes:
     """A value as bytes that are the same in every process: sets and mappings sorted, dataclasses by their fields;
-    TypeError where it holds something whose text may differ between processes."""
+    TypeError for contents whose text may differ between processes."""
 
     def plain(part: Any) -> object:
         if is_dataclass(part):
@@ -128,8 +128,8 @@ def in_one_order(value: object) -> bytes:
 
 
 def is_same(path: Path, run: Identity) -> bool:
-    """Whether the pieces that `path` speaks of are of this run; not where nothing says of which. Raises InputError
-    where they are of another."""
+    """Whether the pieces described by `path` are of this run; False without a description. Raises InputError if they
+    are of another run."""
     try:
         stopped = json.loads(path.read_text(encoding="utf-8"))
         begun = f"{stopped['export']} ({stopped['loops']} loops, begun {stopped['begun']})"
@@ -147,7 +147,7 @@ def is_same(path: Path, run: Identity) -> bool:
 
 
 def of_code() -> bytes:
-    """A digest of the code and the limits that judge: pieces of a run that others began are no pieces of this one."""
+    """A digest of the code and the limits, because pieces of another version cannot be used."""
     mark, here = hashlib.blake2b(digest_size=16), Path(__file__).parents[2]
     for package in PACKAGES:
         for path in sorted(p for p in (here / package).rglob("*") if p.suffix in (".py", ".toml", ".json")):
@@ -156,7 +156,7 @@ def of_code() -> bytes:
 
 
 def identity(plant: Plant) -> Identity:
-    """What a run that goes on with the pieces of another must have in common with it."""
+    """Properties that a resumed run must have in common with the earlier one."""
     mark = hashlib.blake2b(of_code(), digest_size=16)
     for source in plant.export.sources:
         mark.update(ends_of(source.path))
@@ -170,7 +170,7 @@ def identity(plant: Plant) -> Identity:
 
 
 def _begun(plant: Plant, store: Store, nights: Sequence[Night], resume: bool) -> list[str]:
-    """Keys of the chunks that a stopped run left whole; all else of it is forgotten."""
+    """Keys of the complete chunks of a stopped run; everything else of it is deleted."""
     mine = identity(plant)
     if resume and is_same(store.run_file, mine):
         keys = [key for key in store.whole_chunks(nights[-1].name) if _is_readable(store, nights, key)]
@@ -183,7 +183,7 @@ def _begun(plant: Plant, store: Store, nights: Sequence[Night], resume: bool) ->
 
 
 def _is_readable(store: Store, nights: Sequence[Night], key: str) -> bool:
-    """Whether a chunk's pieces are whole; one of which a piece is damaged or gone is worked on again."""
+    """Whether a chunk's pieces are complete; a chunk with a damaged or missing piece is repeated."""
     try:
         for night, table in product(nights, OF_A_NIGHT):
             if table.in_pieces:
@@ -202,13 +202,13 @@ def run(
     scheduler: str | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Outcome:
-    """Assess all loops of a plant and keep the results.
+    """Assess all loops of a plant and store the results.
 
-    store : where, held for the run alone; jobs : worker processes; 0 works in this one, where a loop that takes all
-    memory takes the run with it; resume : go on with the pieces of a run that was stopped, instead of starting anew;
-    replacing : forget what the store has of these nights; scheduler : address of a Dask scheduler whose workers do
-    the loops, instead of processes of this machine; progress : called with loops done and loops in all. Raises
-    InputError for no loops, no nights, another run on the store, or pieces of another run to be gone on with.
+    store : the store, locked for the run; jobs : worker processes; 0: this process, which ends if a loop uses all
+    memory; resume : use the pieces of a stopped run instead of starting again; replacing : delete what the store has
+    of these nights; scheduler : address of a Dask scheduler whose workers assess the loops, instead of processes of
+    this machine; progress : called with loops done and loops in all. Raises InputError for no loops, no nights,
+    another run on the store, or pieces of another run on resumption.
     """
     if not plant.specs:
         raise no_loops(plant.export.tags)
@@ -235,7 +235,7 @@ def run(
                 met.update(result.met)
                 progress(done, of)
             require_unchanged(plant.export.marks)
-        except ChangedError:  # some pieces may be of another export
+        except ChangedError:  # some pieces may be of the changed export
             store.drop_parts()
             raise
         written, more = _finished(plant, store, nights, keys, replacing)
@@ -243,10 +243,10 @@ def run(
 
 
 def _require_one_clock(store: Store, zone: str, replaced: Sequence[str]) -> None:
-    """Raise InputError where the nights that stay in a store were cut by the clock of another time zone."""
+    """Raise InputError if the remaining nights of a store were cut in another time zone."""
     stay = [night for night in store.nights() if night not in replaced]
     kept = None
-    with suppress(DamagedError):  # set aside, or named by others
+    with suppress(DamagedError):  # set aside, or reported elsewhere
         kept = store.stated_zone(stay[-1:])
     if kept is not None and kept != zone:
         seen = f"--timezone {zone}: the nights of {store.path} are of {kept}"
@@ -254,7 +254,7 @@ def _require_one_clock(store: Store, zone: str, replaced: Sequence[str]) -> None
 
 
 def _require_kept(store: Store, night: str, key: str) -> None:
-    """Raise DamagedError where a chunk that is done has left no piece in this store."""
+    """Raise DamagedError if a finished chunk has no piece in this store."""
     piece = store.part(night, "nights", key)
     if not afresh(piece).exists():
         raise store.gone(piece)
@@ -263,7 +263,7 @@ def _require_kept(store: Store, night: str, key: str) -> None:
 def _finished(
     plant: Plant, store: Store, nights: Sequence[Night], keys: Sequence[str], replacing: bool
 ) -> tuple[list[Night], list[str]]:
-    """The nights put together, those without a sample left out unless they are all there is."""
+    """The combined nights, without those without a sample unless there are no others."""
     order = [s.loop for s in plant.specs]
     held = [_require_all(store, night.name, keys, order) for night in nights]
     full = [night for night, rows in zip(nights, held, strict=True) if not is_empty(rows)] or list(
@@ -280,7 +280,7 @@ def _finished(
 
 
 def _require_all(store: Store, night: str, keys: Sequence[str], order: Sequence[str]) -> list[Row]:
-    """What the pieces of a night hold of each loop of the run. Raises DamagedError where they lack one."""
+    """Contents of a night's pieces for each loop of the run. Raises DamagedError if a loop is missing."""
     table = store.read_parts(night, "nights", keys, ("loop", *TELLS_EMPTY))
     rows = [] if table is None else table.to_pylist()
     missing = set(order) - {r["loop"] for r in rows}
@@ -291,7 +291,7 @@ def _require_all(store: Store, night: str, keys: Sequence[str], order: Sequence[
 
 
 def _require_in(store: Store, night: str, wanted: AbstractSet[str]) -> None:
-    """Raise DamagedError where the finished table of a night lacks a loop of the run."""
+    """Raise DamagedError if a loop of the run is missing in the finished table of a night."""
     lacking = wanted - set(store.read("nights", night, ["loop"]).column(0).to_pylist())
     if lacking:
         seen = f"{store.file('nights', night)}: lacks {len(lacking)} of the {len(wanted)} loops of this run"
@@ -299,7 +299,7 @@ def _require_in(store: Store, night: str, wanted: AbstractSet[str]) -> None:
 
 
 def _outcome(plant: Plant, store: Store, nights: Sequence[Night], notes: Sequence[str]) -> Outcome:
-    """The outcome as the last night's table has it, for the loops of this run."""
+    """The outcome from the last night's table, for the loops of this run."""
     wanted = {s.loop for s in plant.specs}
     for night in nights:
         _require_in(store, night.name, wanted)

@@ -1,4 +1,4 @@
-"""What `triage check` says: what was read, and which questions each loop's trends are fit for."""
+"""Result of `triage check`: what was read, and which analyses each loop's trends allow."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from identification.errors import TriageError
 
 ALONE = "fit for a model from its experiments alone"
 MOST_NAMES = 5
-"""Loops that are named in a line."""
+"""Maximum number of loops listed in a line."""
 
 
 def _tags(spec: LoopSpec) -> str:
@@ -34,7 +34,7 @@ def _tags(spec: LoopSpec) -> str:
 
 
 def _fit_for(lacking: Requirement | None, spec: LoopSpec, prepared: Prepared, config: Config) -> str:
-    """Which questions the record is fit for, in words, as a run judges it."""
+    """Analyses that the record allows, in words, by the criteria of a run."""
     if lacking is not None:
         return f"fit for nothing: {lacking}"
     stated = controller_of(spec, prepared) if prepared.op_scaled else None
@@ -78,7 +78,7 @@ def loop_line(plant: Plant, spec: LoopSpec) -> tuple[str, bool]:
 
 
 def _changes_counted(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> str:
-    """What the changes of settings are of."""
+    """Summary of the changes of settings."""
     here = {s.loop for s in specs}
     others = sorted({c.loop for c in changes} - here)
     text = f"{len(changes)} changes of settings, {sum(c.loop in here for c in changes)} of these loops"
@@ -86,8 +86,8 @@ def _changes_counted(changes: Sequence[TuningChange], specs: Sequence[LoopSpec])
 
 
 def check_lines(asked: Asked) -> Iterator[tuple[str, bool]]:
-    """All lines on an export, each with whether a loop of it cannot be assessed. Raises InputError where it cannot be
-    used; once the lines on it are told, where it has no loops."""
+    """All lines on an export, each with whether one of its loops cannot be assessed. Raises InputError if it cannot
+    be used, after the lines on it if it has no loops."""
     plant = guarded(asked)
     export, specs, notes = plant.export, plant.specs, plant.notes
     first, last = export.span()

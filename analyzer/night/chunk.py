@@ -1,4 +1,4 @@
-"""What a worker does: a few loops over some nights, each on its own, the results written as pieces of the nights.
+"""Task of a worker: a few loops over some nights, each assessed separately, with the results written as pieces.
 
 An error of one loop is a result of that loop.
 """
@@ -60,7 +60,7 @@ from tuning.recommend import WITHOUT_SETTINGS
 @dataclass(frozen=True, slots=True)
 class Task:
     """A chunk of a plant's loops over some nights, small enough to send to a worker; `key` names its pieces, `alone`
-    says that it is one loop's second try, and `held` are settings that nights before have told of its loops."""
+    marks the second try of a single loop, and `held` are settings that earlier nights recommended for its loops."""
 
     plant: Plant
     nights: tuple[Night, ...]
@@ -75,13 +75,13 @@ class Task:
         return self.plant.specs
 
     def part(self, specs: tuple[LoopSpec, ...], name: object, alone: bool = False) -> Task:
-        """A task of some of its loops, whose pieces have a name beside its own."""
+        """A task of some of its loops, with its own name for the pieces."""
         return replace(self, plant=replace(self.plant, specs=specs), key=f"{self.key}-{name}", alone=alone)
 
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """What a worker says of its chunk: the key of its pieces, the loops they hold, what was met in their samples."""
+    """A worker's report on its chunk: the key of its pieces, their loops, and problems in their samples."""
 
     key: str
     loops: int
@@ -96,15 +96,14 @@ def assess_loop(
     earlier: Sequence[Earlier] = (),
     held: Held | None = None,
 ) -> tuple[Assessment, Advice]:
-    """Assess one loop, and advise on it if wanted, in view of settings before its last and of those told before.
+    """Assess one loop, and advise on it if wanted, with settings before its last change and earlier recommendations.
 
-    The advice is for the controller with what the record shows of it beside, or on recorded settings for want of
-    stated ones.
+    The advice is for the controller completed by what the record shows, or for recorded settings if none are stated.
     """
     stated = controller_of(spec, prepared)
     found = with_controller_told(assess(prepared, stated, config, spec.type, earlier), spec, stated, prepared)
     if not advising:
-        return found, Advice(WITHOUT_SETTINGS.get(found.verdict.cause))  # settings are for tomorrow alone
+        return found, Advice(WITHOUT_SETTINGS.get(found.verdict.cause))  # settings are only for the next day
     pair = None
     if held is not None and held[0] == (spec.kp, spec.ti):
         kp, ti = held[1]
@@ -119,8 +118,8 @@ def assess_loop(
 
 @dataclass(slots=True)
 class Rows:
-    """What is kept of the loops of one night: findings, settings compared, moves of the signals, assessments, and
-    thinned trends, of loops too that could not be assessed."""
+    """What is stored of the loops of one night: findings, compared settings, moves of the signals, assessments, and
+    decimated trends, also of loops that could not be assessed."""
 
     nights: list[Finding] = field(default_factory=list)
     compared: list[dict[str, Any]] = field(default_factory=list)
@@ -139,7 +138,7 @@ def _loop_row(
     changes: Sequence[TuningChange] = (),
     held: Held | None = None,
 ) -> None:
-    """Keep the row of one loop and night, whatever happens, and its assessment where there is one."""
+    """Add the row of one loop and night, in any case, and its assessment if there is one."""
     spec = in_force(stated, changes, night.at_end_s)
     part = {tag: cut(s, night) for tag, s in series.items()}
     known: dict[str, Cell] = {
@@ -168,7 +167,7 @@ def _loop_row(
         if taught is not None:
             told = with_experiment(told, taught, spec, present)
         drawn = _settings_row(spec, night.name, advice)
-    except Exception as error:  # an error of one loop is that loop's result, never the night's end
+    except Exception as error:  # an error of one loop is that loop's result and never ends the night
         kept.nights.append(_lost(error, config).of(spec, night.name, **known))
         if prepared is not None:
             kept.trends.append((spec.loop, thinned(prepared.record)))
@@ -181,7 +180,7 @@ def _loop_row(
 
 
 def _of_trends(prepared: Prepared) -> dict[str, Cell]:
-    """What a row says of its trends, whatever they show."""
+    """Columns of a row about its trends in general."""
     low, span = prepared.scale.low, prepared.scale.span
     travel_of = "OP" if prepared.record.position is None else "stem"
     straight_pct = 100.0 * prepared.compressed_share
@@ -191,7 +190,7 @@ def _of_trends(prepared: Prepared) -> dict[str, Cell]:
 def _signs_kept(
     prepared: Prepared, found: Assessment, controller: Pid | None, kind: str, config: Config
 ) -> dict[str, Cell]:
-    """What the night witnesses of the valve, and the indices of the literature."""
+    """Evidence of the night about the valve, and the published indices."""
     cycles = found.oscillations
     return {
         "witness": witness(found.verdict, counting(cycles) is not None, prepared, config),
@@ -200,8 +199,8 @@ def _signs_kept(
 
 
 def _typed_in(earlier: Sequence[Earlier], spec: LoopSpec, found: Assessment, zone: str) -> dict[str, Cell]:
-    """What was typed in last within the night, in words, and since when the verdict is told of it; nothing where
-    nothing was."""
+    """Settings last entered within the night, in words, and the time from which the verdict applies to them; empty if
+    there were none."""
     if not earlier:
         return {}
     last = earlier[-1]
@@ -211,7 +210,7 @@ def _typed_in(earlier: Sequence[Earlier], spec: LoopSpec, found: Assessment, zon
 
 
 def _settings_row(spec: LoopSpec, night: str, advice: Advice) -> list[dict[str, Any]]:
-    """The page on which settings are compared, as a row, none where none were sought."""
+    """The page of compared settings, as a row; none if no settings were searched."""
     if advice.compared is None:
         return []
     page = settings_pages.settings_page(spec.loop, night, advice.compared, spec)
@@ -219,7 +218,7 @@ def _settings_row(spec: LoopSpec, night: str, advice: Advice) -> list[dict[str, 
 
 
 def _lost(error: Exception, config: Config) -> FailedLoop:
-    """What is left of a loop that an error has ended."""
+    """The result of a loop that ended with an error."""
     if isinstance(error, LacksError):
         return FailedLoop(Status.NOT_ASSESSED, error.needs)
     told = str(error) if isinstance(error, TriageError) else f"{type(error).__name__}: {error}"
@@ -231,7 +230,7 @@ def _lost(error: Exception, config: Config) -> FailedLoop:
 
 
 def _as_told(text: str) -> Requirement:
-    """What an error says of itself."""
+    """The text of an error."""
     return Requirement(None, RequirementKind.AS_TOLD, (text,))
 
 
@@ -253,7 +252,7 @@ def _samples_of(task: Task, spec: LoopSpec) -> dict[str, Series] | FailedLoop:
 
 
 def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
-    """Assess a chunk and write its pieces; `began` is told the number of each loop that is begun with."""
+    """Assess a chunk and write its pieces; `began` is called with the number of each started loop."""
     be_patient(task.store.path)
     assessed(task, began)
     met = task.plant.export.met(tag for spec in task.specs for tag in spec.tags)
@@ -261,7 +260,7 @@ def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
 
 
 def assessed(task: Task, began: Callable[[int], None] = lambda at: None) -> dict[str, Rows]:
-    """What is kept of a chunk by night, its pieces written."""
+    """The results of a chunk by night, with its pieces written."""
     kept, plant = {n.name: Rows() for n in task.nights}, task.plant
     for at, spec in enumerate(task.specs):
         began(at)
@@ -288,7 +287,7 @@ def lose(task: Task, reason: str) -> Done:
 
 
 def _write_pieces(task: Task, night: str, kept: Rows) -> None:
-    """The piece of the table of nights comes last, and names the others: where all are, the chunk is whole."""
+    """Write the pieces, that of the table of nights last: it names the others, and makes the chunk complete."""
     trends = [
         pa.table({"loop": pa.array([loop] * len(trend["time_s"])).dictionary_encode(), **trend})
         for loop, trend in kept.trends

@@ -1,7 +1,7 @@
-"""Tasks on a Dask cluster: what they write goes into the store that all machines share.
+"""Tasks on a Dask cluster: they write to the store, which all machines share.
 
-Answers do not depend on where they are computed. A worker that dies costs nothing: its task goes to another; one that
-ends several workers comes back as `Died`.
+Results do not depend on the machine. If a worker dies, its task goes to another; a task that ends several workers is
+returned as a `WorkerDeath`.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ WHY = "ended several workers of the cluster"
 
 
 class Cluster(Executor[T, R]):
-    """The workers of a scheduler at an address, tcp://HOST:PORT; a line on stderr says when none has answered for a
-    while. Raises InputError where Dask is not installed, no scheduler answers there, it died before all was done, or
-    there have been no workers for too long."""
+    """The workers of a scheduler at an address, tcp://HOST:PORT; a line on stderr reports when none has responded for
+    a while. Raises InputError if Dask is not installed, no scheduler responds, it died before all was done, or there
+    have been no workers for too long."""
 
     def __init__(self, address: str, function: Callable[[T], R]) -> None:
         super().__init__(function)
@@ -49,12 +49,12 @@ class Cluster(Executor[T, R]):
             seen = f"--scheduler {self._address}: no scheduler answers"
             expected = "the address that 'dask scheduler' prints"
             raise InputError(seen, expected, "start it, or correct it") from error
-        # what ends the run is told in one line below
+        # one line below reports what ended the run
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         return self
 
     def __exit__(self, *_: object) -> None:
-        with suppress(Exception):  # a scheduler that hangs is not waited for
+        with suppress(Exception):  # do not wait for a scheduler that hangs
             self._client.close(timeout=CLUSTER.answer_s)
 
     def submit(self, task: T, alone: bool = False) -> None:
@@ -76,7 +76,7 @@ class Cluster(Executor[T, R]):
                     yield WorkerDeath(task, None, WHY, again=False)
 
     def _next(self) -> Any:
-        """The next task that is done. Raises InputError where nobody has worked on any for too long."""
+        """The next finished task. Raises InputError if no worker has worked on any for too long."""
         idle_s = time.monotonic()
         said = ""
         while True:
@@ -94,7 +94,7 @@ class Cluster(Executor[T, R]):
                 raise InputError(f"--scheduler {self._address}: {seen}", "workers that answer", GO_ON)
 
     def _who_works(self) -> str:
-        """What keeps the cluster from work; '' where it has workers."""
+        """Why the cluster does not work; '' if it has workers."""
         try:
             asked = {"callback_timeout": CLUSTER.answer_s}
             workers = self._client.sync(self._client.scheduler.ncores, **asked)

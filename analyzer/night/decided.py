@@ -1,6 +1,6 @@
-"""What a night decided of one loop: its row as `triage rank` has it, from a store, or made just as a run makes it.
+"""The decision of a night on one loop: its row of `triage rank`, from a store or computed exactly as in a run.
 
-`tune` and `explain` begin with it, so that every command has one answer.
+`tune` and `explain` begin with it, so that all commands give the same answer.
 """
 
 from __future__ import annotations
@@ -29,27 +29,27 @@ OF_ORDER = (
     *("lack", "night", "lanes", "expected_period_s", "expected_pv_amplitude_pct"),
     *("field_indices", "harris_index"),
 )
-"""What an order, and the indices of the literature, rest on beside the columns of a list."""
+"""Columns for an order and for the published indices, besides those of a list."""
 COLUMNS = tuple(dict.fromkeys((*names((*RANKING, *LISTED, *BELIEVED)), *OF_ORDER)))
 TIES = ("master", "ratio_of", "split_of", "override_with")
-"""Columns of loops.csv that tie a loop to another one."""
+"""Columns of loops.csv that link a loop to another one."""
 MOST_BESIDE = 60
-"""Loops of a plant up to which it is looked which of them move together: some seconds."""
+"""Largest number of loops of a plant for which common oscillations are searched: takes some seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Decided:
-    """The row of a loop in a night, and its assessment where the row was made anew and the loop could be assessed."""
+    """The row of a loop in a night, and its assessment if the row was recomputed and the loop could be assessed."""
 
     row: Row
     found: Assessment | None = None
 
 
 def decided(plant: Plant, night: Night, loop: str, store: Store | None = None) -> Decided:
-    """What a night decided of a loop.
+    """The decision of a night on a loop.
 
-    store, one that holds the night: its row, which rests on all nights there; None: the row of a store that holds
-    this night alone. Raises InputError where the store has no such night, or the night no such loop.
+    store, one with the night: its row, which includes all nights there; None: the row of a store with this night
+    only. Raises InputError where the store has no such night, or the night no such loop.
     """
     if store is not None:
         return Decided(_stored(store, night.name, loop))
@@ -78,8 +78,8 @@ def _stored(store: Store, night: str, loop: str) -> Row:
 
 
 def _related(plant: Plant, night: Night, loop: str) -> tuple[LoopSpec, ...]:
-    """The loop and all whose night may change its row: those that share an oscillation with it, or hang on it, by
-    loops.csv or by the trends; by loops.csv alone in a plant of many loops."""
+    """The loop and all loops whose night may change its row: those with a common oscillation or a link, by loops.csv
+    or by the trends; in a large plant by loops.csv alone."""
     ties = [(spec.loop, other) for spec in plant.specs for other in _stated(spec)]
     if len(plant.specs) <= MOST_BESIDE:
         ties += _seen(plant, night)
@@ -95,7 +95,7 @@ def _stated(spec: LoopSpec) -> Iterable[str]:
 
 
 def _seen(plant: Plant, night: Night) -> Sequence[tuple[str, str]]:
-    """Pairs of loops that share an oscillation, or of which one's output moves the other's set point."""
+    """Pairs of loops with a common oscillation, or in which one's output moves the other's set point."""
     series = plant.trends(list(dict.fromkeys(tag for spec in plant.specs for tag in spec.tags)), night)
     waves: list[Wave] = []
     moves: list[Moves] = []

@@ -1,7 +1,7 @@
-"""A night put together: the plant-wide pass over its pieces, lanes, then one table, joined with what the store has.
+"""Combination of a night: the plant-wide pass over its pieces, lanes, then one table, joined with that of the store.
 
-A second export of the same night adds its loops. Of a loop that stands in both the fuller record is kept, and the
-newer of two that are alike, so that the same night twice replaces and a good night is never lost to an empty one.
+A second export of the same night adds its loops. Of two records of a loop the fuller one is kept, and of equal ones
+the newer, so that a repeated night replaces the first and an empty one never replaces a good one.
 """
 
 from __future__ import annotations
@@ -31,21 +31,21 @@ from analyzer.store.store import Store
 from analyzer.store.table import KEPT, rows_of_loops, rows_table
 
 JOINED = tuple(t.name for t in KEPT if t.in_pieces and t.name != "nights")
-"""Tables whose pieces are taken as they are; the table of nights and that of groups are made of theirs."""
+"""Tables whose pieces are used unchanged; the tables of nights and groups are computed from them."""
 TELLS_EMPTY = ("status", "good_h")
-"""Columns that say whether there is anything to keep of a night."""
+"""Columns that show whether there is anything to keep of a night."""
 PLANT_WIDE = (*TYPED, *plantwide.READ, *cascade.READ, "good_h")
-"""Columns of a loop that the plant-wide pass reads, and what records are compared by."""
+"""Columns of a loop for the plant-wide pass, and for comparing records."""
 OF_ITS_OWN = tuple(name for name in names(NIGHTS) if name not in TYPED)
-"""Columns that a worker alone knows."""
+"""Columns that only a worker computes."""
 CHUNKS_AT_ONCE, LOOPS_AT_ONCE = 8, 256
-"""What is in memory at a time of tables that are put together."""
+"""Part of the combined tables in memory at a time."""
 WORTH = {Status.OK: 2, Status.NOT_ASSESSED: 1}
-"""What a status is worth when two records of one loop meet; a failure is worth nothing."""
+"""Rank of a status when two records of one loop are compared; a failure ranks lowest."""
 
 
 def fuller(old: Row, new: Row, limits: NightLimits) -> bool:
-    """Whether the record that the store has of a loop is worth more than the new one."""
+    """Whether the loop's record in the store is better than the new one."""
     before, after = (WORTH.get(r["status"], 0) for r in (old, new))
     if before != after:
         return before > after
@@ -57,25 +57,24 @@ def _good_h(row: Row) -> float:
 
 
 def is_empty(rows: Sequence[Row]) -> bool:
-    """Whether no loop of a night has a good sample, and none failed, so that there is nothing to keep."""
+    """Whether no loop of a night has a good sample or failed, so that there is nothing to keep."""
     return all(r["status"] == Status.NOT_ASSESSED and not r["good_h"] for r in rows)
 
 
 def finish_night(
     store: Store, night: str, order: Sequence[str], config: Config, keys: Sequence[str], replace: bool = False
 ) -> tuple[str, ...]:
-    """Put one night together from its pieces and keep it; nothing where it has none.
+    """Combine one night from its pieces and store it; nothing without pieces.
 
-    order : the loops of the run, in the order in which they are kept; keys : the chunks whose pieces count; replace :
-    forget what the store has of the night. Returns sentences on what was joined, and on loops whose earlier record
-    was kept.
+    order : the loops of the run, in stored order; keys : the chunks whose pieces count; replace : delete what the
+    store has of the night. Returns sentences on what was joined, and on loops whose earlier record was kept.
     """
     held = Pieces(store, night, keys)
     fresh = {r["loop"]: finding_of(r) for t in held.tables("nights", PLANT_WIDE) for r in t.to_pylist()}
     if not fresh:
         return ()
     other = [] if replace else _rows_held(store, "groups", night, GROUPS)
-    gone = {r["group"] for r in other if r["loop"] in fresh}  # a group of any of these loops is told anew
+    gone = {r["group"] for r in other if r["loop"] in fresh}  # these loops' groups are computed again
     other = [r for r in other if r["group"] not in gone]
     first = 1 + max((int(r["group"]) for r in other), default=0)
     with TemporaryFile() as lines:
@@ -89,7 +88,7 @@ def finish_night(
     }
     beside = [loop for loop in old if loop not in loops]
     mine = [loop for loop in loops if loop not in kept]
-    for name in JOINED:  # trends are most of a night
+    for name in JOINED:  # trends are most of a night's data
         before = () if replace else store.parts_if_there(name, night)
         store.write(name, night, _joined_tables(before, held.tables(name), mine))
     groups = [*other, *reassign_sources(found, loops)]
@@ -102,7 +101,7 @@ def finish_night(
 
 
 class Pieces:
-    """The pieces of a night, those of a few chunks in memory."""
+    """The pieces of a night, with those of a few chunks in memory."""
 
     def __init__(self, store: Store, night: str, keys: Sequence[str]) -> None:
         self.store, self.night = store, night
@@ -117,7 +116,7 @@ class Pieces:
 
     @cached_property
     def _place(self) -> dict[str, int]:
-        """Among which few chunks each loop is."""
+        """The few chunks with each loop."""
         names = enumerate(self.tables("nights", ["loop"]))
         return {loop: k for k, table in names for loop in table.column(0).to_pylist()}
 
@@ -127,14 +126,14 @@ class Pieces:
         return {r.pop("loop"): r for r in rows}
 
     def known(self, loop: str) -> Row:
-        """Columns of a loop that no pass over the plant judges."""
+        """Columns of a loop that no plant-wide pass changes."""
         return self._rows_of(self._place[loop])[loop]
 
 
 def _joined_rows(
     held: Pieces, order: Sequence[str], judged: Mapping[str, Finding], config: Config
 ) -> Iterator[pa.Table]:
-    """The table of a night in parts: rows of loops as they are judged, of others as the store has them."""
+    """The table of a night in parts: judged rows of loops, and rows of others from the store."""
     for k in range(0, len(order), LOOPS_AT_ONCE):
         part = order[k : k + LOOPS_AT_ONCE]
         old = _rows_held(held.store, "nights", held.night, NIGHTS, set(part) - judged.keys())
@@ -146,12 +145,12 @@ def _joined_rows(
 
 
 def _worth(own: Finding) -> Row:
-    """What a finding is compared by with another record of its loop."""
+    """Figures of a finding for the comparison with another record of its loop."""
     return {"loop": own.loop, "status": own.status, "good_h": own.known.get("good_h")}
 
 
 def _worth_held(store: Store, night: str) -> dict[str, Row]:
-    """The same of the loops that the store has of a night."""
+    """The same for the loops of a night in the store."""
     if not store.file("nights", night).exists():
         return {}
     return {r["loop"]: r for r in store.own_rows("nights", night, ("loop", "status", "good_h"))}
@@ -160,7 +159,7 @@ def _worth_held(store: Store, night: str) -> dict[str, Row]:
 def _rows_held(
     store: Store, table: str, night: str, columns: Sequence[Column], loops: Collection[str] | None = None
 ) -> list[dict[str, Any]]:
-    """The rows that the store has of some loops of a night, or of all; none where it has no such table."""
+    """Rows of some loops of a night in the store, or of all; none if it has no such table."""
     if loops == set() or not store.file(table, night).exists():
         return []
     return store.own_rows(table, night, names(columns), loops)
@@ -169,7 +168,7 @@ def _rows_held(
 def _joined_tables(
     before: Iterable[pa.Table], pieces: Iterable[pa.Table], mine: Sequence[str]
 ) -> Iterator[pa.Table]:
-    """Rows of a table of the store in parts, those of some loops taken from pieces; all of one schema."""
+    """Rows of a table of the store in parts, with those of some loops taken from pieces; all of one schema."""
     kept = chain(
         (rows_of_loops(t, mine, others=True) for t in before), (rows_of_loops(t, mine) for t in pieces)
     )
@@ -177,7 +176,7 @@ def _joined_tables(
     first = next(filled, None)
     if first is None:
         return
-    second = next(filled, first.slice(0, 0))  # where the store's are of an earlier version
+    second = next(filled, first.slice(0, 0))  # if those of the store are of an earlier version
     schema = pa.unify_schemas([first.schema, second.schema], promote_options="default")
     for part in chain((first, second), filled):
         yield pa.concat_tables([schema.empty_table(), part], promote_options="default").unify_dictionaries()
@@ -186,7 +185,7 @@ def _joined_tables(
 def _joining_told(
     night: str, loops: Mapping[str, Finding], old: Mapping[str, Row], kept: set[str], beside: Sequence[str]
 ) -> tuple[str, ...]:
-    """What is worth saying of a night that was there already."""
+    """Notes on a night that already existed."""
     said = []
     if beside:
         said.append(f"night {night}: {len(beside)} loops of an earlier run are kept beside these")

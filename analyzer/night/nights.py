@@ -36,7 +36,7 @@ class Night:
 
     @property
     def at_end_s(self) -> float:
-        """The last moment that belongs to it [s]: what is dated at its end belongs to the next one."""
+        """The last moment that belongs to it [s]: a time at its end belongs to the next one."""
         return math.nextafter(self.last_s, -math.inf)
 
 
@@ -46,8 +46,8 @@ def _name(first_s: float, last_s: float, zone: str) -> str:
 
 
 def _daily(first_s: float, last_s: float, limits: NightLimits, zone: str) -> list[Night]:
-    """Cut a span of time at the plant's midnights; a short first or last piece joins its neighbour. Raises InputError
-    where there would be more of them than one run may have."""
+    """Cut a span of time at the plant's midnights; a short first or last piece is joined to its neighbour. Raises
+    InputError if there would be more than one run may have."""
     if last_s - first_s > limits.most * DAY_S:
         days, ends = (last_s - first_s) / DAY_S, f"{stamp_text(first_s)} to {stamp_text(last_s)} UTC"
         remedy = "state the part that is meant with --since and --until"
@@ -62,9 +62,9 @@ def _daily(first_s: float, last_s: float, limits: NightLimits, zone: str) -> lis
 def in_nights(spans: Sequence[Span], limits: NightLimits, zone: str = UTC_NAME) -> list[Night]:
     """The nights of an export from the spans of its loops [s].
 
-    Where the median loop has over whole_h (36 h), the export is cut into days; else each loop is assessed whole, in
-    one night, named by the date of the middle of the loop that ends last. Recordings of different days can so be
-    ranked together.
+    If the median loop has more than whole_h (36 h), the export is cut into days; otherwise each loop is assessed
+    whole, in one night, named by the date of the middle of the loop that ends last, so that recordings of different
+    days can be ranked together.
     """
     lengths = sorted(last - first for first, last in spans)
     first, last = min(s[0] for s in spans), max(s[1] for s in spans)
@@ -84,8 +84,8 @@ def cut(series: Series, night: Night) -> Series:
 
 
 def nights_of(plant: Plant) -> list[Night]:
-    """The nights of a plant within its span of time, cut at its midnights. Raises InputError where the export has no
-    PV of any loop, or nothing within the span."""
+    """The nights of a plant within its span of time, cut at its midnights. Raises InputError if the export has no PV
+    of any loop, or nothing within the span."""
     present = [s.pv for s in plant.specs if s.pv is not None]
     if not present:
         wanted = plant.specs[0].wanted_pv or f"{plant.specs[0].loop}.PV"
@@ -100,11 +100,11 @@ def nights_of(plant: Plant) -> list[Night]:
 
 @dataclass(frozen=True)
 class Plant:
-    """An export and its loops, and what is asked of both.
+    """An export and its loops, with the request.
 
-    specs : loops with the tags that the export has; config : limits; span : of time, whose samples are used [s since
-    1970-01-01 UTC]; changes : when settings were changed, each night has those in force at its end; zone : the
-    plant's time zone, whose days the nights are; notes : what there is to say of files and tables.
+    specs : loops with the tags of the export; config : limits; span : of time, whose samples are used [s since
+    1970-01-01 UTC]; changes : times of changed settings, each night has those in force at its end; zone : the plant's
+    time zone, which defines the nights; notes : notes on files and tables.
     """
 
     export: Export
@@ -131,8 +131,8 @@ class Plant:
         return tuple(self.spans)
 
     def loop(self, name: str, night: str | None = None) -> PlantLoop:
-        """One loop, over one night or over all that the export holds. Raises InputError where there is no such loop
-        or night, or the loop has no PV; NotAssessedError where its trends hold too little to be put on a clock."""
+        """One loop, over one night or over the whole export. Raises InputError where there is no such loop or night,
+        or the loop has no PV; NotAssessedError where its trends have too few samples for a clock."""
         spec = spec_of(self.specs, name)
         if night is not None and night not in self.spans:
             raise InputError(f"night {night}", f"one of {', '.join(self.nights[-3:])}", "see Plant.nights")
@@ -147,7 +147,7 @@ class Plant:
         return {tag: cut(x, span) for tag, x in self.export.read(tags).items()}
 
     def last_night(self, name: str) -> PlantLoop:
-        """One loop over the last night that its own samples make; errors as of `loop` and `nights_of`."""
+        """One loop over its own last night; errors as of `loop` and `nights_of`."""
         alone = replace(self, specs=(spec_of(self.specs, name),))
         return replace(alone.loop(name, alone.nights[-1]), plant=self)
 
@@ -157,7 +157,7 @@ class PlantLoop:
     """One loop over one night, or over all of an export.
 
     spec : its row of loops.csv with the settings in force; prepared : its trends on one clock, with masks and notes;
-    plant : the export that it is of; night : None where it is the whole export.
+    plant : its export; night : None for the whole export.
     """
 
     spec: LoopSpec
@@ -172,7 +172,7 @@ class PlantLoop:
 
     @property
     def controller(self) -> Pid | None:
-        """The stated settings in percent and seconds; None where loops.csv does not state them."""
+        """The stated settings in percent and seconds; None if they are not in loops.csv."""
         return controller_of(self.spec, self.prepared)
 
     @property

@@ -1,4 +1,4 @@
-"""The export that is asked for, opened: its loops, what there is to say of them, and the worker that reads it."""
+"""The opened export of a request: its loops, notes on them, and the worker that reads it."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from analyzer.places import is_remote
 from identification.errors import InputError
 
 MOST_NAMES = 10
-"""Loops that are named in a note; the rest is counted."""
+"""Maximum number of loops listed in a note; the others are counted."""
 
 
 def opened(asked: Asked) -> Plant:
-    """The export and its loops, found by their tags' endings where no loops.csv is given, and what there is to
-    say of them and of the changes."""
+    """The export and its loops, found by their tags' endings without a loops.csv, and notes on them and on the
+    changes."""
     stated = (
         () if asked.loops is None else read_loops(asked.loops, asked.zone, asked.reading.get("day_first"))
     )
@@ -58,8 +58,8 @@ def opened(asked: Asked) -> Plant:
 
 
 def drafted(asked: Asked, told: Callable[[int, int], None]) -> list[Row]:
-    """The rows of a draft of loops.csv, those of a given one first; `told` is told of tags read, and of all. Raises
-    InputError where the export cannot be used."""
+    """The rows of a draft of loops.csv, those of a given one first; `told` is called with the number of tags read,
+    and of all. Raises InputError where the export cannot be used."""
     plant = guarded(asked)
     return draft(plant.export, () if asked.loops is None else plant.specs, asked.span, told)
 
@@ -67,8 +67,8 @@ def drafted(asked: Asked, told: Callable[[int, int], None]) -> list[Row]:
 def in_milliamperes(
     source: Export, specs: tuple[LoopSpec, ...]
 ) -> tuple[tuple[LoopSpec, ...], tuple[str, ...]]:
-    """The loops, marked where their OPs look like currents, and a note on that: where no range of OP is stated, of
-    two or more loops, and each OP that is looked at lies within the range of a signal of 4 to 20 mA."""
+    """The loops, marked if their OPs look like currents, and a note on that: if no range of OP is stated, for two or
+    more loops, and each tested OP is within the range of a signal of 4 to 20 mA."""
     unstated = [
         s for s in specs if s.op and s.pv and s.stated.isdisjoint(("op_lo", "op_hi")) and s.op_hi == 100.0
     ]
@@ -83,8 +83,8 @@ def in_milliamperes(
 
 
 def _lies_within(source: Export, tag: str, low: float, high: float) -> bool:
-    """Whether all good values of a tag lie between two others."""
-    with suppress(InputError):  # a damaged file is told of where its loop is assessed
+    """Whether all good values of a tag are between two others."""
+    with suppress(InputError):  # a damaged file is reported where its loop is assessed
         series = source.read([tag])[tag]
         value = series.value[~series.bad]
         return value.size > 0 and bool(low <= value.min() and value.max() <= high)
@@ -92,7 +92,7 @@ def _lies_within(source: Export, tag: str, low: float, high: float) -> bool:
 
 
 def _of_no_loop(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> tuple[str, ...]:
-    """A note on changes of loops that are not among those that are read."""
+    """A note on changes of loops that are not read."""
     strange = sorted({change.loop for change in changes} - {spec.loop for spec in specs})
     more = f" and {len(strange) - MOST_NAMES} more" if len(strange) > MOST_NAMES else ""
     text = f"{', '.join(strange[:MOST_NAMES])}{more}: no such loop is read; these changes are left aside"
@@ -100,8 +100,8 @@ def _of_no_loop(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> t
 
 
 def opened_apart(asked: Asked) -> Plant:
-    """What is asked, opened in a worker process: a damaged file may take memory or time without end. Raises
-    InputError where the export cannot be used, or the process that read it died."""
+    """The request, opened in a worker process, because a damaged file may need unlimited memory or time. Raises
+    InputError if the export cannot be used, or the process that read it died."""
     with Workers(1, find_out, _allowed(asked)) as workers:
         workers.submit(asked)
         (found,) = workers.results()
@@ -117,9 +117,9 @@ def _ended(path: Path, why: str) -> InputError:
 
 
 def guarded(asked: Asked) -> Plant:
-    """The same, its samples read in a worker process too, whenever they are asked for; errors as of `opened_apart`,
-    also where samples are read."""
-    scratch = asked.reading.get("scratch") or own_scratch()  # gone with this process, however a worker ends
+    """The same, with its samples also read in a worker process; errors as of `opened_apart`, also on reading
+    samples."""
+    scratch = asked.reading.get("scratch") or own_scratch()  # removed with this process in any case
     plant = opened_apart(replace(asked, reading={**asked.reading, "scratch": scratch}))
     return replace(plant, export=Guarded.of(plant.export, asked.config.workers))
 
@@ -159,7 +159,7 @@ _reading: list[Export] = []
 
 
 def read_apart(given: tuple[Export | None, Sequence[str]], began: Callable[[int], None]) -> dict[str, Series]:
-    """What a worker reads of an export, which it is given once."""
+    """Result of a worker's read of an export, which it receives once."""
     _be_silent()
     export, tags = given
     if export is not None:
@@ -168,13 +168,13 @@ def read_apart(given: tuple[Export | None, Sequence[str]], began: Callable[[int]
 
 
 def _be_silent() -> None:
-    """Let nothing of a library reach the terminal, such as the last words of a reader that aborts."""
+    """Suppress all terminal output of libraries, such as that of an aborting reader."""
     with open(os.devnull, "wb") as nowhere:
         os.dup2(nowhere.fileno(), 2)
 
 
 def _allowed(asked: Asked) -> WorkerLimits:
-    """What opening the export may cost, by its size; of shared storage the copying is not known beforehand."""
+    """Limits for opening the export, by its size; for shared storage the copying is not known beforehand."""
     near = [path for path in asked.export if not is_remote(path)]
     files = [file for path in near for file in (path.rglob("*") if path.is_dir() else [path])]
     limits = asked.config.opening
@@ -185,12 +185,12 @@ def _allowed(asked: Asked) -> WorkerLimits:
 
 
 def find_out(asked: Asked, began: Callable[[int], None]) -> Plant:
-    """What a worker finds out about an export, its span of time included."""
+    """Open an export in a worker, including its span of time."""
     _be_silent()
     plant = opened(asked)
     for spec in plant.specs:
         if spec.pv is not None:
             plant.export.span(spec.pv)
-    with suppress(InputError):  # of files without a loop it is nobody's fault
+    with suppress(InputError):  # files without a loop are not an error
         plant.export.span()
     return plant

@@ -1,4 +1,4 @@
-"""Limits that a worker process sets itself: of memory, by the machine or the control groups it is in, and of time."""
+"""Limits that a worker process sets for itself: of memory, by the machine or its control groups, and of time."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ MEGABYTE = 2**20
 
 
 def limit_memory(megabytes: float, machine_share: float) -> None:
-    """Let allocations fail beyond what is held now and so many megabytes more, or a share of the machine's memory;
-    nothing where the system cannot."""
+    """Make allocations fail above the present use plus so many megabytes, or plus a share of the machine's memory; no
+    effect where the system does not support it."""
     if sys.platform != "linux":
         return
     import resource
@@ -26,7 +26,7 @@ def limit_memory(megabytes: float, machine_share: float) -> None:
 
 
 def machine_bytes(groups: Path = Path("/sys/fs/cgroup"), of: Path = Path("/proc/self/cgroup")) -> float:
-    """Memory of this machine, or what the control groups of this process, of either version, leave of it [bytes]."""
+    """Memory of this machine, or what the control groups of this process, of either version, allow [bytes]."""
     limits = [float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))]
     for folder, name in _groups_of(groups, of):
         for level in (folder, *folder.parents):
@@ -37,8 +37,8 @@ def machine_bytes(groups: Path = Path("/sys/fs/cgroup"), of: Path = Path("/proc/
 
 
 def _groups_of(groups: Path, of: Path) -> Iterator[tuple[Path, str]]:
-    """The folders of the control groups that limit memory, and the file of the limit there; a container sees its own
-    as the first of all."""
+    """The folders of the control groups that limit memory, and the file of the limit there; a container has its own
+    as the first."""
     yield groups, "memory.max"
     with contextlib.suppress(OSError):
         for line in of.read_text(encoding="utf-8").splitlines():
@@ -58,7 +58,7 @@ def _held_bytes() -> int:
 
 
 def limit_processor(seconds: float) -> None:
-    """Let this process be ended after so many more seconds of processor time; nothing where the system cannot."""
+    """End this process after so many more seconds of processor time; no effect on systems without support."""
     if sys.platform == "win32":
         return
     import resource

@@ -1,7 +1,7 @@
 """Compile all kernels once, so that the first night is as fast as the second: python -m analyzer.night.warm_up
 
-Kernels are kept beside the code, or in numba's cache directory where that cannot be written; an installation that is
-made once and used by many runs this as its last step.
+Kernels are stored beside the code, or in numba's cache directory if that is not writable; an installation for many
+users runs this as its last step.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ LOOPS = (
     Loop(Fopdt(40.0, 1200.0, 8.0), Pid(0.8, 100.0), Backlash(0.8)),
     Loop(Fopdt(1.2, 8.0, 3.0), Pid(0.4, 20.0), Stiction(4.0, 3.0)),
 )
-"""A flow under a load that swings, a level behind a play, a flow behind a stem that sticks."""
+"""A flow under an oscillating load, a level behind backlash, a flow behind a sticking valve."""
 
 
 def simulated_series(loop: Loop, seed: int) -> dict[str, Series]:
-    """Three hours of a loop at 1 s, as an export has them."""
+    """Three hours of a loop at 1 s, as in an export."""
     rng, n = np.random.default_rng(seed), 10_800
     swing = 2.0 * np.sin(2 * np.pi * np.arange(n) / 600.0) if loop.valve is None else np.zeros(n)
     wander = 30.0 * first_order(rng.normal(0.0, 1.0, n), 1000.0)

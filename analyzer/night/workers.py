@@ -1,10 +1,10 @@
-"""Who carries out tasks, by one interface: this process, worker processes that may die, or a cluster (cluster.py).
+"""Execution of tasks by one interface: this process, worker processes that may die, or a cluster (cluster.py).
 
-Each worker process has a pipe of its own, so that what kills one harms no other.
+Each worker process has its own pipe, so that the death of one affects no other.
 
-A pool whose workers share a queue ends with the first of them that the system kills. Here a worker says which item
-of its task it has in hand; when it dies, that item is known and the rest is given to others. Workers end with the
-process that started them, have a limit of memory and, for each item, of processor time and of time by the clock.
+A pool with a shared queue ends when the system kills one of its workers. Here a worker reports the current item of
+its task; if it dies, that item is known and the others go to other workers. Workers end with the process that started
+them, and have a limit of memory and, for each item, of processor time and of clock time.
 """
 
 from __future__ import annotations
@@ -33,26 +33,26 @@ from analyzer.night.own_limits import limit_memory, limit_processor
 T = TypeVar("T")
 R = TypeVar("R")
 Began = Callable[[int], None]
-"""Told by a worker's function: the number of the item of its task that it begins with."""
+"""Called by a worker's function with the number of the item that it starts."""
 PRELOADED = "analyzer.night.chunk"
-"""What workers need, imported once for all of them."""
+"""Module that workers need, imported once for all of them."""
 POLL_S = 0.5
-"""How often the clocks of the items in hand are looked at [s]."""
+"""Interval of the check of the items' times [s]."""
 OUT_OF_TIME = -int(getattr(signal, "SIGXCPU", 24))
-"""Exit status of a worker that used up its processor time."""
+"""Exit status of a worker that exceeded its processor time."""
 NEW_S = 43_200.0
-"""Age up to which the folder of a server stays [s], for the process that began it may live and remove it itself:
-longer than a night's run, shorter than a day."""
+"""Age up to which a server's folder is kept [s], because its process may be alive and remove it itself: longer than a
+night's run, shorter than a day."""
 SERVER_GONE = 255
-"""Exit status of workers whose server is gone, which alone knows their own (multiprocessing.popen_forkserver)."""
+"""Exit status of workers whose server ended, which alone knows theirs (multiprocessing.popen_forkserver)."""
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerDeath(Generic[T]):
-    """A worker died over a task, or was ended.
+    """A worker died during a task, or was ended.
 
-    task : what it worked on; at : number of the item in hand, None where that is not known; why, in words; again :
-    whether the item may succeed on another try (not where it took too long).
+    task : its task; at : number of the current item, None if unknown; why, in words; again : whether another try may
+    succeed (not after too much time).
     """
 
     task: T
@@ -62,9 +62,9 @@ class WorkerDeath(Generic[T]):
 
 
 class Executor(Generic[T, R]):
-    """Who carries out one function on many tasks, for as long as it is entered: by itself this process, one after
-    the other, unprotected. `watch` is told now and then how many items of the tasks in hand are done, where that is
-    known."""
+    """Executes one function on many tasks while the context is entered; this base class uses this process, one task
+    after another, unprotected. `watch` is called from time to time with the number of finished items of the current
+    tasks, if known."""
 
     def __init__(self, function: Callable[..., R]) -> None:
         self._function = function
@@ -75,17 +75,17 @@ class Executor(Generic[T, R]):
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Give up what is not done."""
+        """Cancel unfinished tasks."""
         self._waiting.clear()
 
     def submit(self, task: T, alone: bool = False) -> None:
-        """Add a task; one that is to run alone waits until nothing else does that it might end."""
+        """Add a task; a task that must run alone waits until no other one runs that it might end."""
         self._waiting.append(task)
 
     def results(self) -> Iterator[R | WorkerDeath[T]]:
-        """What comes back, as it comes, until no task is left; tasks may be added meanwhile.
+        """Results in order of arrival until no task remains; tasks may be added meanwhile.
 
-        Whatever the function raises is raised: an error of an item is the function's business.
+        Exceptions of the function are raised: it must handle errors of items itself.
         """
         while self._waiting:
             yield self._function(self._waiting.popleft())
@@ -105,9 +105,10 @@ class _Worker:
 
 
 class Workers(Executor[T, R]):
-    """Some processes of this machine, so many at most.
+    """Up to a number of processes of this machine.
 
-    The function, of a task and of `Began`, is importable by name, for the processes share no memory with this one.
+    The function, of a task and of `Began`, is importable by name, because the processes share no memory with this
+    one.
     """
 
     def __init__(self, count: int, function: Callable[[T, Began], R], limits: WorkerLimits) -> None:
@@ -117,7 +118,7 @@ class Workers(Executor[T, R]):
         self._workers: list[_Worker] = []
 
     def __exit__(self, *_: object) -> None:
-        """End all processes at once, whatever they are at."""
+        """End all processes immediately."""
         for worker in self._workers:
             worker.process.kill()
         for worker in self._workers:
@@ -134,7 +135,7 @@ class Workers(Executor[T, R]):
             yield from self._gathered()
 
     def _feed(self) -> None:
-        """Give each idle worker a task, and start workers where there are more tasks than idle ones."""
+        """Give each idle worker a task, and start workers if there are more tasks than idle ones."""
         busy = sum(w.busy for w in self._workers)
         alone = not self._waiting and not busy
         queue = self._alone if alone else self._waiting
@@ -142,7 +143,7 @@ class Workers(Executor[T, R]):
         for _ in range(min(room, len(queue))):
             worker = next((w for w in self._workers if not w.busy), None) or self._started()
             worker.task, worker.at, worker.since_s = queue.popleft(), 0, time.monotonic()
-            with contextlib.suppress(BrokenPipeError, ConnectionResetError):  # seen as its death below
+            with contextlib.suppress(BrokenPipeError, ConnectionResetError):  # its death is handled below
                 worker.pipe.send(worker.task)
 
     def _started(self) -> _Worker:
@@ -190,7 +191,7 @@ class Workers(Executor[T, R]):
 def executor(
     jobs: int, tasks: int, function: Callable[..., R], limits: WorkerLimits, scheduler: str | None = None
 ) -> Executor[Any, R]:
-    """The cluster of a scheduler, else worker processes for so many tasks, or this process where there are to be no
+    """The cluster of a scheduler, otherwise worker processes for so many tasks, or this process if there are no
     jobs."""
     if scheduler is not None:
         from analyzer.night.cluster import Cluster  # it is one of these
@@ -200,11 +201,11 @@ def executor(
 
 
 def _process(pipe: Connection, *given: Any) -> Any:
-    """A worker's process, started: on Linux forked from a server that has imported what all need, else, or where the
-    server cannot be had, afresh."""
+    """The started process of a worker: on Linux forked from a server with common imports, otherwise, or if the server
+    is not available, a new one."""
     asked: dict[str, Any] = {"target": _serve, "args": (pipe, _surroundings(), *given), "daemon": True}
     if sys.platform == "linux":
-        with contextlib.suppress(OSError, EOFError):  # no room for its socket, or it died while it began
+        with contextlib.suppress(OSError, EOFError):  # no space for its socket, or it died at the start
             forked = multiprocessing.get_context("forkserver")
             forked.set_forkserver_preload([PRELOADED])
             _forget_dead_servers(Path(tempfile.gettempdir()))
@@ -219,7 +220,7 @@ def _process(pipe: Connection, *given: Any) -> Any:
 
 
 def _forget_dead_servers(folder: Path) -> None:
-    """Remove the folders of sockets that nobody listens at any more: kill -9 of a run leaves its server's."""
+    """Remove the folders of sockets without a listener: kill -9 of a run leaves its server's."""
     known = _open_sockets()
     if forkserver._forkserver._forkserver_pid is not None or known is None:  # type: ignore
         return
@@ -232,8 +233,8 @@ def _forget_dead_servers(folder: Path) -> None:
 
 
 def _open_sockets() -> str | None:
-    """What the kernel says of this machine's sockets; None where it does not. Nobody is connected to: a server that
-    is asked by a stranger ends."""
+    """The kernel's list of this machine's sockets; None if not available. No connection is made, because a server
+    ends on a connection from a stranger."""
     try:
         return Path("/proc/net/unix").read_text()
     except OSError:
@@ -242,8 +243,8 @@ def _open_sockets() -> str | None:
 
 @contextlib.contextmanager
 def _undisturbed() -> Iterator[None]:
-    """What the server begins under: it imports nothing that lies in the folder where the night is run, as a script
-    named reports.py, and leaves Ctrl-C to this process."""
+    """Environment for starting the server: it imports nothing from the current folder, such as a script named
+    reports.py, and ignores Ctrl-C, which this process handles."""
     before, name = os.environ.get("PYTHONSAFEPATH"), "PYTHONSAFEPATH"
     os.environ[name] = "1"
     resource_tracker.ensure_running()  # which unblocks signals as it begins
@@ -272,8 +273,8 @@ def _surroundings() -> _Surroundings:
 
 
 def _take_on(given: _Surroundings) -> None:
-    """Be in the surroundings of the process that starts this one now, and not of the server when it began; what
-    libraries read as they are imported stays as it was then."""
+    """Set the environment of the process that starts this one, instead of that of the server at its start; values
+    that libraries read on import stay as they were then."""
     os.environ.clear()
     os.environ.update(given.environ)
     os.umask(given.mask)
@@ -299,11 +300,11 @@ def _serve(
     function: Callable[[Any, Began], Any],
     limits: WorkerLimits,
 ) -> None:
-    """A worker's life: tasks in, results out, until the pipe closes."""
+    """Main loop of a worker: tasks in, results out, until the pipe closes."""
     _take_on(surroundings)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
     if not sys.warnoptions:
-        warnings.simplefilter("ignore")  # a library's warning says nothing to an engineer
+        warnings.simplefilter("ignore")  # a library's warning is useless to an engineer
     _end_with_parent()
     limit_memory(limits.memory_mb, limits.machine_share)
 
@@ -319,21 +320,21 @@ def _serve(
         limit_processor(limits.processor_s)
         try:
             answer = ("done", function(task, began))
-        except Exception as error:  # told to the parent, which raises it
+        except Exception as error:  # sent to the parent, which raises it
             answer = ("raised", error)
         try:
             pipe.send(answer)
         except (BrokenPipeError, ConnectionResetError):
             return
-        except Exception as error:  # an answer that cannot be sent
+        except Exception as error:  # a result that cannot be sent
             pipe.send(("raised", RuntimeError(f"{type(error).__name__}: {error}; {answer[1]!r}"[:500])))
 
 
 def _end_with_parent() -> None:
-    """End this process when its parent does, however that ends: at once on Linux, else as a thread sees it.
+    """End this process when its parent ends in any way: immediately on Linux, otherwise when a thread detects it.
 
-    On Linux the end of the parent's pipe is a signal to this process, which no long call holds up; so is the death of
-    the process that forked it, the parent or a server of the parent's.
+    On Linux the end of the parent's pipe sends a signal to this process, which no long call delays; so does the death
+    of the process that forked it, the parent or a server of the parent's.
     """
     parent = multiprocessing.parent_process()
 

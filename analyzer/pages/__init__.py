@@ -1,1 +1,1 @@
-"""Results to pages: read from the store, put into words, handed to the renderers as data."""
+"""Conversion of results to pages: read from the store, put into words, passed to the renderers as data."""

@@ -1,4 +1,4 @@
-"""The before/after page: changes of controllers, what came of each, per loop and on average, with proof."""
+"""The before/after page: changes of controllers and their effects, per loop and on average, with evidence."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ PRIMARY = tuple(m for m in MEASURES if m.primary)
 NINETY = 1.645
 """Standard deviations of a 90 % interval to either side."""
 MOST_CONTROLS = 40
-"""Unchanged loops of an area that are read at most; ours."""
+"""Maximum number of unchanged loops of an area that are read; ours."""
 TREND_BUCKETS = 4000
 """Buckets of a trend on this page: two weeks at two pixels a bucket, 64 kB a loop; ours."""
 OFFERED = "These changes were not stated but seen in the loops' behaviour: confirm them first."
@@ -56,7 +56,7 @@ OFFERED = "These changes were not stated but seen in the loops' behaviour: confi
 
 @dataclass(frozen=True, slots=True)
 class ChangeCase:
-    """A change with what came of it, the loop's row of the last night around it, and its trend."""
+    """A change with its result, the loop's row of the last night around it, and its trend."""
 
     change: TuningChange
     found: LoopComparison
@@ -65,8 +65,7 @@ class ChangeCase:
 
 
 def detected(store: Store, loops: Sequence[str] | None, config: Config) -> list[TuningChange]:
-    """Changes that nobody stated: settings that differ between nights, and steps of a controller's
-    behaviour."""
+    """Unstated changes: settings that differ between nights, and steps of a controller's behaviour."""
     nights = store.nights()
     rows = by_loop(read_nights(store, nights, COLUMNS, loops))
     hours = read_hours(store, rows, nights)
@@ -85,9 +84,9 @@ def change_cases(
     stated: tuple[Span | None, Span | None] = (None, None),
     limits: ComparisonLimits = LIMITS,
 ) -> tuple[list[ChangeCase], list[tuple[str, str]]]:
-    """Every change with what came of it, and those that could not be looked at, with the reason.
+    """All changes with their results, and those that could not be analysed, with the reason.
 
-    Some days each side are compared, or spans that are stated; several changes of one loop end each other's spans.
+    Some days on each side are compared, or stated spans; several changes of one loop limit each other's spans.
     """
     if not changes:
         return [], []
@@ -125,7 +124,7 @@ def _evidence(
     spans: tuple[Span, Span],
     limits: ComparisonLimits,
 ) -> Evidence:
-    """What a loop's nights say of a change beside its hours."""
+    """Evidence on a change from a loop's nights, besides its hours."""
     ends = [(span.first_s, span.last_s) for span in spans]
     weeks = weeks_of(rows, ends, (change.kp_old, change.ti_old), (change.kp_new, change.ti_new), limits)
     recorded = any(r["travel_of"] == "stem" for r in rows)
@@ -140,7 +139,7 @@ def _evidence(
 
 
 def _works_with_others(rows: Sequence[words.Row], span: Span) -> bool:
-    """Whether in most nights of a span OP shows other settings than those that are stated."""
+    """Whether OP shows settings other than the stated ones in most nights of a span."""
     own = [r for r in rows if r["start_s"] is not None and span.first_s <= r["start_s"] < span.last_s]
     return sum(r["action"] == Action.CHECK_SETTINGS for r in own) > 0.5 * len(own)
 
@@ -153,7 +152,7 @@ def _reference(
     spans: tuple[Span, Span],
     limits: ComparisonLimits,
 ) -> Reference | None:
-    """What loops of the same area did meanwhile of which no change is stated; None with too few, or without areas."""
+    """Change in loops of the same area without a stated change meanwhile; None with too few, or without areas."""
     if not row["area"]:
         return None
     touched = {c.loop for c in changes}
@@ -164,7 +163,7 @@ def _reference(
 
 
 def outcome(found: LoopComparison) -> str:
-    """A loop's outcome in one phrase, with what makes its weeks differ."""
+    """A loop's result in one phrase, with the reasons why its weeks differ."""
 
     def of(verdict: ChangeVerdict) -> list[Change]:
         return [c for c in found.primary if c.verdict is verdict]
@@ -187,7 +186,7 @@ def outcome(found: LoopComparison) -> str:
 
 
 def _priced(change: Change) -> str:
-    """A figure's name, with its own change where it is simulated."""
+    """A figure's name, with its own change if it is simulated."""
     name = change.measure.short_title.lower()
     return name if change.parts is None else f"{name} ({words.signed(_percent(change.parts.change.value))} %)"
 
@@ -204,7 +203,7 @@ def _told(part: Part) -> parts.Cell:
 
 
 def _stated(row: words.Row, name: str) -> float | None:
-    """A number of the plant: a column of the night, or of its JSON of the plant's own columns."""
+    """A number stated by the plant: a column of the night, or of its JSON of the plant's own columns."""
     held = json.loads(row.get("extra") or "{}") | {k: v for k, v in row.items() if v is not None}
     try:
         value = float(held[name])
@@ -214,17 +213,16 @@ def _stated(row: words.Row, name: str) -> float | None:
 
 
 def _clear_change(found: LoopComparison, name: str) -> Change | None:
-    """The change of a figure, where it is clear."""
+    """The change of a figure, if it is clear."""
     unclear = (ChangeVerdict.INCOMPARABLE, ChangeVerdict.UNCLEAR)
     return next((c for c in found.changes if c.measure.name == name and c.verdict not in unclear), None)
 
 
 def wear_texts(found: LoopComparison, row: words.Row) -> tuple[str, ...]:
-    """What the change means in valve life and in the plant's own cost of error, from numbers that loops.csv states
-    alone.
+    """The effect of the change on valve life and on the plant's cost of error, from numbers in loops.csv.
 
     valve_life_travel_pct : travel after which a valve is overhauled [% of stroke, summed]
-    cost_per_error_pct_h : what one percent of average absolute error costs an hour [cost_unit]
+    cost_per_error_pct_h : cost of one percent of average absolute error per hour [cost_unit]
     """
     texts = []
     travel, life = _clear_change(found, "valve_travel_pct_per_h"), _stated(row, "valve_life_travel_pct")
@@ -242,7 +240,7 @@ def wear_texts(found: LoopComparison, row: words.Row) -> tuple[str, ...]:
 
 
 def _outcome_tiles(cases: Sequence[ChangeCase]) -> parts.Tiles:
-    """How many changes came out how, in the order of the outcomes."""
+    """Number of changes with each result, in the order of results."""
     known = words.texts("outcomes")
     counts = Counter(known[grade(c.found)]["tile"] for c in cases)
     tones = {o["tile"]: o["tone"] for o in known.values()}
@@ -251,8 +249,8 @@ def _outcome_tiles(cases: Sequence[ChangeCase]) -> parts.Tiles:
 
 
 def _row(change: Change, found: LoopComparison, first: bool) -> tuple[words.NightDecision, ...]:
-    """A figure before and after; the interval is in percent of before, in the figure's unit where that is zero; the
-    remark on a loop stands in its first row."""
+    """A figure before and after; the interval is in percent of before, in the figure's unit if that is zero; the
+    remark on a loop is in its first row."""
     d, ends, unit = change.found, change.interval_pct, change.measure.unit
     interval = f"{words.number(d.low)} … {words.number(d.high)} {unit}"
     if ends is not None:
@@ -270,7 +268,7 @@ def _row(change: Change, found: LoopComparison, first: bool) -> tuple[words.Nigh
 
 
 def _colour(change: Change, found: LoopComparison) -> str:
-    """The colour of a figure's verdict: what a trade costs is not red."""
+    """The colour of a figure's verdict: the cost in a trade-off is not red."""
     traded = change.verdict is ChangeVerdict.WORSE and grade(found) is Grade.TRADED
     return ChangeVerdict.UNCLEAR.colour if traded else change.verdict.colour
 
@@ -285,7 +283,7 @@ def figures(cases: Sequence[ChangeCase], primary: bool, name: str) -> parts.Tabl
 
 
 def _settings_typed(case: ChangeCase) -> str:
-    """Old and new settings with their units; else what was seen."""
+    """Old and new settings with their units; otherwise what was detected."""
     change, row = case.change, case.row
     if change.kp_new is None and change.ti_new is None:
         return change.seen or "not stated"
@@ -298,7 +296,7 @@ def _settings_typed(case: ChangeCase) -> str:
 
 
 def _in_short(case: ChangeCase) -> tuple[words.NightDecision, ...]:
-    """A loop in one row: what was typed in, the four changes, and what to make of them."""
+    """A loop in one row: the new settings, the four changes, and the conclusion."""
     by_name = {c.measure.name: c for c in case.found.primary}
     kind = words.texts("outcomes")[grade(case.found)]["tone"]
     return (
@@ -311,7 +309,7 @@ def _in_short(case: ChangeCase) -> tuple[words.NightDecision, ...]:
 
 
 def _change_cell(change: Change | None, found: LoopComparison) -> parts.Cell:
-    """The change's own part where both loops were simulated, else what was measured."""
+    """The change's own part if both loops were simulated, otherwise the measured change."""
     if change is None or change.verdict is ChangeVerdict.INCOMPARABLE:
         return parts.Cell("–")
     colour = _colour(change, found)
@@ -324,7 +322,7 @@ def _change_cell(change: Change | None, found: LoopComparison) -> parts.Cell:
 
 
 def changes_in_short(cases: Sequence[ChangeCase]) -> parts.Table:
-    """A row a loop."""
+    """One row per loop."""
     *first, last = words.page_columns("changes")
     hint = "Change, with its interval"
     four = (parts.Column(m.name, f"{m.short_title}, % of before", True, hint, True) for m in PRIMARY)
@@ -332,7 +330,7 @@ def changes_in_short(cases: Sequence[ChangeCase]) -> parts.Table:
 
 
 def _parts_told(found: LoopComparison) -> parts.Listing | None:
-    """What each simulated figure's difference is made of, a line each; None where nothing was simulated."""
+    """Components of each simulated figure's difference, one line each; None without a simulation."""
     told = words.texts("parts_told")["line"]
     lines = []
     for c in found.primary:
@@ -347,7 +345,7 @@ def _parts_told(found: LoopComparison) -> parts.Listing | None:
 
 
 def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> parts.Section:
-    """What became of one loop: settings, spans, remarks, trends (the study's Figure 10)."""
+    """Results for one loop: settings, spans, remarks, trends (the study's Figure 10)."""
     found, change = case.found, case.change
     spans = [
         f"{words.stamp(s.first_s, zone)} to {words.stamp(s.last_s, zone)} {zone}, {usable_h:.0f} usable hours"
@@ -368,7 +366,7 @@ def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> parts.
 
 
 def _trend(case: ChangeCase, number_: int) -> parts.Trend | None:
-    """Both spans of a loop; None where the store holds no trends of them, for they may have been pruned."""
+    """Both spans of a loop; None if the store has no trends of them, because they may have been deleted."""
     if case.trend is None:
         return None
     found, marks = case.found, (parts.Mark(case.change.time_s, "changed"),)
@@ -380,7 +378,7 @@ def _trend(case: ChangeCase, number_: int) -> parts.Trend | None:
 
 
 def _shown(change: Change) -> tuple[float | None, float | None, float | None]:
-    """The change's own part where both loops were simulated, else what was measured, with its ends [% of before]."""
+    """The change's own part if both loops were simulated, otherwise the measured one, with its ends [% of before]."""
     if change.parts is not None:
         low, high = map(_percent, change.parts.change.interval(NINETY))
         return _percent(change.parts.change.value), low, high
@@ -403,7 +401,7 @@ def per_loop_chart(cases: Sequence[ChangeCase]) -> parts.IntervalChart:
 
 
 def _average(cases: Sequence[ChangeCase], measure: Measure) -> parts.IntervalBar:
-    """Mean of the loops' changes; errors of different loops taken as independent."""
+    """Mean of the loops' changes; errors of different loops are assumed independent."""
     changes = [c for case in cases for c in case.found.primary if c.measure.name == measure.name]
     known = [shown for shown in map(_shown, changes) if shown[0] is not None]
     group = words.with_noun(len(known), "loop")
@@ -433,7 +431,7 @@ def changes_page(
     offered: bool = False,
     zone: str = UTC_NAME,
 ) -> parts.Page:
-    """The page of all changes on the plant's clock; `missing` could not be looked at, with the reason."""
+    """The page of all changes on the plant's clock; `missing` could not be analysed, with the reason."""
     lost = parts.Listing(tuple((loop, f"not looked at: {why}") for loop, why in missing)) if missing else None
     seen = parts.Text((OFFERED,)) if offered else None
     comparable = [c for c in cases if grade(c.found) is not Grade.INCOMPARABLE]

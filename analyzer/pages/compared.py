@@ -1,4 +1,4 @@
-"""The page on which settings are compared and tried: what engineers know beside what is recommended, and a slider."""
+"""The page on which settings are compared and simulated: recommended and other settings, and a slider."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ from tuning.limits import METHOD
 from tuning.rules import simc
 
 OFFERED = (CALMER, SMALLER, DERIVATIVE)
-"""Settings between which may be chosen beside the recommended ones."""
+"""Alternative settings to choose from, besides the recommended ones."""
 PLACED = {NOW: "now", RECOMMENDED: "recommended"}
-"""Colours of settings in a picture; others are those of a rule."""
+"""Colours of settings in a picture; others have that of a rule."""
 
 
 def _against(value: float, now: float) -> str:
@@ -42,7 +42,7 @@ def _against(value: float, now: float) -> str:
 
 
 def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
-    """What the recommended settings win and cost, in a sentence; of a loop without them what is compared."""
+    """Gains and losses of the recommended settings, in a sentence; otherwise the list of what is compared."""
     now, new = c.tried[0], next((t for t in c.tried if t.name == RECOMMENDED), None)
     if new is None:
         offers = "; ".join(
@@ -66,7 +66,7 @@ def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
 
 
 def choices(c: Comparison, spec: LoopSpec) -> list[str]:
-    """The settings between which an engineer may choose, a line each, and what a repair would bring."""
+    """The settings from which an engineer may choose, one line each, and the effect of a repair."""
     named = [t.name for t in c.tried if t.name in (RECOMMENDED, *OFFERED) and t.name in c.everywhere]
     unit = spec.pv_unit or "PV"
     told = [f"{name}: {_typed(c, name, spec)}: {_priced(c, name)}" for name in named]
@@ -75,7 +75,7 @@ def choices(c: Comparison, spec: LoopSpec) -> list[str]:
 
 
 def _offers(c: Comparison, settings: list[str], repair: str, unit: str) -> list[str]:
-    """Settings with what they win and cost, and what a repair brings, on the identified loop."""
+    """Settings with their gains and losses, and the effect of a repair, on the identified loop."""
     if c.repaired is None:
         return settings
     t, now, scale = c.repaired, c.tried[0], c.pv_span / 100.0
@@ -85,7 +85,7 @@ def _offers(c: Comparison, settings: list[str], repair: str, unit: str) -> list[
 
 
 def _typed(c: Comparison, name: str, spec: LoopSpec) -> str:
-    """Settings as they are typed in."""
+    """Settings in the units of entry."""
     pid = next(t.controller for t in c.tried if t.name == name)
     kp, ti = as_stated(pid, spec, c.pv_span)
     gain = gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit)
@@ -94,13 +94,13 @@ def _typed(c: Comparison, name: str, spec: LoopSpec) -> str:
 
 
 def _td(c: Comparison, pid: Pid, spec: LoopSpec) -> str:
-    """A derivative time as it is typed in."""
+    """A derivative time in the units of entry."""
     td = derivative_as_stated(pid, spec, c.pv_span)
     return f"Td {number(td)} {'s' if spec.ti_unit == 's' else 'min'}"
 
 
 def _priced(c: Comparison, name: str) -> str:
-    """What settings win and cost on that of all loops that the data allow where each is worst, and on a load step."""
+    """Gains and losses of settings, on the worst of all loops consistent with the data, and on a load step."""
     found = c.everywhere[name]
     travel, error = map(_against_now_pct, (found.worst_travel, found.worst_error))
     return (
@@ -109,20 +109,20 @@ def _priced(c: Comparison, name: str) -> str:
 
 
 def _against_now_pct(ratio: float) -> str:
-    """A change against now; of what hardly is now no percentage."""
+    """A change relative to now; no percentage if now is nearly zero."""
     if ratio > PAGES.many_times:
         return f"over {PAGES.many_times:g} times"
     return f"{signed(100.0 * (ratio - 1.0))} %"
 
 
 def _times(t: Tried, now: Tried) -> float | None:
-    """Sum of the error that a step of load leaves, over that of the present settings; None where one never ends."""
+    """Integral of the error after a load step, over that of the present settings; None if one is infinite."""
     known = math.isfinite(t.integral_s) and math.isfinite(now.integral_s)
     return t.integral_s / now.integral_s if known else None
 
 
 def table(c: Comparison, spec: LoopSpec, unit: str) -> parts.Table:
-    """The settings with what they do on the load."""
+    """The settings with their effects under the load."""
     said, lasts = texts("settings_tried"), duration(c.load.size * scan_step(c.loop))
     note = said["note"].format(lasts=lasts) + said["derivative"] * (c.loop.controller.td_s > 0.0)
     return page_table(
@@ -168,7 +168,7 @@ def travel_field(
 ) -> parts.Field:
     """The travel of the limit cycle over Kp and Ti, with settings as points.
 
-    moves, rest : what travels, and what is said of settings at rest.
+    moves, rest : what travels, and the text for settings at rest.
     """
     swings = f"limit cycle, the darker the more {moves} travels"
     keys = (("swings", swings), ("calm", f"comes to rest{rest}"), ("unstable", "unstable"))
@@ -181,7 +181,7 @@ def _place(x: float, y: float, t: Tried) -> parts.Place:
 
 
 def price(c: Comparison, unit: str) -> parts.Plot | None:
-    """Travel over error of the settings that no others beat in both, and of those compared; None without such."""
+    """Travel over error of the settings that are not inferior in both, and of those compared; None without such."""
     if len(c.curve) < 2:
         return None
     now, scale, most = c.tried[0], c.pv_span / 100.0, PAGES.shown_ratio
@@ -202,7 +202,7 @@ def price(c: Comparison, unit: str) -> parts.Plot | None:
 
 
 def field(c: Comparison) -> parts.Field | None:
-    """The travel map with all settings that are compared; None where the valve is free."""
+    """The travel map with all compared settings; None for an ideal valve."""
     if c.travel is None:
         return None
     known = [t for t in c.tried if math.isfinite(t.controller.ti_s)]
@@ -214,9 +214,9 @@ def field(c: Comparison) -> parts.Field | None:
 
 
 def _kick(c: Comparison) -> dict[str, float]:
-    """What sets a loop with play going, as tuning.forecast.run does it.
+    """The start of motion of a loop with backlash, as in tuning.forecast.run.
 
-    Kick [% PV times gain], the slowest time beside Ti [s], times of it that the loop is left alone, scans at least.
+    Kick [% PV times gain], the slowest time besides Ti [s], multiples of it without a kick, minimum scans.
     """
     width = band(c.loop.valve)
     free = replace(c.loop, controller=replace(c.loop.controller, ti_s=math.inf))
@@ -234,12 +234,12 @@ def _finite(x: float) -> float | None:
 
 
 def model(c: Comparison, spec: LoopSpec, unit: str) -> str:
-    """What a page needs to simulate the loop with other settings, as JSON."""
+    """Data with which a page simulates the loop with other settings, as JSON."""
     loop, h = c.loop, scan_step(c.loop)
     d, pid = discretize(loop.process, h), c.loop.controller
     breakaway, sliding, tolerance = law_of(loop.valve)
     law = per_scan(pid, h)
-    alike = [t for t in c.tried if t.controller.td_s == pid.td_s]  # the sliders move Kp and Ti alone
+    alike = [t for t in c.tried if t.controller.td_s == pid.td_s]  # the sliders change Kp and Ti only
     found: dict[str, Any] = {
         "process": {"pole": d.pole, "now": d.now, "before": d.before, "delay": d.delay},
         "valve": {"breakaway": breakaway, "sliding": sliding, "tolerance": _finite(tolerance)},
@@ -279,7 +279,7 @@ def model(c: Comparison, spec: LoopSpec, unit: str) -> str:
 
 
 def settings_page(loop: str, night: str, c: Comparison, spec: LoopSpec) -> parts.Page:
-    """A loop's page of settings."""
+    """The settings page of a loop."""
     known = spec.pv_lo is not None and spec.pv_hi is not None
     unit, said = (spec.pv_unit or "own unit") if known else "%", texts("settings_tried")
     meant = texts("settings") | (

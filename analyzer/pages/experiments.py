@@ -1,4 +1,4 @@
-"""The experiments of a night on a loop's page: each with its span, its answer and the model's, and the constants."""
+"""The experiments of a night on a loop's page: each with its span, PV, simulated PV, and constants."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from analyzer.pages.words import Row, number
 from reports import pages as parts
 
 Kept = Mapping[str, Any]
-"""An experiment as the store keeps it (analyzer/loop/experiments.py)."""
+"""An experiment as stored (analyzer/loop/experiments.py)."""
 
 
 def experiments_section(row: Row) -> parts.Section | None:
-    """What experiments in the night tell, None where there were none."""
+    """Results of experiments in the night, None if there were none."""
     found = json.loads(row.get("experiments") or "[]")
     if not found:
         return None
@@ -51,7 +51,7 @@ def _constants(x: Kept) -> Iterator[tuple[str, str]]:
 
 
 def _pictures(at: int, x: Kept, scale: words.PvScale) -> Iterator[parts.Panels]:
-    """PV with the model's answer, and OP below."""
+    """PV with the model's response, and OP below."""
     hours = np.asarray(x["time_s"], dtype=float) / 3600.0
     pv, simulated = (scale.of(np.asarray(x[k], dtype=float)) for k in ("pv", "simulated"))
     op = np.asarray(x["op"], dtype=float)

@@ -1,4 +1,4 @@
-"""Groups that share an oscillation: as a list, in the morning page, as pages of their own and in those of loops."""
+"""Groups with a common oscillation: as a list, on the morning page, on their own pages and on those of loops."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from reports.plain import csv_text
 from reports.texts import visible
 
 PERIODS = 12.0
-"""Periods that the aligned trends show."""
+"""Periods in the aligned trends."""
 FLOOR_DB = 30.0
-"""Level under a loop's peak from which a colour is empty [dB]."""
+"""Level below a loop's peak at which the colour is empty [dB]."""
 
 
 def grouped(store: Store, night: str | None = None, top: int | None = None) -> tuple[list[GroupView], str]:
-    """The groups of a night, those that cost most first, and the night's name.
+    """The groups of a night, highest loss first, and the night's name.
 
     Raises
     ------
     InputError
-        Where there is no such store or night.
+        There is no such store or night.
     """
     name = night or store.require()
     store.read("nights", name, ["loop"])
@@ -43,7 +43,7 @@ def grouped(store: Store, night: str | None = None, top: int | None = None) -> t
 
 
 def group_row(g: GroupView) -> dict[str, Any]:
-    """What is listed of a group, candidates by their names and members as they are."""
+    """Listed columns of a group, candidates by their names and members unchanged."""
     source = g.source
     told = {
         "group": g.number,
@@ -97,15 +97,15 @@ def _as_table(shown: Sequence[Sequence[str]], night: str) -> str:
 
 
 def _told(g: GroupView, unseen: str, undecided: str) -> tuple[str, ...]:
-    """A group in a row: number, loops, period, where it starts or `unseen`, the action there or `undecided`, what the
-    others gain, and they."""
+    """A row of a group: number, loops, period, the source or `unseen`, the action there or `undecided`, the
+    improvement for the others, and their names."""
     others = ", ".join(r["loop"] for r in g.rows if r is not g.source)
     head = g.number, str(len(g.rows)), duration(g.period_s), _candidates(g) or unseen
     return (*head, action_there(g) or undecided, number(g.gain_pct), others)
 
 
 def action_there(g: GroupView) -> str:
-    """The action at the source with the settings to type in, where there are any."""
+    """The action at the source with the new settings, if there are any."""
     return action_text(g.loops[g.source["loop"]], g.action) if g.source else g.action
 
 
@@ -114,7 +114,7 @@ def _candidates(g: GroupView) -> str:
 
 
 def sentence(g: GroupView) -> str:
-    """One cause, so many loops: what is shared, where it starts, what the others would gain."""
+    """Summary of a group: the common oscillation, its source, and the improvement for the others."""
     head = f"One oscillation of {duration(g.period_s)} in {len(g.rows)} loops"
     if g.source is not None:
         loop, pct = g.source["loop"], g.source["source_pct"]
@@ -125,7 +125,7 @@ def sentence(g: GroupView) -> str:
 
 
 def morning_table(groups: Sequence[GroupView], linked: bool) -> parts.Table:
-    """One cause, several loops: the groups of a night, those that cost most first; `linked` to their pages."""
+    """One cause, several loops: the groups of a night, highest loss first; `linked` to their pages."""
     rows = []
     for g in groups:
         href = f"group-{g.number}.html" if linked else ""
@@ -138,7 +138,7 @@ def morning_table(groups: Sequence[GroupView], linked: bool) -> parts.Table:
 
 
 def _members_table(g: GroupView, night: ShownNight) -> parts.Table:
-    """The members with their lags and gains, the likeliest source first."""
+    """The members with their lags and gains, the most likely source first."""
 
     def own(row: Row) -> dict[str, words.NightDecision]:
         pct, cause = row["source_pct"], g.loops[row["loop"]]["cause"]
@@ -149,7 +149,7 @@ def _members_table(g: GroupView, night: ShownNight) -> parts.Table:
 
 
 def _signs_table(g: GroupView) -> parts.Table:
-    """Why there: the signs of the likeliest candidates side by side."""
+    """The evidence for the source: criteria of the most likely candidates side by side."""
     shown = {r["loop"]: json.loads(r["group_signs"]) for r in g.rows[:5] if r["group_signs"]}
     columns = (*words.page_columns("signs"), *(parts.Column(loop, loop, True) for loop in shown))
     rows = (
@@ -193,7 +193,7 @@ def member_section(g: GroupView, loop: str, trends: Mapping[str, Thinned]) -> pa
 
 
 def graph(g: GroupView) -> parts.Graph:
-    """The way of the oscillation from loop to loop."""
+    """Propagation of the oscillation from loop to loop."""
     shown = [r for r in g.rows if r["role"] != GroupRole.SHARES or r is g.rows[0]][: PAGES.group_loops]
     by_name = {r["loop"]: r for r in shown}
     first = shown[0]["loop"]
@@ -202,7 +202,7 @@ def graph(g: GroupView) -> parts.Graph:
 
     def column(name: str) -> int:
         if name not in depth:
-            depth[name] = 1  # of a ring, were there one
+            depth[name] = 1  # in case of a ring
             depth[name] = 1 + column(parents[name])
         return depth[name]
 
@@ -222,7 +222,7 @@ def graph(g: GroupView) -> parts.Graph:
 
 
 def heat_map(g: GroupView) -> parts.HeatMap | None:
-    """Spectra of the members beneath each other; None where the night kept none."""
+    """Spectra of the members below each other; None if the night has none."""
     rows = g.rows[: PAGES.group_loops]
     kept = [(r["loop"], json.loads(s)) for r in rows if (s := g.loops[r["loop"]]["spectrum"])]
     if not kept:
@@ -246,7 +246,7 @@ def heat_map(g: GroupView) -> parts.HeatMap | None:
 
 
 def aligned(g: GroupView, trends: Mapping[str, Thinned], only: Sequence[str] = ()) -> parts.Trend | None:
-    """PV of the members beneath each other over some periods; None where the trends are too coarse to show any."""
+    """PV of the members below each other over some periods; None if the trends are too coarse."""
     shown = [r["loop"] for r in g.rows if r["loop"] in trends and (not only or r["loop"] in only)]
     shown = (sorted(shown, key=only.index) if only else shown)[: PAGES.group_loops]
     if not shown:

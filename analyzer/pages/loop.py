@@ -1,4 +1,4 @@
-"""The page of one loop: what, why, the evidence, the trends, and how it was over the nights."""
+"""The page of one loop: problem, cause, evidence, trends, and history over the nights."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ from reports.texts import slug
 
 WEEK = 7
 LEVELS = frozenset({"sp_mean_pct", "pv_mean_pct"})
-"""Figures that are places and no sizes: their own unit has another zero."""
+"""Figures that are positions, not sizes: in their own unit zero is different."""
 CYCLES = {
     "recorded": "",
     "predicted by the model": "predicted_",
     "expected with the new settings": "expected_",
 }
-"""Limit cycles, and how the columns of their periods and amplitudes begin."""
+"""Limit cycles, and the prefixes of the columns of their periods and amplitudes."""
 COLUMNS = keys("of-a-loop", "figures-of-a-night", "model", "shared-valve", "tied-to", "moves")
-"""What a loop's page reads of the table of nights."""
+"""Columns of the table of nights used on a loop's page."""
 
 
 def loop_page(
@@ -57,17 +57,17 @@ def loop_page(
     Parameters
     ----------
     rows : sequence of mapping
-        The loop's nights, oldest first; the last is the night that the page is about.
+        The loop's nights, oldest first; the page is about the last one.
     thin : Thinned or None
         Its trends of the last week.
     explained, more : mapping or None, parts.Page or None
         The night's explanation of the loop (analyzer.columns.EXPLAINED), and its page.
     shared : parts.Section or None
-        What it shares with other loops.
+        Its relations to other loops.
     notes : sequence of str
-        What people wrote about it, oldest first.
+        Users' notes on it, oldest first.
     settings : parts.Page or None
-        The page on which settings are tried; what it opens with stands here too.
+        The page on which settings are simulated; its opening is also shown here.
     """
     row = rows[-1]
     sections = parts.there(
@@ -94,7 +94,7 @@ def loop_page(
 def _links(
     row: Row, more: parts.Page | None, settings: parts.Page | None, shared: bool
 ) -> Iterator[tuple[str, str]]:
-    """To all loops, the loop's other pages, its group's, and to it beside the loop that it follows."""
+    """Links to all loops, the loop's other pages, its group's page, and a comparison with the loop it follows."""
     yield words.ALL_LOOPS
     if more is not None:
         yield "The explanation", f"{more.name}.html"
@@ -108,7 +108,7 @@ def _links(
 
 
 def _first_section(row: Row, thin: Thinned | None) -> parts.Section:
-    """What is wrong, what to do in three lines, and ten periods of it."""
+    """The problem, the action in three lines, and ten periods of the trend."""
     reason, drawn, scale = words.cell(row, "reason").text, None, words.pv_scale_of(row)
     lines = tuple((f"{head}:", text) for head, text in order(row) if text)
     if thin is not None and thin.time_s.size > 1:
@@ -120,7 +120,7 @@ def _first_section(row: Row, thin: Thinned | None) -> parts.Section:
 
 
 def manual_since(row: Row, thin: Thinned | None) -> tuple[str, str] | None:
-    """Since when a loop is in manual, as a fact; None where it is not at the end of its trend."""
+    """Time since which a loop is in manual, as a fact; None if it is not at the end of its trend."""
     spans = () if thin is None else thin.spans(thin.manual)
     if thin is None or not spans or spans[-1][1] < thin.time_s[-1]:
         return None
@@ -130,7 +130,7 @@ def manual_since(row: Row, thin: Thinned | None) -> tuple[str, str] | None:
 
 
 def _facts(row: Row, thin: Thinned | None) -> parts.Facts:
-    """What was found of a loop, to what it is tied, and its settings."""
+    """Findings of a loop, linked loops, and its settings."""
     facts = [titled("action", row["action"] or "–"), titled("cause", row["cause"] or "not assessed")]
     shares = [(name, row[name]) for name in (f"osc_{c}_pct" for c in CAUSES)]
     facts += [titled(name, f"{share:.0f}") for name, share in shares if share is not None]
@@ -150,7 +150,7 @@ def _facts(row: Row, thin: Thinned | None) -> parts.Facts:
 
 
 def _believed(row: Row) -> parts.Facts:
-    """What the nights together say, and how many they are."""
+    """Joint results of the nights, and their number."""
     nights = words.with_noun(int(row["believed_nights"]), "night")
     out = [("The verdict rests on", f"{nights} since {row['believed_since']}")]
     if row["worn_nights"]:
@@ -166,7 +166,7 @@ def _believed(row: Row) -> parts.Facts:
 
 
 def _explained_section(found: Row | None, row: Row) -> parts.Section | None:
-    """What the plain loop lacks, where the night was explained, and how that goes with the night's verdict."""
+    """Effects that the baseline model does not include, if explained, and agreement with the night's verdict."""
     if found is None:
         return None
     together = beside_night(row, found["verdict"], found["block"])
@@ -175,7 +175,7 @@ def _explained_section(found: Row | None, row: Row) -> parts.Section | None:
 
 
 def _evidence_section(row: Row) -> parts.Section:
-    """The clauses of the reason that no list shows, the signs, the model, the advice and what the data lack."""
+    """Further clauses of the reason, the evidence, the model, the advice and missing data."""
     signs = sorted(json.loads(row["signs"] or "[]"), key=lambda s: -s["strength"])
     rows = [
         (
@@ -198,7 +198,7 @@ def _evidence_section(row: Row) -> parts.Section:
 
 
 def _picture_section(thin: Thinned | None, row: Row) -> parts.Section | None:
-    """The last night's plane of PV over OP, and the rhythm of its error."""
+    """The last night's PV over OP, and the autocorrelation of its error."""
     if thin is None or thin.time_s.size < 2:
         return None
     last = thin.between(row["start_s"] or 0.0, float("inf"))
@@ -207,7 +207,7 @@ def _picture_section(thin: Thinned | None, row: Row) -> parts.Section | None:
 
 
 def _moves(row: Row) -> parts.Section | None:
-    """How PV answers moves of the set point, where there were some."""
+    """Response of PV to set point moves, if there were any."""
     drawn = loop_pictures.answered_moves(row)
     if drawn is None:
         return None
@@ -218,7 +218,7 @@ def _moves(row: Row) -> parts.Section | None:
 
 
 def _phases(row: Row) -> parts.Table | None:
-    """Moves of a programme that come back, a row a kind: how often, and the medians of their answers."""
+    """Repeated moves of a programme, one row per kind: count, and medians of their responses."""
     low, span = row["pv_lo"] or 0.0, (row["pv_hi"] or 100.0) - (row["pv_lo"] or 0.0)
     rows = []
     for phase in json.loads(row["phases"] or "[]"):
@@ -231,14 +231,14 @@ def _phases(row: Row) -> parts.Table | None:
 
 
 def _limit_cycle(row: Row) -> parts.Section | None:
-    """Recorded against predicted limit cycle, and what new settings promise, where the night holds them."""
+    """Recorded and predicted limit cycle, and that with new settings, if the night has them."""
     known = [(name, row[f"{of}period_s"], row[f"{of}pv_amplitude_pct"]) for name, of in CYCLES.items()]
     rows = [(name, parts.Cell(duration(p), p), size) for name, p, size in known if p is not None]
     return parts.Section("Limit cycle", (page_table("limit-cycle", rows),)) if len(rows) > 1 else None
 
 
 def _of_settings(found: parts.Page | None) -> parts.Section | None:
-    """What the page of settings opens with: what is won and what it costs, in a sentence and a picture."""
+    """Opening of the settings page: gains and losses, in a sentence and a picture."""
     if found is None:
         return None
     first = found.sections[0]
@@ -246,7 +246,7 @@ def _of_settings(found: parts.Page | None) -> parts.Section | None:
 
 
 def _indices(row: Row) -> parts.Section | None:
-    """The literature's indices, what each publication concludes from its own, and what is concluded here."""
+    """The published indices, the conclusion of each publication, and the project's own conclusion."""
     told, width = words.texts("field_indices"), row["backlash_pct"] or row["stickband_pct"]
     fault = row["valve_fault"] or row["cause"] or "not assessed"
     ours = {
@@ -269,7 +269,7 @@ def _indices(row: Row) -> parts.Section | None:
 
 
 def _figures(row: Row) -> parts.Facts:
-    """The figures of the night that are known, in the loop's own unit too where they are percentages of span."""
+    """The known figures of the night, with the loop's own unit if they are percentages of span."""
     facts, scale = [], words.pv_scale_of(row)
     for name in keys("figures-of-a-night"):
         if row[name] is not None:
@@ -280,8 +280,8 @@ def _figures(row: Row) -> parts.Facts:
 
 
 def nights_section(rows: Sequence[Row]) -> parts.Section:
-    """A table of a loop's nights, the last first, and pictures of how its oscillation and the width of its valve's
-    fault grew or fell."""
+    """A table of a loop's nights, the last first, and pictures of its oscillation and of the width of its valve's
+    fault over time."""
     day = rows[-1]["night"][:10]
     plots = [
         _over_nights(f"nights-{slug(c)}", BY_NAME[c].title, BY_NAME[c].unit, 0.0, day, _by_night(rows, c))
@@ -303,13 +303,13 @@ def nights_section(rows: Sequence[Row]) -> parts.Section:
 
 
 def _night_cells(row: Row) -> tuple[words.NightDecision, ...]:
-    """One night's cells; the last says why where the loop was not assessed."""
+    """One night's cells; the last gives the reason if the loop was not assessed."""
     lost = {} if row["status"] == Status.OK else {"action": f"{row['status']}: {row['reason']}"}
     return words.cells(row, "history", **lost)
 
 
 def _by_night(rows: Sequence[Row], column: str, label: str = "each night", **drawn: Any) -> parts.Line:
-    """A figure over the days up to the last night, where it is known."""
+    """A figure over the days up to the last night, where known."""
     days = [float(date.fromisoformat(r["night"][:10]).toordinal()) for r in rows]
     known = [(x - days[-1], r[column]) for x, r in zip(days, rows, strict=True) if r[column] is not None]
     x, y = np.array(known, float).reshape(-1, 2).T
@@ -319,8 +319,8 @@ def _by_night(rows: Sequence[Row], column: str, label: str = "each night", **dra
 def _over_nights(
     name: str, title: str, unit: str, least: float, day: str, *lines: parts.Line
 ) -> parts.Plot | None:
-    """Figures over the nights up to a day, from 0 to `least` at least; None where fewer than three nights know
-    them."""
+    """Figures over the nights up to a day, from 0 to at least `least`; None if it is known in fewer than three
+    nights."""
     if min(line.x.size for line in lines) < 3:
         return None
     return parts.Plot(name, title, "night", unit, lines, reach=(0.0, least), day=day)

@@ -1,4 +1,4 @@
-"""Pictures of a loop: its trends, PV over OP, the rhythm of its error, and the half-cycles that convict."""
+"""Pictures of a loop: trends, PV over OP, autocorrelation of the error, and half-cycles of a faulty valve."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ CAPTION = (
     "two fingers do both; double click shows all."
 )
 LEAST_PCT = 2.0
-"""Height of an axis at least [% of span]; ours: less would show noise as if it were a swing."""
+"""Minimum height of an axis [% of span]; ours: a smaller one would show noise like an oscillation."""
 SEGMENTS = 4
-"""Parts that the spectrum is averaged over."""
+"""Parts over which the spectrum is averaged."""
 LEAST_SAMPLES = 64
-"""Buckets that autocorrelation and spectrum need at least."""
+"""Minimum buckets for autocorrelation and spectrum."""
 LEAST_BUCKETS = 2.5
-"""Buckets a period needs to be seen in a thinned trend [-]; below 2 it is folded (Nyquist)."""
+"""Minimum buckets per period in a decimated trend [-]; below 2 it is aliased (Nyquist)."""
 SHOWN_PERIODS = 8.0
 """Length of the autocorrelation shown [periods]."""
 STANDS = "OP moves, the stem stands"
 Course = tuple[Floats, Floats, slice]
-"""A line's places across and along, shape (n,) each, and the part of it in which the stem stands."""
+"""A line's horizontal and vertical values, shape (n,) each, and the part of it in which the stem is at rest."""
 
 
 def close_span(row: Row, thin: Thinned) -> tuple[float, float] | None:
-    """First and last time [s] of the ten periods that a page opens on; None where the night names none."""
+    """First and last time [s] of the ten periods shown initially; None if the night has none."""
     first, last = row.get("close_first_s"), row.get("close_last_s")
     if first is None or last is None or thin.between(first, last).time_s.size < 3:
         return None
@@ -49,7 +49,7 @@ def trend_block(
     scale: PvScale = PLAIN,
     opening: tuple[float, float] | None = None,
 ) -> Trend:
-    """SP, PV over OP on linked axes, in the loop's own unit, opened on a span of time where one is named."""
+    """SP, PV over OP on linked axes, in the loop's own unit, initially on a span of time if given."""
     bands = []
     for s in ("pv", "sp", "op"):
         low, high = (thin.extremes[f"{s}_{end}"] for end in ("min", "max"))
@@ -71,7 +71,7 @@ def trend_block(
 
 
 def sparkline(thin: Thinned, span: tuple[float, float] | None = None) -> Sparkline:
-    """The PV as a cell's picture, of a span of time where one is named; gaps are closed."""
+    """The PV as a cell's picture, over a span of time if given; gaps are closed."""
     first, last = span or (float("-inf"), float("inf"))
     known = thin.between(first, last).coarser(SPARK_BUCKETS)
     shown = ~known.gap
@@ -79,13 +79,13 @@ def sparkline(thin: Thinned, span: tuple[float, float] | None = None) -> Sparkli
 
 
 def _least_ends(middle: float, scale: PvScale) -> tuple[float, float]:
-    """Ends that an axis of PV around a value reaches at least."""
+    """Ends that an axis of PV around a value includes."""
     half = 0.5 * LEAST_PCT * scale.span / 100.0
     return middle - half, middle + half
 
 
 def pv_over_op(thin: Thinned, row: Row) -> Plot:
-    """The plane of PV over OP, of the ten periods where the night names them."""
+    """PV over OP, for the ten periods if the night has them."""
     scale, close = pv_scale_of(row), close_span(row, thin)
     part = thin.between(*close) if close else thin
     told = ~(part.gap | part.frozen)
@@ -106,7 +106,7 @@ def rhythm_plots(thin: Thinned, period_s: float | None) -> tuple[Plot | Text, ..
     if period_s is not None and period_s < LEAST_BUCKETS * step:
         text = f"The stored trend, a bucket each {step:.0f} s, cannot show a period of {duration(period_s)}."
         return (Text((text,), "note"),)
-    # drawn straight where nothing is known
+    # linear where nothing is known
     grid = np.arange(thin.time_s[0], thin.time_s[-1] + 0.5 * step, step)
     error = np.interp(grid, thin.time_s[told], (thin.middle("sp") - thin.middle("pv"))[told])
     error -= error.mean()
@@ -145,8 +145,7 @@ def _spectrum_plot(error: Floats, step: float, period_s: float | None) -> Plot:
 
 
 def turn_panels(row: Row, scale: PvScale) -> Panels | None:
-    """A night's half-cycles laid over one another from each turn of OP, and the plane of PV over OP; None where the
-    night kept none."""
+    """A night's half-cycles superimposed from each OP reversal, and PV over OP; None if the night has none."""
     kept = json.loads(row.get("turns") or "null")
     if not kept:
         return None
@@ -166,8 +165,8 @@ def turn_panels(row: Row, scale: PvScale) -> Panels | None:
 
 
 def _half_cycle(kept: Row, scale: PvScale, step_s: float) -> tuple[Course, Course, Course]:
-    """OP and PV since the turn, of a falling half turned over so that all lie on one another, and over OP the PV of
-    the dead time later, so that no delay looks like play."""
+    """OP and PV since the OP reversal, with falling halves inverted so that all coincide, and over OP the PV delayed
+    by the dead time, so that a delay does not look like backlash."""
     op, pv, late = (np.array(kept[name], dtype=np.float64) for name in ("op", "pv", "late"))
     pv, late = scale.of(pv), scale.of(late)
     first, last = kept["stuck"]
@@ -178,15 +177,15 @@ def _half_cycle(kept: Row, scale: PvScale, step_s: float) -> tuple[Course, Cours
 
 
 def _laid_over(paths: Sequence[Course]) -> tuple[Line, ...]:
-    """Paths over one another, where the stem stands marked on top."""
+    """Superimposed paths, with the part of the stem at rest on top."""
     stuck = [Line(STANDS, x[part], y[part], kind="stuck") for x, y, part in paths if x[part].size > 1]
     return (*(Line("since the turn", x, y) for x, y, _ in paths), *stuck)
 
 
 def answered_moves(row: Row) -> Plot | None:
-    """PV's answers to moves of the set point over one another, each from 0 to 1; None where there were none."""
+    """Superimposed responses of PV to set point moves, each from 0 to 1; None if there were none."""
     every = json.loads(row["moves"] or "[]")
-    steps = [m for m in every if not m.get("ramp_s")]  # ramps are long, and set the course themselves
+    steps = [m for m in every if not m.get("ramp_s")]  # ramps are long and determine the course
     lines = [
         Line("PV", np.linspace(0.0, m["lasts_s"], len(m["course"])), np.array(m["course"]))
         for m in steps or every

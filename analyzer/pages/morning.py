@@ -1,5 +1,5 @@
-"""The morning page: which loops to touch, what is new, what was not assessed, and the plant as a whole: its areas,
-its map of what each loop costs, and its figures over the nights."""
+"""The morning page: loops that need action, changes, loops not assessed, and the plant as a whole: its areas, its map
+of losses by loop, and its figures over the nights."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ KEYS = (
 )
 SUMMED = ("loop", "status", "oscillating_pct", "cause", "importance", LOSS, SIGNIFICANCE)
 FOLLOWER = "\u2514 "
-"""Before the name of a loop that stands under the one it follows."""
+"""Prefix of the name of a loop that is listed below the one it follows."""
 LINKS = (
     ("Hand-over to maintenance", f"{work.MAINTENANCE}.html"),
     ("Work list", f"{work.WORK}.html"),
@@ -55,12 +55,12 @@ LINKS = (
 
 
 def _what_marks(rows: Sequence[words.Row], *columns: str) -> str:
-    """What the mark behind figures means; '' where none of some columns has one."""
+    """Meaning of the mark after figures; '' if none of the columns has one."""
     return f"{MARK} {OF_RECORDED}." if any(mark(row, name) for row in rows for name in columns) else ""
 
 
 def worst_table(night: ShownNight) -> Table:
-    """The loops to touch, the worst first, followers under the loop that moves them."""
+    """The loops that need action, worst first, followers below the loop that moves them."""
     here, by = {r["loop"] for r in night.worst}, cost_column(night.rows)
 
     def own(row: words.Row) -> dict[str, words.NightDecision]:
@@ -97,7 +97,7 @@ def ranking(night: ShownNight) -> Table:
 
 
 def waiting(night: ShownNight) -> list[tuple[str, str]]:
-    """Loops that ask for a look and are hidden by a note, with that note."""
+    """Loops that need a look and are hidden by a note, with that note."""
     rows = [r for r in night.rows if r["loop"] in night.hidden and needs_a_look(r)]
     return [(f"{r['loop']} waits:", night.note(r["loop"])) for r in rows]
 
@@ -119,12 +119,12 @@ def lost_table(night: ShownNight) -> Table:
 
 
 def by_area(rows: Sequence[words.Row]) -> dict[str, list[words.Row]]:
-    """Rows by the name of their area, '' where none is stated."""
+    """Rows by the name of their area, '' if none is stated."""
     return {a: [r for r in rows if (r["area"] or "") == a] for a in sorted({r["area"] or "" for r in rows})}
 
 
 def score(rows: Sequence[words.Row]) -> float | None:
-    """Share of assessed loops, by importance, at which nothing is to be done [%]; None where none is assessed."""
+    """Share of assessed loops, by importance, that need no action [%]; None if none is assessed."""
     weights = [
         (
             1.0 if r["importance"] is None else r["importance"],
@@ -154,7 +154,7 @@ def area_table(rows: Sequence[words.Row]) -> Table:
 
 
 def _plant_tiles(night: ShownNight, rows: Sequence[words.Row], by: str) -> tuple[Tile, ...]:
-    """An area's loops, those that cost most first, and the others in one."""
+    """An area's loops, highest loss first, and the others in one tile."""
     ordered = sorted(((cost(r, by), r) for r in rows), key=lambda c: (-c[0], c[1]["loop"]))
     tiles = []
     for worth, row in ordered[: PAGES.area_tiles]:
@@ -169,8 +169,8 @@ def _plant_tiles(night: ShownNight, rows: Sequence[words.Row], by: str) -> tuple
 
 
 def plant_map(night: ShownNight) -> TreeMap | None:
-    """Areas and assessed loops as large as what they cost, coloured by why they are worth a look; None where nothing
-    is lost anywhere."""
+    """Areas and assessed loops with sizes by loss, coloured by the reason for a look; None if there is no loss
+    anywhere."""
     rows = [r for r in night.rows if r["status"] == Status.OK]
     by = cost_column(rows)
     if not any(cost(r, by) > 0 for r in rows):
@@ -182,7 +182,7 @@ def plant_map(night: ShownNight) -> TreeMap | None:
 
 @dataclass(frozen=True, slots=True)
 class NightSum:
-    """One night of the plant: its name, loops that oscillate, those of each cause, and what all cost by a column."""
+    """One night of the plant: its name, number of oscillating loops, number by cause, and total loss by a column."""
 
     name: str
     oscillate: int
@@ -206,8 +206,8 @@ def read_sums(store: Store, night: str) -> list[NightSum]:
 
 
 def plant_history(sums: Sequence[NightSum]) -> Panels | None:
-    """Curves over the nights: loops that oscillate, and what all cost, of the nights whose figure is that of the last
-    one; None where there are too few."""
+    """Curves over the nights: oscillating loops, and total loss, of the nights with the figure of the last one; None
+    if there are too few."""
     if len(sums) < PAGES.curve_nights:
         return None
     day = np.array([date.fromisoformat(s.name[:10]).toordinal() for s in sums], float)
@@ -232,7 +232,7 @@ def morning_page(
     sums: Sequence[NightSum] = (),
     links: Sequence[tuple[str, str]] = (),
 ) -> Page:
-    """The morning page of a night, with its groups that share an oscillation and the plant's figures over the nights.
+    """The morning page of a night, with its groups of common oscillations and the plant's figures over the nights.
 
     links : to other nights, after those to the sheet and the CSV.
     """

@@ -1,4 +1,4 @@
-"""All pages of a night: the morning page, one for each loop, and morning pages under their dates."""
+"""All pages of a night: the morning page, one for each loop, and morning pages of earlier dates."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from reports.texts import slug
 
 LATEST = ("Latest night", "index.html")
 BUCKETS = 720
-"""Buckets of a trend beside others at most; ours: two minutes of a day, and some kilobytes a loop."""
+"""Maximum buckets of a trend in a side-by-side view; ours: two minutes of a day, and some kilobytes per loop."""
 
 
 def pages_of_night(store: Store, name: str | None = None, top: int = 200) -> Iterator[Page]:
@@ -42,7 +42,7 @@ def pages_of_night(store: Store, name: str | None = None, top: int = 200) -> Ite
     Raises
     ------
     InputError
-        Where the store holds no such night.
+        The store has no such night.
     """
     night = read_night(store, name, top)
     shared = read_groups(store, night.name)
@@ -76,7 +76,7 @@ def pages_of_loop(store: Store, name: str | None, tag: str) -> Iterator[Page]:
 
 
 def side_by_side(store: Store, night: ShownNight) -> Page:
-    """The page on which the loops that have a page of their own are laid beside each other on one time axis."""
+    """The page on which the loops with a page are shown below each other on one time axis."""
     trends = read_trends(store, night.paged, [night.name])
     scales = {r["loop"]: pv_scale_of(r) for r in night.rows}
     blocks = tuple(
@@ -96,7 +96,7 @@ def _loop_pages(
     shared: Sequence[GroupView],
     around: Mapping[str, Thinned],
 ) -> Iterator[Page]:
-    """The loops one by one, each with its settings compared and its explanation, if the night kept any."""
+    """The pages of the loops, each with its compared settings and its explanation, if the night has any."""
     rows = by_loop(read_nights(store, nights, loop.COLUMNS, night.paged))
     trends = read_trends(store, night.paged, nights[-loop.WEEK :])
     by_number = {g.number: g for g in shared}
@@ -119,14 +119,14 @@ def _loop_pages(
 
 
 def dated_pages(store: Store, name: str | None, written: Callable[[str], bool]) -> Iterator[Page]:
-    """Morning pages under their dates, up to a night (the latest by default); those of the last two apart, nights are
-    left out of which `written` says that their page was written after their results."""
+    """Morning pages by date, up to a night (the latest by default). Except for the last two, nights are skipped if
+    `written` reports that their page is newer than their results."""
     last = name or store.require()
     nights = [n for n in store.nights() if n <= last][-PAGES.dated :]
     sums, told = morning.read_sums(store, last), lru_cache(PAGES.usual_nights)(told_of)
     for night in nights:
         if night in nights[-2:] or not written(night):
-            # loops' pages are the latest night's
+            # loops' pages are those of the latest night
             shown = replace(read_night(store, night, PAGES.dated_loops, told=told), paged=())
             own = [s for s in sums if s.name <= night]
             found = morning.morning_page(shown, read_groups(store, night), own)
@@ -140,13 +140,13 @@ def name_of(night: str) -> str:
 
 
 def nights_around(nights: Sequence[str], night: str) -> tuple[tuple[str, str], ...]:
-    """Links from a night to those before and after it among some, oldest first."""
+    """Links from a night to the previous and the next among some, oldest first."""
     at = list(nights).index(night)
     around = (("Previous night", at - 1), ("Next night", at + 1))
     return tuple((text, f"{name_of(nights[k])}.html") for text, k in around if 0 <= k < len(nights))
 
 
 def nights_to_choose(nights: Sequence[str], night: str) -> tuple[tuple[str, str], ...]:
-    """Nights that have a page, the latest first, with their pages; '' for the one that is shown."""
+    """Nights with a page, the latest first, with their pages; '' for the one shown."""
     pages = {n: f"{name_of(n)}.html" for n in nights} | {nights[-1]: LATEST[1], night: ""}
     return tuple((n, pages[n]) for n in reversed(nights)) if len(nights) > 1 else ()

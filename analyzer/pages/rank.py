@@ -1,4 +1,4 @@
-"""`triage rank`: the loops of a night in the order of the morning, as text; reads what is shown."""
+"""`triage rank`: the loops of a night in morning order, as text; only reads."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from reports.plain import csv_text, table
 from reports.texts import visible
 
 BELIEFS_TOLD = tuple(c for c in BELIEVED if c.name not in ("constants", "state", "news_tone"))
-"""What beliefs add to a list."""
+"""Columns that beliefs add to a list."""
 LANE_FIGURES = tuple(n for n in FIGURE.values() if n not in names((*RANKING, *BELIEFS_TOLD)))
-"""Figures of lanes that the list does not hold."""
+"""Figures of lanes that are not in the list."""
 SORTABLE = (*names(RANKING), "importance", LOSS, *LANE_FIGURES, *names(BELIEFS_TOLD))
 KEPT = names((*RANKING, *LISTED, *BELIEFS_TOLD))
 LIST_COLUMNS = (*KEPT, *names(NOTED))
-"""Columns of CSV and JSON: the contract's, then what says in which units settings stand, and the advice in full."""
+"""Columns of CSV and JSON: the contract's, then the units of the settings, and the full advice."""
 MOST_NAMES = 10
-"""Areas that are named in an error."""
+"""Maximum number of areas listed in an error."""
 WIDEST, PIPED = 240, 180
-"""Characters of a line of a wide table, and of one that no terminal shows."""
+"""Characters of a line of a wide table, and of one that is not on a terminal."""
 CAUSE_STYLES: Mapping[str, str] = {
     Cause.VALVE: "red",
     Cause.TUNING: "yellow",
@@ -45,11 +45,11 @@ CAUSE_STYLES: Mapping[str, str] = {
 }
 """Colours of causes on the terminal."""
 SHOWN = keys("list")
-"""Columns for people, in their order; new settings stand in the cells of the old ones."""
+"""Columns for people, in order; new settings are in the cells of the old ones."""
 WITH_UNITS = frozenset({"period_s", "kp", "ti"})
-"""Numbers that are shown with their units, and so as texts."""
+"""Numbers shown with their units, and so as texts."""
 LEAST_REASON = 44
-"""Characters of a line of the reason at least."""
+"""Minimum characters of a line of the reason."""
 
 
 def ranked(
@@ -63,13 +63,13 @@ def ranked(
 ) -> tuple[list[dict[str, Any]], str]:
     """Rows of a night, or of one of its areas or lanes, sorted; loops without a figure come last by name.
 
-    Without a column, loops that are worth a look come first: those of a lane by its figure; all by their loss where
-    loops.csv states importances, else by the significance of their oscillation.
+    Without a column, loops that need a look come first: those of a lane by its figure; all by their loss if
+    loops.csv states importances, otherwise by the significance of their oscillation.
 
     Raises
     ------
     InputError
-        Where there is no such store, night, column or area.
+        There is no such store, night, column or area.
     """
     if column is not None and column not in SORTABLE:
         in_words = (c for c in SORTABLE if get_close_matches(column, c.split("_"), 1, 0.75))
@@ -91,7 +91,7 @@ def ranked(
 
 
 def _noted(row: dict[str, Any], known: Mapping[str, tuple[notes.Note, ...]]) -> dict[str, Any]:
-    """A row with the newest note of its loop; numbers that are none are not known."""
+    """A row with the newest note of its loop; non-finite numbers become unknown."""
     row = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in row.items()}
     found = notes.last(known, row["loop"])
     said, until = (None, None) if found is None else (found.said(row["timezone"]), found.hidden_until or None)
@@ -99,7 +99,7 @@ def _noted(row: dict[str, Any], known: Mapping[str, tuple[notes.Note, ...]]) -> 
 
 
 def hidden_loops(rows: Sequence[Row], night: str) -> tuple[str, ...]:
-    """Loops that their notes keep out of a night's list."""
+    """Loops that their notes hide from a night's list."""
     return tuple(r["loop"] for r in rows if notes.hides(r["hidden_until"], night))
 
 
@@ -112,10 +112,10 @@ def _sorted_by_column(rows: Sequence[dict[str, Any]], column: str, ascending: bo
 
 
 def worst_first(rows: Sequence[dict[str, Any]], column: str | None = None) -> list[dict[str, Any]]:
-    """Rows as the morning reads them: what oscillates, then what stands in another lane, then the rest.
+    """Rows in morning order: oscillating loops, then loops in another lane, then the rest.
 
-    Each by a column; behind them, by the significance within their own recorded range, those whose figure is not
-    known or compares with no other's.
+    Each part is sorted by a column. Loops with an unknown or incomparable figure follow, by the significance within
+    their own recorded range.
     """
     by = cost_column(rows)
     alike = _sorted_by_column([r for r in rows if compares(r, column or by)], column or by, False)
@@ -124,7 +124,7 @@ def worst_first(rows: Sequence[dict[str, Any]], column: str | None = None) -> li
 
 
 def _worth(row: Row, lossy: bool) -> int:
-    """0 for loops to be looked at first, 2 for those with nothing to look at; losses are compared across lanes."""
+    """0 for loops that need a look first, 2 for those that need none; losses are compared across lanes."""
     lanes = lanes_in(row)
     if row["due"] == Due.SHUTDOWN:
         return 1
@@ -134,7 +134,7 @@ def _worth(row: Row, lossy: bool) -> int:
 
 
 def _rows_of_area(rows: list[dict[str, Any]], area: str | None) -> list[dict[str, Any]]:
-    """The rows of an area, all where none is named; capitals do not matter."""
+    """The rows of an area, all if none is given; upper and lower case are equal."""
     if area is None:
         return rows
     found = [r for r in rows if (r["area"] or "").casefold() == area.casefold()]
@@ -146,7 +146,7 @@ def _rows_of_area(rows: list[dict[str, Any]], area: str | None) -> list[dict[str
 
 
 def rendered(rows: Sequence[Row], form: str, night: str, wide: bool = False, lane: Lane | None = None) -> str:
-    """Loops as text in one of the formats; a `wide` table keeps all its columns, one of a lane shows its figure."""
+    """Loops as text in one of the formats; a `wide` table has all columns, one of a lane its figure."""
     if form == "csv":
         return csv_text(LIST_COLUMNS, ([r[c] for c in LIST_COLUMNS] for r in rows)).rstrip("\n")
     if form == "json":
@@ -167,7 +167,8 @@ def rendered(rows: Sequence[Row], form: str, night: str, wide: bool = False, lan
 def as_table(
     rows: Sequence[Row], night: str, width: int | None = None, columns: Sequence[str] | None = None
 ) -> str:
-    """The columns for people as a table; those worth least go where `width` (the terminal's by default) is short."""
+    """The columns for people as a table; the least important are dropped if `width` (default: the terminal's) is
+    small."""
     width = width or (get_terminal_size().columns if interactive() else PIPED)
     shown = [brief(row, columns or SHOWN) for row in rows]
     kept = _fitting(shown, width)
@@ -184,7 +185,7 @@ def as_table(
 
 
 def _line() -> str:
-    """What a line is drawn with, by what the output can show."""
+    """Character of a line, by what the output can show."""
     try:
         "\u2500".encode(getattr(sys.stdout, "encoding", None) or "utf-8")
     except UnicodeEncodeError:
@@ -201,7 +202,7 @@ def _coloured(line: str, loop: str, cause: str | None) -> str:
 
 
 def _shown_of(rows: Sequence[Row], figure: str | None) -> tuple[str, ...]:
-    """The columns for people: a lane's figure in the place of the significance, the loss where there is one."""
+    """The columns for people: a lane's figure instead of the significance, and the loss if there is one."""
     lead = [] if figure is None or figure in SHOWN else [figure]
     lead += [LOSS] if cost_column(rows) == LOSS else []
     rest = [name for name in SHOWN[1:] if figure in (None, *SHOWN) or name not in SHARES]
@@ -209,7 +210,7 @@ def _shown_of(rows: Sequence[Row], figure: str | None) -> tuple[str, ...]:
 
 
 def brief(row: Row, columns: Sequence[str]) -> dict[str, str]:
-    """A row for people, by column: figures in few characters, settings as old and new in one cell."""
+    """A row for people, by column: short figures, old and new settings in one cell."""
     gain = gain_unit(row.get("gain_unit"), row.get("pv_unit"), row.get("op_unit"))
     noted = f" [note: {row['note']}]" if row.get("note") else ""
     special = {
@@ -221,7 +222,7 @@ def brief(row: Row, columns: Sequence[str]) -> dict[str, str]:
 
 
 def _fitting(shown: Sequence[Mapping[str, str]], width: int) -> tuple[str, ...]:
-    """The columns that fit into so many characters with all tags whole, those worth least left out; none without
+    """The columns that fit into a width with all tags complete, without the least important ones; none without
     rows."""
     kept = list(shown[0]) if shown else []
     size = {name: max(map(len, (BY_NAME[name].heading, *(row[name] for row in shown)))) + 1 for name in kept}
@@ -233,7 +234,7 @@ def _fitting(shown: Sequence[Mapping[str, str]], width: int) -> tuple[str, ...]:
 
 
 def _setting_text(now: float | None, new: float | None, unit: str, off: str = "0") -> str:
-    """A setting and what to make of it, with its unit; empty where it is not known, `off` where it is 0."""
+    """A setting and its new value, with its unit; empty if unknown, `off` if it is 0."""
     if now is None:
         return ""
     present = number(now) if now else off
@@ -243,5 +244,5 @@ def _setting_text(now: float | None, new: float | None, unit: str, off: str = "0
 
 
 def interactive() -> bool:
-    """Whether the output is read on a terminal."""
+    """Whether the output is a terminal."""
     return sys.stdout is not None and sys.stdout.isatty()

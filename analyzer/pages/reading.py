@@ -1,4 +1,4 @@
-"""What the pages need from a store: nights, hours and trends of some loops, and one night as a whole."""
+"""Data that the pages read from a store: nights, hours and trends of some loops, and one night as a whole."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from reports.pages import Cell, Table
 from reports.texts import slug
 
 BESIDE = "side-by-side"
-"""Name of the page on which loops are laid beside each other; the address after # names them."""
+"""Name of the page with loops below each other; the address after # lists them."""
 AROUND_D = 2
-"""Nights are named by the date of their middle and are up to 36 h long: read this many days more [d]."""
+"""Nights are named by the date of their middle and are up to 36 h long: so many more days are read [d]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Thinned:
-    """Thinned signals of a loop: start of each bucket [s], extremes by name ("pv_min") [% of span], gaps; manual and
-    frozen, where the controller is in manual and PV stands still."""
+    """Decimated signals of a loop: start of each bucket [s], extremes by name ("pv_min") [% of span], gaps; manual
+    and frozen, where the controller is in manual and where PV is constant."""
 
     time_s: Floats
     extremes: Mapping[str, Floats]
@@ -56,7 +56,7 @@ class Thinned:
         return Thinned(self.time_s[a:b], {k: v[a:b] for k, v in self.extremes.items()}, *masks)
 
     def coarser(self, most: int) -> Thinned:
-        """At most about `most` buckets, neighbours joined so that no extreme is lost."""
+        """At most about `most` buckets, with neighbours merged so that no extreme is lost."""
         n = self.time_s.size
         if n <= most:
             return self
@@ -75,7 +75,7 @@ class Thinned:
 
 
 def nights_within(store: Store, span: Span) -> list[str]:
-    """Names of the nights that may hold something of a span."""
+    """Names of the nights that may contain part of a span."""
     around = timedelta(days=AROUND_D)
     first = (datetime.fromtimestamp(span.first_s, UTC) - around).strftime("%Y-%m-%d")
     last = (datetime.fromtimestamp(span.last_s, UTC) + around).strftime("%Y-%m-%d")
@@ -85,7 +85,7 @@ def nights_within(store: Store, span: Span) -> list[str]:
 def read_nights(
     store: Store, nights: Sequence[str], columns: Sequence[str], loops: Collection[str] | None = None
 ) -> list[dict[str, Any]]:
-    """Rows of several nights, oldest first; columns that a night lacks are None."""
+    """Rows of several nights, oldest first; columns missing in a night are None."""
     read = nights if loops is None or loops else ()
     return [{**r, "night": night} for night in read for r in store.rows("nights", night, columns, loops)]
 
@@ -105,7 +105,7 @@ def _figures(
     nights: Sequence[str],
     columns: Sequence[str] | None = None,
 ) -> dict[str, dict[str, Floats]]:
-    """Columns of numbers by loop, in the order of the nights that have the table, NaN where not known."""
+    """Columns of numbers by loop, in the order of the nights that have the table, NaN where unknown."""
     paths = [store.file(table, night) for night in nights] if loops else []
     tables = [_read_loops(p, columns, loops) for p in paths if p.exists()]
     if not tables:
@@ -124,15 +124,14 @@ def _figures(
 
 
 def _read_loops(path: Path, columns: Sequence[str] | None, loops: Collection[str]) -> pa.Table:
-    """The rows of some loops in a table, with those of some columns that it has."""
+    """The rows of some loops in a table, with those of some columns that exist."""
     held = None if columns is None else set(stored_names(path))
     wanted = None if held is None else [c for c in columns or () if c in held]
     return read_stored(path, wanted, loops)
 
 
 def read_hours(store: Store, loops: Collection[str], nights: Sequence[str]) -> dict[str, dict[str, Floats]]:
-    """Hourly figures by loop, in order of time, NaN where not known; of an hour that stands twice the fuller
-    one."""
+    """Hourly figures by loop, in order of time, NaN where unknown; of an hour recorded twice the fuller one."""
     out = {}
     for tag, held in _figures(store, "hours", loops, nights).items():
         order = np.lexsort((held["usable_h"], held["hour_s"]))
@@ -142,7 +141,7 @@ def read_hours(store: Store, loops: Collection[str], nights: Sequence[str]) -> d
 
 
 def read_trends(store: Store, loops: Collection[str], nights: Sequence[str]) -> dict[str, Thinned]:
-    """Thinned trends by loop, in order of time; a bucket of a gap stands where nothing was recorded."""
+    """Decimated trends by loop, in order of time; a bucket of a gap where nothing was recorded."""
     found = _figures(store, "trends", loops, nights, ("loop", *TREND, *SHADED))
     return {tag: _thinned_from(held) for tag, held in found.items()}
 
@@ -163,17 +162,17 @@ def _thinned_from(held: Mapping[str, Floats]) -> Thinned:
 
 
 NIGHT_COLUMNS = tuple(dict.fromkeys((*keys("of-a-night"), *FIGURE.values())))
-"""What the pages of a night read of its rows."""
+"""Columns of a night used on its pages."""
 REMEMBERED = ("loop", "lanes", *FIGURE.values())
-"""What is read of the nights before."""
+"""Columns of earlier nights that are read."""
 
 
 @dataclass(frozen=True, slots=True)
 class ShownNight:
-    """The rows of a night, the worst first, and trends of the worst.
+    """The rows of a night, worst first, and trends of the worst.
 
-    earlier : of loops that the night before has, rows of it and of others before it, oldest first, with what is
-    remembered of them; paged : loops that have a page of their own, the worst first.
+    earlier : for loops of the previous night, its row and earlier ones, oldest first, with the columns that are kept;
+    paged : loops that have a page, worst first.
     """
 
     name: str
@@ -192,16 +191,16 @@ class ShownNight:
 
     @property
     def hidden(self) -> frozenset[str]:
-        """Loops that a note keeps out of the list."""
+        """Loops hidden from the list by a note."""
         return frozenset(loop for loop in self.notes if is_hidden(last(self.notes, loop), self.name))
 
     def note(self, loop: str) -> str:
-        """The newest note of a loop, '' where there is none."""
+        """The newest note of a loop, '' if there is none."""
         found = last(self.notes, loop)
         return "" if found is None else found.said(self.zone)
 
     def link(self, loop: str) -> Cell:
-        """The loop's name, leading to its page where there is one."""
+        """The loop's name, linked to its page if there is one."""
         return Cell(loop, kind="strong", href=f"{slug(loop)}.html" if loop in self.paged else "")
 
     def table(
@@ -211,8 +210,8 @@ class ShownNight:
         own: Callable[[Row], Mapping[str, NightDecision]] = lambda row: {},
         **stated: Any,
     ) -> Table:
-        """A table of loops, as tables.toml declares it but for what is `stated`: each row's own cells, a link to the
-        loop's page, else what the store holds."""
+        """A table of loops as declared in tables.toml, except for `stated` properties: each row's own cells, a link
+        to the loop's page, and otherwise values of the store."""
         shown = stated.get("columns", declared)
         told = (cells(row, shown, **{"loop": self.link(row["loop"]), **own(row)}) for row in rows)
         return page_table(declared, told, **stated)
@@ -224,7 +223,7 @@ def oscillates(row: Row | None) -> bool:
 
 
 def needs_a_look(row: Row) -> bool:
-    """Whether a loop oscillates, has a valve at fault all the same, or stands in another lane."""
+    """Whether a loop oscillates, has a valve fault without an oscillation, or is in another lane."""
     if row["status"] == Status.FAILED:
         return False
     return bool(row["lanes"]) or (
@@ -233,15 +232,14 @@ def needs_a_look(row: Row) -> bool:
 
 
 def largest_loss(rows: Sequence[Row]) -> str:
-    """The loop that costs most of all, which the morning's list holds whatever was found of it; '' where losses are
-    not compared."""
+    """The loop with the highest loss, which is always in the morning's list; '' if losses are not compared."""
     if cost_column(rows) != LOSS:
         return ""
     return str(max(rows, key=lambda r: cost(r, LOSS))["loop"])
 
 
 def followers_under(rows: Sequence[Row]) -> list[Row]:
-    """Rows in their order, each loop that follows another one right under it."""
+    """Rows in their order, each loop that follows another one directly below it."""
     present = {r["loop"] for r in rows}
     under: dict[str, list[Row]] = defaultdict(list)
     for row in rows:
@@ -253,7 +251,7 @@ def followers_under(rows: Sequence[Row]) -> list[Row]:
 
 
 def told_of(store: Store, night: str) -> list[dict[str, Any]]:
-    """What pages of later nights read of a night."""
+    """Columns of a night that the pages of later nights read."""
     return read_nights(store, [night], REMEMBERED)
 
 
@@ -264,8 +262,8 @@ def read_night(
     drawn: bool = True,
     told: Callable[[Store, str], list[dict[str, Any]]] = told_of,
 ) -> ShownNight:
-    """What the morning page of a night needs, with trends of the worst loops if they are to be drawn; `told` reads
-    nights before it, of which whoever asks for several nights keeps some."""
+    """Data of the morning page of a night, with trends of the worst loops if they are drawn; `told` reads earlier
+    nights and may cache them for several pages."""
     nights = store.nights()
     night = name or store.require()
     store.read("nights", night, ["loop"])
@@ -289,7 +287,7 @@ def read_night(
 
 
 def action_text(row: Row, action: str = "") -> str:
-    """The action (the row's, unless another is named), with the settings to type in where there are any."""
+    """The action (the row's, unless another is given), with the new settings if there are any."""
     action = action or row["action"] or ""
     if row["kp_new"] is None and row["ti_new"] is None:
         return action

@@ -1,4 +1,4 @@
-"""The morning on one screen: what a shift leader does first, what changed, the worst loops with what to type in."""
+"""The morning on one screen: first actions for a shift leader, changes, the worst loops with new settings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CALM = "No loop needs a touch this morning."
 
 
 def listed(names: Sequence[str]) -> str:
-    """Names in a sentence, the first few of them."""
+    """Names in a sentence, only the first few."""
     more = len(names) - PAGES.named
     return (
         ", ".join(names[: PAGES.named]) + f" and {more} more" if more > 0 else words.enumerated(list(names))
@@ -29,7 +29,7 @@ def listed(names: Sequence[str]) -> str:
 
 
 def first_things(rows: Sequence[words.Row], groups: Sequence[GroupView] = ()) -> tuple[str, ...]:
-    """At most three sentences, the one that gains most first; one that says so where there is nothing to do."""
+    """At most three sentences, the largest improvement first; or one that there is nothing to do."""
     by_loop, by = {r["loop"]: r for r in rows}, cost_column(rows)
     told: set[str] = set()
     found: list[tuple[float, str]] = []
@@ -44,7 +44,7 @@ def first_things(rows: Sequence[words.Row], groups: Sequence[GroupView] = ()) ->
     left = sorted((r for r in rows if r["loop"] not in told), key=lambda r: (-cost(r, by), r["loop"]))
     for work in orders.texts("work"):
         mine = [r for r in left if orders.kind_of_work(r) == work]
-        if mine:  # what waits for a shutdown is worth nothing tonight
+        if mine:  # a repair at the next shutdown is not for tonight
             worth = 0.0 if work == Due.SHUTDOWN else sum(cost(r, by) for r in mine)
             found.append((worth, orders.asked(work, mine, listed([r["loop"] for r in mine]))))
     ordered = sorted(found, key=lambda pair: -pair[0])
@@ -53,7 +53,7 @@ def first_things(rows: Sequence[words.Row], groups: Sequence[GroupView] = ()) ->
 
 def _of_group(source: words.Row, others: Sequence[str]) -> str:
     name, moved = source["loop"], f"it also moves {listed(others)}"
-    unasked = source["action"] is None and source["cause"] == Cause.VALVE  # of a night that got no advice
+    unasked = source["action"] is None and source["cause"] == Cause.VALVE  # from a night without advice
     if source["action"] == Action.REPAIR_VALVE or unasked:
         return f"Fix {name}'s valve: {moved}."
     if source["action"] == Action.RETUNE:
@@ -64,7 +64,7 @@ def _of_group(source: words.Row, others: Sequence[str]) -> str:
 
 
 def _news(night: ShownNight) -> list[words.Row]:
-    """Loops of which there is something new since the night before: what it is, and its colour."""
+    """Loops with changes since the previous night: the change, and its colour."""
     found: list[words.Row] = []
     for row in night.rows:
         earlier = night.earlier.get(row["loop"])
@@ -75,7 +75,7 @@ def _news(night: ShownNight) -> list[words.Row]:
 
 
 def _lane_news(nights: Sequence[words.Row]) -> words.Row:
-    """Lanes beside oscillation that a loop came into or left, of those whose figures both nights know."""
+    """Lanes other than oscillation that a loop entered or left, among those with figures in both nights."""
     old, row = nights[-2:]
     known = [x for x in Lane if x is not Lane.OSCILLATION and None not in (old[FIGURE[x]], row[FIGURE[x]])]
     states = {x: _inside(nights, x)[-2:] for x in known}
@@ -86,7 +86,7 @@ def _lane_news(nights: Sequence[words.Row]) -> words.Row:
 
 
 def _inside(nights: Sequence[words.Row], lane: Lane) -> list[bool]:
-    """Whether a loop was in a lane in each night; one that is inferred has to be told some nights in a row."""
+    """Whether a loop was in a lane in each night; an inferred lane must be reported in several consecutive nights."""
     told = [lane in lanes_in(row) for row in nights]
     if lane is not Lane.SLUGGISH:
         return told
@@ -98,14 +98,14 @@ def _inside(nights: Sequence[words.Row], lane: Lane) -> list[bool]:
 
 
 def news_lines(night: ShownNight) -> list[str]:
-    """What is new since the night before, a line a loop, what got worse first."""
+    """Changes since the previous night, one line per loop, deteriorations first."""
     order = {"worse": 0, "unclear": 1, "better": 2}
     told = sorted((order[row["news_tone"]], row["loop"], row["news"]) for row in _news(night))
     return [f"{loop} {text}" for _, loop, text in told]
 
 
 def news_table(night: ShownNight, tones: Sequence[str], name: str, title: str) -> Table:
-    """Loops of which there is something new, of the colours asked for."""
+    """Loops with changes of the given colours."""
 
     def own(row: words.Row) -> dict[str, words.NightDecision]:
         before, now = (words.cell(r, SIGNIFICANCE) for r in (night.earlier[row["loop"]][-1], row))
@@ -128,7 +128,7 @@ def since(night: ShownNight) -> Section:
 
 
 def _do(row: words.Row) -> str:
-    """The action with the settings to type in, else with the first line of its order; '' of nothing."""
+    """The action with the new settings, otherwise with the first line of its order; '' if there is none."""
     if row["kp_new"] is not None or row["ti_new"] is not None:
         return f"{row['action']}: {changed_settings(row)}"
     return "" if row["action"] in (None, Action.NONE) else f"{row['action']}: {dict(order(row))['Do']}"
@@ -147,7 +147,7 @@ def summary_page(store: Store, name: str | None = None) -> Page:
     Raises
     ------
     InputError
-        Where the store holds no such night.
+        The store has no such night.
     """
     night = read_night(store, name, PAGES.summary_loops, drawn=False)
     seen = [r for r in night.rows if r["loop"] not in night.hidden]
@@ -164,7 +164,7 @@ def summary_page(store: Store, name: str | None = None) -> Page:
 
 
 def _worst(night: ShownNight, left: int) -> Table:
-    """The worst loops with what to do, and how many are left out; their notes where there are any."""
+    """The worst loops with their actions, and the number of those left out; their notes if there are any."""
 
     def own(row: words.Row) -> dict[str, words.NightDecision]:
         return {"loop": Cell(row["loop"], kind="strong"), "do": _do(row), "note": night.note(row["loop"])}

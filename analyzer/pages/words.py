@@ -1,4 +1,4 @@
-"""Figures, times, columns and cells, the same on every page."""
+"""Formatting of figures, times, columns and cells, common to all pages."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from analyzer.words.reason import in_short
 from analyzer.words.units import Row, duration, number
 from reports.pages import Cell, Column, Facts, Floats, Listing, Table, Text
 
-__all__ = ["Row", "duration", "number", "stamp"]  # of the words that are not chosen here
+__all__ = ["Row", "duration", "number", "stamp"]  # words that are chosen elsewhere
 
 NightDecision = Cell | str | float | None
-"""What a table tells in a cell: a text or a number stands for a cell of it alone."""
+"""Content of a table cell: a text or a number alone makes a cell."""
 ROOM = "analyzer.pages"
-"""Where the tables and texts of pages stand."""
+"""Package with the tables and texts of pages."""
 ALL_LOOPS = ("All loops", "index.html")
 """The link from a page to the morning page."""
 SHARES = tuple(f"osc_{cause}_pct" for cause in CAUSES)
 WHOLE = frozenset({"oscillating_pct", *SHARES})
-"""Shares that lists show without decimals."""
+"""Shares without decimals in lists."""
 OF_GROUPS = {c.name: c for c in GROUPS if c.name not in BY_NAME}
-"""Columns of the table of groups alone; in a heading their unit stands too."""
+"""Columns only in the table of groups; their headings include the unit."""
 
 
 def signed(value: float | None) -> str:
@@ -51,7 +51,7 @@ def enumerated(names: list[str]) -> str:
 
 
 def texts(subject: str) -> dict[str, Any]:
-    """What texts.toml says of a subject."""
+    """The texts of a subject in texts.toml."""
     found: dict[str, Any] = toml_of(ROOM, "texts.toml")[subject]
     return found
 
@@ -61,7 +61,7 @@ def _declared(name: str) -> Declared:
 
 
 def heading(name: str, **more: bool) -> Column:
-    """A column of the store as one of a page."""
+    """A column of the store as a column of a page."""
     declared = _declared(name)
     unit = f" [{declared.unit}]" if name in OF_GROUPS and declared.unit else ""
     return Column(name, declared.heading + unit, declared.is_number, declared.hint, **more)
@@ -69,7 +69,7 @@ def heading(name: str, **more: bool) -> Column:
 
 @cache
 def page_columns(table: str) -> tuple[Column, ...]:
-    """The columns of a table of a page, as tables.toml declares them."""
+    """The columns of a table of a page, as declared in tables.toml."""
     stated = toml_of(ROOM, "tables.toml")[table]["columns"]
     parted = (c if isinstance(c, dict) else c.split() for c in stated)
     return tuple(
@@ -83,7 +83,7 @@ def keys(*tables: str) -> tuple[str, ...]:
 
 
 def page_table(declared: str, rows: Iterable[Iterable[NightDecision]], **own: Any) -> Table:
-    """A table of a page with its rows: as tables.toml declares it, but for what is its `own`."""
+    """A table of a page with its rows, as declared in tables.toml, except for its `own` properties."""
     stated = {
         k: tuple(v) if isinstance(v, list) else v for k, v in toml_of(ROOM, "tables.toml")[declared].items()
     }
@@ -98,12 +98,12 @@ def _as_cell(told: NightDecision) -> Cell:
 
 
 def lead(*clauses: str) -> Text:
-    """Clauses as sentences at the head of a section."""
+    """Clauses as opening sentences of a section."""
     return Text(tuple(f"{text[:1].upper()}{text[1:]}." for text in clauses), "lead")
 
 
 def listing(texts: Iterable[str]) -> Listing:
-    """A list of texts, none of them with a lead."""
+    """A list of texts without leads."""
     return Listing(tuple(("", text) for text in texts))
 
 
@@ -114,17 +114,17 @@ def titled(name: str, text: str) -> tuple[str, str]:
 
 
 def known_figures(row: Row, names: Iterable[str]) -> Facts:
-    """Figures of a row that are known, with their titles and units."""
+    """Known figures of a row, with their titles and units."""
     return Facts(tuple(titled(name, number(row[name])) for name in names if row[name] is not None))
 
 
 def plain_cell(value: float | None) -> Cell:
-    """A number that is no column of the store."""
+    """A number that is not a column of the store."""
     return Cell(number(value), value)
 
 
 def cell(row: Row, name: str) -> Cell:
-    """What a row holds in a column of the store: three digits, a period in the unit that reads best, or a text."""
+    """The cell for a column of the store: three digits, a period in the most readable unit, or a text."""
     value = row[name]
     if name == "reason":
         return Cell(in_short(value or "")[0])
@@ -136,13 +136,13 @@ def cell(row: Row, name: str) -> Cell:
 
 
 def cells(row: Row, columns: str | Iterable[Column], **own: NightDecision) -> tuple[NightDecision, ...]:
-    """A row of a table by the keys of its columns: what is its `own`, else what the store holds."""
+    """A row of a table by the keys of its columns: its `own` cells, otherwise values of the store."""
     shown = page_columns(columns) if isinstance(columns, str) else columns
     return tuple(own[c.key] if c.key in own else cell(row, c.key) for c in shown)
 
 
 def marked_cell(row: Row, name: str) -> Cell:
-    """A figure in a list of loops: shares without decimals, marked where it compares with no other loop's."""
+    """A figure in a list of loops: shares without decimals, with a mark if it is not comparable with other loops."""
     shown = cell(row, name)
     text = f"{shown.number:.0f}" if name in WHOLE and shown.number is not None else shown.text
     return Cell(text + mark(row, name), shown.number)
@@ -155,7 +155,7 @@ def cause_cell(cause: str | None) -> Cell:
 
 @dataclass(frozen=True, slots=True)
 class PvScale:
-    """What percent of span means for a loop: PV at 0 %, the span, and the unit; '' for one that is not stated."""
+    """Meaning of percent of span for a loop: PV at 0 %, the span, and the unit; '' if it is not stated."""
 
     low: float
     span: float
@@ -173,11 +173,11 @@ class PvScale:
 
 PERCENT = "% of span"
 PLAIN = PvScale(0.0, 100.0, PERCENT)
-"""Percent as it is, where the night does not say what it means."""
+"""Percent unchanged, if the night does not state its meaning."""
 
 
 def pv_scale_of(row: Row) -> PvScale:
-    """What percent means in a row of the night."""
+    """Meaning of percent in a row of the night."""
     low, high = row.get("pv_lo"), row.get("pv_hi")
     if low is None or high is None or not high > low:
         return PLAIN
@@ -185,7 +185,7 @@ def pv_scale_of(row: Row) -> PvScale:
 
 
 def beside(name_unit: str, value: float | None, scale: PvScale) -> str:
-    """A figure in % of span in the loop's own unit too, in brackets; '' where that says nothing new."""
+    """A figure in % of span converted to the loop's own unit, in brackets; '' if that adds nothing."""
     if value is None or name_unit != PERCENT or not scale.unit or scale is PLAIN:
         return ""
     if scale.unit == "%" and scale.span == 100.0:

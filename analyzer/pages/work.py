@@ -1,5 +1,5 @@
-"""The hand-over sheet for maintenance, and the work list, which says how far what people noted has come and what the
-nights since say of it."""
+"""The hand-over sheet for maintenance, and the work list, with the state of work in users' notes and the results of
+the nights since."""
 
 from __future__ import annotations
 
@@ -26,25 +26,25 @@ FIGURES = {
     "valve_travel_pct_per_h": "valve travel",
     "loss": "loss",
 }
-"""What is won, and how it is called."""
+"""Improvements, and their names."""
 READ = ("loop", "status", "oscillating_pct", *FIGURES)
 
 
 def valve_test(row: Row) -> str:
-    """The stroke test of a valve at fault in a few words; its order says how it is done."""
+    """The stroke test of a faulty valve in a few words; its order gives the procedure."""
     step, answer = stroke(row)
     return f"steps of {step} %: {answer}" if answer else "steps of 5 %: PV, or the stem, does not answer"
 
 
 def wearing(night: ShownNight) -> Table:
-    """Valves whose width grows, the fastest first: for the next shutdown."""
+    """Valves with growing backlash or stickband, fastest first: for the next shutdown."""
     rows = [r for r in night.rows if r["wear_pct_per_month"] is not None]
     rows.sort(key=lambda r: -r["wear_pct_per_month"])
     return night.table("wear", rows, lambda row: {"forecast": wear_text(row)})
 
 
 def faulty(night: ShownNight) -> Table:
-    """Valves at fault, by making a cycle or for all that nights say: those to be repaired first, then by width."""
+    """Faulty valves, by a cycle or by all nights: those to be repaired first, then by width."""
     assessed = [r for r in night.rows if r["status"] == Status.OK]
     faults = (Fault.BACKLASH, Fault.STICTION)
     rows = [r for r in assessed if r["cause"] == Cause.VALVE or r["valve_fault"] in faults]
@@ -53,14 +53,14 @@ def faulty(night: ShownNight) -> Table:
 
 
 def _of_valve(row: Row) -> dict[str, NightDecision]:
-    """What the store does not hold of a valve, and place for what is found."""
+    """Columns of a valve that are not in the store, and space for findings."""
     fault = "" if row["valve_fault"] in (None, Fault.NONE) else row["valve_fault"]
     known = {"width": fault_width(row), "test": valve_test(row), "found": ""}
     return {"valve_fault": Cell(fault, kind="valve"), **known}
 
 
 def worn(night: ShownNight) -> Table:
-    """The valves that travel most."""
+    """The valves with the most travel."""
     rows = [r for r in night.rows if r["valve_travel_pct_per_h"] is not None]
     rows.sort(key=lambda r: -r["valve_travel_pct_per_h"])
     return night.table("travel", rows[: PAGES.travelled])
@@ -81,26 +81,26 @@ def maintenance_page(night: ShownNight) -> Page:
 
 @dataclass(frozen=True, slots=True)
 class Sides:
-    """A loop's nights before and since a piece of work."""
+    """A loop's nights before and after a piece of work."""
 
     before: Sequence[Row]
     since: Sequence[Row]
 
     def means(self, column: str) -> tuple[float, float] | None:
-        """Mean figure before and since; None where a side does not know it."""
+        """Mean figure before and after; None if it is unknown on one side."""
         known = [[r[column] for r in side if r[column] is not None] for side in (self.before, self.since)]
         return (float(np.mean(known[0])), float(np.mean(known[1]))) if all(known) else None
 
 
 def sides(rows: Sequence[Row], day: str) -> Sides:
-    """A loop's assessed nights, oldest first, parted by the day of the work, which is neither."""
+    """A loop's assessed nights, oldest first, split by the day of the work, which is in neither part."""
     told = [r for r in rows if r["status"] == Status.OK]
     before = [r for r in told if r["night"] < day][-PAGES.before_work :]
     return Sides(before, [r for r in told if r["night"] > day])
 
 
 def said_since(work: Work, both: Sides) -> str:
-    """What the nights since a piece of work say of it; nothing of work that is not done."""
+    """Result of a piece of work from the nights after it; empty for unfinished work."""
     if work.state not in FINISHED:
         return ""
     if not both.since:
@@ -120,7 +120,7 @@ def _change(before: float, since: float) -> str:
 
 
 def won(night: ShownNight, works: Mapping[str, Work], parted: Mapping[str, Sides]) -> Tiles | None:
-    """What work that was finished since the start of the month brought; None where none was."""
+    """Improvements by work finished since the start of the month; None without any."""
     month = night.name[:7]
     finished = [loop for loop, w in works.items() if w.state in FINISHED]
     done = [parted[loop] for loop in finished if stamp(works[loop].since_s, night.zone)[:7] == month]
@@ -135,14 +135,14 @@ def won(night: ShownNight, works: Mapping[str, Work], parted: Mapping[str, Sides
 
 
 def work_page(store: Store, night: ShownNight) -> Page:
-    """The work list as it stands after a night."""
+    """The work list after a night."""
     works = {loop: work_on(notes) for loop, notes in night.notes.items() if notes}
     names = [n for n in store.nights() if n <= night.name][-PAGES.work_nights :]
     history = by_loop(read_nights(store, names, READ, works))
     parted = {k: sides(history.get(k, ()), stamp(w.since_s, night.zone)[:10]) for k, w in works.items()}
 
     def own(row: Row) -> dict[str, NightDecision]:
-        """What is told of a piece of work, and what the nights since say of it."""
+        """A piece of work in the list, and its result from the nights after it."""
         work, finished = works[row["loop"]], works[row["loop"]].state in FINISHED
         late = bool(work.due) and work.due < night.name and not finished
         return {
@@ -155,7 +155,7 @@ def work_page(store: Store, night: ShownNight) -> Page:
         }
 
     def urgency(row: Row) -> tuple[bool, str, float, str]:
-        """What is not finished first, by its date; then what was reached last."""
+        """Sort key: unfinished work first, by its date; then the most recently finished."""
         work = works[row["loop"]]
         return work.state in FINISHED, work.due or "9999", -work.since_s, row["loop"]
 

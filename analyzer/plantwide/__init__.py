@@ -1,1 +1,1 @@
-"""Oscillations of one plant that are one oscillation: who shares it, where it starts, what it means for each."""
+"""Plant-wide oscillations: the loops that share one, its source, and the consequences for each."""

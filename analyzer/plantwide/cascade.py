@@ -1,4 +1,4 @@
-"""Loops that hang on each other, judged together: the slave first, for its master has it in place of a valve."""
+"""Linked loops, judged together: the slave first, because it takes the place of the valve in its master's loop."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ from analyzer.words import sentences
 from analyzer.words.reason import below_first
 
 COLUMN = {Tie.MASTER: "master", Tie.SPLIT: "split_of", Tie.RATIO: "ratio_of"}
-"""The column that names the loop that another one hangs on."""
+"""The column with the loop to which another one is linked."""
 READ = (*COLUMN.values(), "half_slope", "split_slope")
-"""Columns that are read here of a loop, beside those that a Finding has as values of their own."""
+"""Columns of a loop that are read here, in addition to attributes of a Finding."""
 OWN = (Cause.VALVE, Cause.TUNING)
-"""Causes that are a loop's own."""
+"""Causes inside a loop."""
 HARMONICS = (1, 2, 3)
-"""Parts of a master's period in which a slave's error may cycle: its SP is a wave of any shape."""
+"""Parts of a master's period in which a slave's error may cycle, because its SP has any waveform."""
 
 
 def linked(
     loops: Mapping[str, Finding], links: Mapping[str, Link], limits: PlantLimits
 ) -> dict[str, Finding]:
-    """The loops of a night, those that hang on each other told apart by what they are to each other.
+    """The loops of a night, with linked loops judged together.
 
-    What loops.csv states stands; where it states no master, what the trends show is told.
+    Links in loops.csv have priority; without a stated master, the link found in the trends is used.
     """
     done = {k: _built(f, links.get(k)) for k, f in loops.items()}
     for loop in loops:
@@ -61,7 +61,7 @@ def linked(
 
 
 def _with_halves(own: Finding, halves: Sequence[Finding], limits: PlantLimits) -> Finding:
-    """A controller of a split range, without new settings where its halves need two: one gain cannot suit both."""
+    """A controller of a split range, without new settings if its halves need different ones."""
     if len(halves) != 2 or own.remedy.action is not Action.RETUNE:
         return own
     size = [abs(h.number("half_slope") * h.number("split_slope")) for h in halves]
@@ -75,7 +75,7 @@ def _with_halves(own: Finding, halves: Sequence[Finding], limits: PlantLimits) -
 
 
 def _send_on(done: dict[str, Finding], led: Sequence[str], above: str, root: Root) -> None:
-    """Send those that a master moves on to the loop that the master follows itself."""
+    """Let the loops that a master moves follow the loop that the master follows."""
     sent = []
     for k in led:
         old = done[k].follows
@@ -88,9 +88,9 @@ def _send_on(done: dict[str, Finding], led: Sequence[str], above: str, root: Roo
 
 
 def reassign_sources(rows: Sequence[Mapping[str, Any]], loops: Mapping[str, Finding]) -> list[dict[str, Any]]:
-    """The rows of groups, those led by a master that follows its slave led by that slave.
+    """The rows of groups; if the leader is a master that follows its slave, the slave becomes the leader.
 
-    A loop that leads one group and follows another loop's in a second one leads as before.
+    A loop that leads one group and follows another loop's in a second one still leads the first.
     """
     out = [dict(r) for r in rows]
     by_place = {(r["group"], r["loop"]): r for r in out}
@@ -107,7 +107,7 @@ def reassign_sources(rows: Sequence[Mapping[str, Any]], loops: Mapping[str, Find
 
 
 def _built(own: Finding, link: Link | None) -> Finding:
-    """A loop with what it hangs on."""
+    """A loop with its link."""
     if link is None or any(own.text(column) for column in COLUMN.values()):
         return own
     return replace(own, known={**own.known, COLUMN[link.tie]: link.loop, "link_agreement": link.agreement})
@@ -116,7 +116,7 @@ def _built(own: Finding, link: Link | None) -> Finding:
 def _judged_together(
     above: Finding, below: Finding, tie: Tie, link: Link | None, limits: PlantLimits
 ) -> tuple[Finding, Finding]:
-    """A loop and the one that hangs on it; as they were where either follows another one already."""
+    """A loop and the one linked to it; unchanged if either already follows another loop."""
     if {above.status, below.status} != {Status.OK} or above.follows is not None or below.follows is not None:
         return above, below
     level = 1.0 if link is None else min(link.agreement, 1.0)
@@ -127,7 +127,7 @@ def _judged_together(
         root = Root(below.loop, level, None, max(f.confidence.get(cause, 0.0) for f in (above, below)))
         if above.cause is Cause.VALVE or _alike(above, below, limits) or not below.oscillates:
             seen = SignKind.OF_BELOW, (below.loop, below.cause, tie)
-            # a repair that could wait if the loop were alone: its master cycles for it
+            # the repair could wait for a single loop, but the master cycles because of it
             waits = below.remedy.due is Due.SHUTDOWN
             remedy = Remedy(below.remedy.action, due=Due.NOW) if waits else below.remedy
             moved = replace(below, moves=_moves_with(below, above.loop), remedy=remedy)
@@ -149,7 +149,7 @@ def _moves_with(own: Finding, *loops: str) -> tuple[str, ...]:
 
 
 def _alike(above: Finding, below: Finding, limits: PlantLimits) -> bool:
-    """Whether both cycle with one period, the lower one in a whole part of the upper one's."""
+    """Whether both cycle with one period, or the lower loop with an integer fraction of the upper one's."""
     periods = [f.swing.period_s if f.swing is not None else None for f in (above, below)]
     if None in periods or not all(periods):
         return False

@@ -1,8 +1,7 @@
-"""Loops that share an oscillation: one period, coherent, over the same hours.
+"""Loops with a common oscillation: one period, coherent, in the same hours.
 
-A wave is compared with those of nearly its period alone. The clearest wave that belongs nowhere yet leads a group;
-what moves with it joins, whether or not it would be called an oscillation by itself. A loop may stand in several
-groups.
+An oscillation is compared only with those of nearly the same period. The clearest one without a group leads a new
+group; coherent ones join, whether or not they are significant alone. A loop may be in several groups.
 """
 
 from __future__ import annotations
@@ -22,8 +21,8 @@ from identification.signals.cross_spectrum import Whole, band, chance_coherence,
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Loops that share an oscillation, each with its wave and its coherence with the wave that leads [-]; the first
-    one's leads, the others follow by their coherence."""
+    """Loops with a common oscillation, each with its oscillation and its coherence with that of the leader [-]; the
+    leader is the first, the others follow by coherence."""
 
     waves: Mapping[str, Wave]
     coherence: Mapping[str, float]
@@ -39,14 +38,14 @@ class Group:
         return tuple(self.waves)
 
     def with_lacking(self, waves: Mapping[str, Wave], coherence: Mapping[str, float]) -> Group:
-        """The group with those of some loops that it lacks."""
+        """The group with additional loops."""
         lacking = [loop for loop in waves if loop not in self.waves]
         more = {loop: waves[loop] for loop in lacking}, {loop: coherence[loop] for loop in lacking}
         return Group({**self.waves, **more[0]}, {**self.coherence, **more[1]})
 
 
 class _Neighbours:
-    """Waves of one clock by rising frequency, and which of them move with which; each is asked once."""
+    """Oscillations of one clock by rising frequency, and which are coherent; each is computed once."""
 
     def __init__(self, waves: Sequence[Wave], limits: PlantLimits) -> None:
         self.waves = sorted(waves, key=lambda w: w.line)
@@ -62,18 +61,18 @@ class _Neighbours:
         self._known: dict[int, dict[int, float]] = {}
 
     def near(self, line: float, reach: float) -> Whole:
-        """Numbers of the waves whose period differs from that of a line by a logarithm of `reach` at most."""
+        """Indices of the oscillations whose log period differs from that of a line by at most `reach`."""
         at = math.log(line)
         return np.arange(*np.searchsorted(self._log_line, (at - reach, at + reach)))
 
     def moving_with(self, one: int) -> dict[int, float]:
-        """Waves that move with one and their coherences, the most coherent first; one wave a loop."""
+        """Oscillations coherent with a given one and their coherences, highest first; one per loop."""
         if one not in self._known:
             self._known[one] = self._one_a_loop(self._coherent_with(one))
         return self._known[one]
 
     def second_ring(self, one: int) -> dict[int, float]:
-        """Waves that move with two of those that move with a leader, though not with the leader itself."""
+        """Oscillations coherent with two that are coherent with a leader, though not with the leader itself."""
         joined = self.moving_with(one)
         inside = {self._loop[j] for j in (one, *joined)}
         seen: dict[int, list[float]] = {}
@@ -116,7 +115,7 @@ class _Neighbours:
         return np.asarray(coherences(*self._packed, one, others, span, shift))
 
     def _by_chance(self, one: int, others: Whole) -> Floats:
-        """The largest coherence of shifted lines, which share nothing but the shape of their band, shape (k,)."""
+        """The largest coherence of shifted lines, which have only the shape of their band in common, shape (k,)."""
         if not others.size:
             return np.zeros(0)
         low, high, _ = band(self.waves[one].line)
@@ -127,7 +126,7 @@ class _Neighbours:
 
     @staticmethod
     def _drifts(one: Wave, others: Sequence[Wave]) -> Floats:
-        """Turns over the record by which the phases of others and of one drift apart, about that one's period."""
+        """Phase drift [turns over the record] of other oscillations against a given one, near its period."""
         if not others:
             return np.zeros(0)
         low, high, _ = band(one.line)
@@ -136,8 +135,8 @@ class _Neighbours:
 
 
 def groups_of(waves: Sequence[Wave], limits: PlantLimits) -> list[Group]:
-    """Groups of loops that share an oscillation by all waves of a night, those of more loops first; none of a single
-    loop."""
+    """Groups of loops with a common oscillation from all oscillations of a night, larger groups first; none of a
+    single loop."""
     known = [w for w in on_one_clock(waves) if w.line >= limits.follow_cycles and np.any(w.lines)]
     if not known:
         return []
@@ -147,12 +146,12 @@ def groups_of(waves: Sequence[Wave], limits: PlantLimits) -> list[Group]:
 
 
 def _shows(wave: Wave, limits: PlantLimits) -> bool:
-    """Whether a wave is seen, or hinted at, in its loop alone."""
+    """Whether an oscillation is found, or indicated, in its loop alone."""
     return wave.own or wave.prominence >= limits.hint_prominence
 
 
 def _led(beside: _Neighbours, limits: PlantLimits) -> list[Group]:
-    """Groups about the clearest waves, in that order."""
+    """Groups around the clearest oscillations, in that order."""
     leading = [i for i, w in enumerate(beside.waves) if _shows(w, limits)]
     order = sorted(leading, key=lambda i: (not beside.waves[i].own, -beside.waves[i].prominence))
     taken: set[int] = set()
@@ -169,14 +168,14 @@ def _led(beside: _Neighbours, limits: PlantLimits) -> list[Group]:
 
 
 def _is_wave(waves: Sequence[Wave], limits: PlantLimits) -> bool:
-    """Whether it is an oscillation at all that loops share, and not the load of neighbours: one of them shows it by
-    itself, or several hint at it."""
+    """Whether the common signal is an oscillation, and not the load of neighbours: one loop shows it alone, or
+    several indicate it."""
     hints = sum(w.prominence >= limits.hint_prominence for w in waves)
     return hints >= limits.hints or any(w.own for w in waves)
 
 
 def _merged(groups: Sequence[Group], limits: PlantLimits) -> list[Group]:
-    """Groups of one period that share most of their loops as one, and groups at harmonics of others within those."""
+    """Merge groups of one period with mostly the same loops, and groups at harmonics of others."""
     kept: list[Group] = []
     for group in sorted(groups, key=lambda g: (-g.period_s, -len(g.waves))):
         for k, other in enumerate(kept):
@@ -197,7 +196,7 @@ def _is_same(one: Group, other: Group, limits: PlantLimits) -> bool:
 
 
 def _is_group_of_harmonics(one: Group, other: Group, limits: PlantLimits) -> bool:
-    """Whether the waves of a group are harmonics of a loop of another one."""
+    """Whether the oscillations of a group are harmonics of a loop of another one."""
     ratio = other.period_s / one.period_s
     if round(ratio) < 2 or abs(math.log(ratio / round(ratio))) > limits.harmonic:
         return False
@@ -205,8 +204,8 @@ def _is_group_of_harmonics(one: Group, other: Group, limits: PlantLimits) -> boo
 
 
 def _with_foresight(group: Group, beside: _Neighbours, limits: PlantLimits) -> Group:
-    """A group with loops that move with it too loosely to be coherent, and yet foresee it: a source that sticks and
-    slips without a rhythm moves others by what of it their filters let through."""
+    """A group with further loops that are not coherent enough but predict it: a source with irregular stick-slip
+    moves others by the part of it that their filters pass."""
     clearest = sorted(group.waves.values(), key=lambda w: -w.prominence)[: limits.heard]
     near = (beside.waves[k] for k in beside.near(next(iter(group.waves.values())).line, limits.near_period))
     asked = [w for w in near if w.loop not in group.waves and w.harmonic == 1 and _shows(w, limits)]

@@ -1,5 +1,5 @@
-"""The plant-wide pass over the loops of a night, and what a shared oscillation means for each: the source leads, the
-others follow it and are left alone, and groups get rows of their own.
+"""The plant-wide pass over the loops of a night, and the consequences of a common oscillation: the source leads, the
+others follow it and are left unchanged, and groups have their own rows.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from analyzer.plantwide.source import Candidate, Lags, candidates_of
 from analyzer.plantwide.wave import Wave
 
 READ = ("usable_h", "evidence", "average_absolute_error_pct")
-"""Columns that are read here of a loop, beside those that a Finding has as values of their own."""
+"""Columns of a loop that are read here, in addition to attributes of a Finding."""
 Loops = Mapping[str, Finding]
 """The loops of a night by name."""
 
@@ -40,7 +40,7 @@ Loops = Mapping[str, Finding]
 def traced_night(
     loops: Loops, waves: Sequence[Wave], limits: PlantLimits, first: int = 1
 ) -> tuple[dict[str, Finding], list[dict[str, Any]]]:
-    """What the plant-wide pass makes of a night: its loops, followers and their sources changed, and rows of groups.
+    """Result of the plant-wide pass: the loops, with followers and their sources changed, and rows of groups.
 
     loops : by name, each with its own verdict; waves : of all loops; first : number of the first group.
     """
@@ -63,11 +63,12 @@ def traced_night(
 def following(
     own: Finding, root: Root, swing: Swing | None, seen: tuple[SignKind, Figures], limits: PlantLimits
 ) -> Finding:
-    """A loop that follows another one: a load from outside moves it, and its own valve and settings are left alone.
+    """A loop that follows another one: an external disturbance moves it, and its own valve and settings are left
+    unchanged.
 
-    own, of the loop alone; swing, its part in what is shared where that is no oscillation by itself; seen, what says
-    that it follows, with its figures. The load is at least as sure as the coherence; what else the loop shows comes
-    from its source.
+    own, of the loop alone; swing, its part of the common oscillation if it has none of its own; seen, the evidence
+    for following, with its figures. The confidence in the load is at least the coherence; other findings come from
+    its source.
     """
     confidence = {c: min(own.confidence.get(c, 0.0), limits.follower_most_pct) for c in CAUSES}
     confidence[Cause.LOAD] = max(own.confidence.get(Cause.LOAD, 0.0), 100.0 * root.coherence)
@@ -84,14 +85,14 @@ def following(
 
 
 def _follower(own: Finding, root: Root, wave: Wave, limits: PlantLimits) -> Finding:
-    """A loop as a follower; as it was where it does not oscillate, not even with its part in what is shared."""
+    """A loop as a follower; unchanged if it does not oscillate, not even with its part of the common oscillation."""
     seen = SignKind.FOLLOWS, (root.loop, root.lag_s, root.coherence)
     told = following(own, root, swing_of(own, root, wave, limits), seen, limits)
     return told if told.oscillates else own
 
 
 def swing_of(own: Finding, root: Root, wave: Wave, limits: PlantLimits) -> Swing | None:
-    """What oscillates in a follower: its wave where that is no oscillation by itself and a fair part of the error."""
+    """Oscillation of a follower: its part, if it has none of its own and the part is a fair share of the error."""
     if own.oscillates or wave.share < limits.weak_share:
         return own.swing
     share, amplitude = wave.oscillating_pct, wave.amplitude_pct
@@ -100,7 +101,7 @@ def swing_of(own: Finding, root: Root, wave: Wave, limits: PlantLimits) -> Swing
 
 
 def likely(found: Traced, limits: PlantLimits) -> list[str]:
-    """The fewest candidates that together are as sure as an answer has to be, the likeliest first."""
+    """The fewest candidates that together reach the required confidence, most likely first."""
     out, total = [], 0.0
     for candidate in found.candidates:
         out.append(candidate.loop)
@@ -121,7 +122,7 @@ def _role(loop: str, found: Traced, followers: Mapping[str, Root], limits: Plant
 def group_rows(
     number: int, found: Traced, followers: Mapping[str, Root], loops: Loops, limits: PlantLimits
 ) -> list[dict[str, Any]]:
-    """A row for each loop of a group that is told, the source first, then by amplitude."""
+    """A row for each loop of a reported group, the source first, then by amplitude."""
     known = {c.loop: c for c in found.candidates}
     itself = Root("", 1.0, 0.0, 0.0)
     out = []
@@ -130,7 +131,7 @@ def group_rows(
             continue
         link, candidate = found.links.get(loop, itself), known.get(loop, Candidate(loop, {}, 0.0))
         share, error = min(wave.share, 1.0), loops[loop].known.get("average_absolute_error_pct")
-        gone = 1.0 - math.sqrt(max(1.0 - share, 0.0))  # part of the error that goes with the wave
+        gone = 1.0 - math.sqrt(max(1.0 - share, 0.0))  # part of the error due to the oscillation
         signs = json.dumps({k: round(v, 3) for k, v in candidate.signs.items()}) if loop in known else None
         row = {
             "loop": loop,
@@ -152,7 +153,7 @@ def group_rows(
 
 
 def own_groups(rows: Sequence[Row]) -> dict[str, str]:
-    """The group of each loop: that in which it follows or leads, else that of its larger wave."""
+    """The group of each loop: that in which it follows or leads, otherwise that of its larger oscillation."""
 
     def worth(row: Row) -> tuple[bool, float]:
         return row["role"] in (GroupRole.FOLLOWER, GroupRole.SOURCE), row["wave_amplitude_pct"]
@@ -163,10 +164,10 @@ def own_groups(rows: Sequence[Row]) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Traced:
-    """A group with its candidates, the likeliest first.
+    """A group with its candidates, most likely first.
 
-    links, how each other loop goes with the likeliest source; parents, the loop from which each seems to have it;
-    followers, those of them that follow the source.
+    links, relation of each other loop to the most likely source; parents, the loop from which each probably receives
+    the oscillation; followers, those of them that follow the source.
     """
 
     group: Group
@@ -177,16 +178,16 @@ class Traced:
 
     @property
     def source(self) -> str:
-        """The likeliest source."""
+        """The most likely source."""
         return self.candidates[0].loop
 
 
 def may_follow(own: Finding, other: Finding, level: float, limits: PlantLimits) -> bool:
     """Whether a loop can follow another at this coherence.
 
-    Two loops that each cycle by themselves do not keep step over a night, so one of the two moves the other; what
-    comes from a neighbour's stem looks like stem motion in the follower too, but explains it worse. A loop whose own
-    valve seems at fault follows one whose valve is so by more evidence, and no other.
+    Two independently cycling loops do not stay in phase over a night, so one of the two moves the other. An
+    oscillation from a neighbour's stem looks like stem motion in the follower too, but explains it worse. A loop
+    whose own valve seems faulty can follow only a loop with more evidence of a valve fault.
     """
     if level < limits.coherent:
         return False
@@ -196,7 +197,7 @@ def may_follow(own: Finding, other: Finding, level: float, limits: PlantLimits) 
 
 
 def _traced(group: Group, peers: Loops, limits: PlantLimits) -> Traced | None:
-    """A group with its candidates and followers; None where no verdict of its loops is known."""
+    """A group with its candidates and followers; None if no verdict of its loops is known."""
     lags = Lags(group.waves)
     candidates = candidates_of(lags, peers, limits)
     if not candidates:
@@ -210,7 +211,7 @@ def _traced(group: Group, peers: Loops, limits: PlantLimits) -> Traced | None:
 
 
 def _links_to_source(group: Group, best: Candidate, lags: Lags, limits: PlantLimits) -> dict[str, Root]:
-    """How the other loops of a group go with its likeliest source."""
+    """Relations of the other loops of a group to its most likely source."""
     out = {}
     for loop, coherence in group.coherence.items():
         if loop != best.loop:
@@ -221,9 +222,9 @@ def _links_to_source(group: Group, best: Candidate, lags: Lags, limits: PlantLim
 
 
 def _parents(source: str, lags: Lags, limits: PlantLimits) -> dict[str, str]:
-    """The loop from which each other one seems to have the wave: the tree of greatest coherence from the source on.
+    """The loop from which each other one probably receives the oscillation: the tree of greatest coherence.
 
-    Coherence falls along the way, for each loop adds something of its own; of large groups all hang on the source.
+    Coherence decreases along the path, because each loop adds its own noise; in large groups all follow the source.
     """
     others = [loop for loop in lags.waves if loop != source]
     if len(lags.waves) > limits.most_in_tree:
@@ -247,9 +248,9 @@ def trace(waves: Sequence[Wave], peers: Loops, limits: PlantLimits) -> list[Trac
 
 
 def followers_of(found: Sequence[Traced]) -> dict[str, tuple[Root, Wave]]:
-    """The source that each follower has, in its larger wave where it follows in two groups.
+    """The source of each follower, in its larger oscillation if it follows in two groups.
 
-    A loop that leads one group follows nobody in another where its wave is smaller.
+    A loop that leads one group does not follow in another where its oscillation is smaller.
     """
     out: dict[str, tuple[Root, Wave]] = {}
     leads = {t.source: t.group.waves[t.source].amplitude_pct for t in found if t.followers}
@@ -263,7 +264,7 @@ def followers_of(found: Sequence[Traced]) -> dict[str, tuple[Root, Wave]]:
 
 
 def _rooted(loop: str, found: Mapping[str, tuple[Root, Wave]]) -> Root:
-    """The source at the end of the chain: a follower's follower follows the loop that leads both."""
+    """The source at the end of the chain: a follower of a follower follows the loop that leads both."""
     at, seen = found[loop][0], {loop}
     while at.loop in found and at.loop not in seen:
         seen.add(at.loop)

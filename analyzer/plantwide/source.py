@@ -1,9 +1,9 @@
-"""Where a shared oscillation starts: candidates ranked by signs that do not rest on each other.
+"""Source of a common oscillation: candidates ranked by independent criteria.
 
-The loop's own verdict (a valve at fault, a tuning at its limit of stability), who moves first, whose past foresees
-the others, whose wave is the clearest and so the least mixed with others, whose shape is the least filtered
-(nonlinearity is strongest at its source and falls along the way, Thornhill 2005). Each sign is a number about 0 to 1;
-the weighted sum is the log odds of a candidate against the others of its group.
+The criteria are the loop's own verdict (a faulty valve, a tuning at its limit of stability), the earliest motion, the
+ability to predict the others, the clearest oscillation, which is least mixed with others, and the least filtered
+waveform (nonlinearity is strongest at its source and decreases along the path, Thornhill 2005). Each is a number
+about 0 to 1; the weighted sum is the log odds of a candidate against the others of its group.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from identification.record import Floats
 from identification.signals.cross_spectrum import Delay, band, granger_f, lag, tapered
 
 AT_ONCE = 64
-"""Waves whose foresight is worked out at a time."""
+"""Oscillations whose predictions are computed at a time."""
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A loop at which a shared oscillation may start, its signs by name (0 to 1), and its confidence [%]."""
+    """A possible source of a common oscillation, its criteria by name (0 to 1), and its confidence [%]."""
 
     loop: str
     signs: Mapping[str, float]
@@ -36,7 +36,7 @@ class Candidate:
 
 
 def _first_guess(waves: Sequence[Wave], peers: Mapping[str, Finding], most: int) -> list[Wave]:
-    """The waves of the likeliest candidates, so many at most."""
+    """The oscillations of the most likely candidates, up to a number."""
 
     def rank(w: Wave) -> tuple[float, float]:
         own = peers[w.loop]
@@ -50,12 +50,12 @@ def _first_guess(waves: Sequence[Wave], peers: Mapping[str, Finding], most: int)
 
 
 def _tuning_share(own: Finding) -> float:
-    """Confidence in a tuning that is too tight [-]."""
+    """Confidence in too tight a tuning [-]."""
     return own.confidence.get(Cause.TUNING, 0.0) / 100.0
 
 
 def _leads(loops: Sequence[str], lags: Lags, limits: PlantLimits) -> tuple[Floats, Floats]:
-    """Mean certainty with which each loop is ahead of the others (-1 to 1), and its mean coherence with them."""
+    """Mean certainty with which each loop leads the others (-1 to 1), and its mean coherence with them."""
     n = len(loops)
     ahead, shared = np.zeros((n, n)), np.zeros((n, n))
     for i, j in combinations(range(n), 2):
@@ -74,10 +74,9 @@ def _relative(x: Floats) -> Floats:
 
 
 def candidates_of(lags: Lags, peers: Mapping[str, Finding], limits: PlantLimits) -> tuple[Candidate, ...]:
-    """The candidates of a group with their confidences, the likeliest first; what is left to 100 % is a source
-    unseen.
+    """The candidates of a group with their confidences, most likely first; the rest to 100 % is an unobserved source.
 
-    lags : of the group's waves, on one clock; peers : verdicts by loop; a loop that is not in it is no candidate.
+    lags : of the group's oscillations, on one clock; peers : verdicts by loop; a loop without one is no candidate.
     """
     waves = _first_guess(list(lags.waves.values()), peers, limits.candidates)
     if not waves:
@@ -95,7 +94,7 @@ def candidates_of(lags: Lags, peers: Mapping[str, Finding], limits: PlantLimits)
 def _signs_by_name(
     waves: Sequence[Wave], peers: Sequence[Finding], lags: Lags, limits: PlantLimits
 ) -> list[dict[str, float]]:
-    """The signs of each candidate by name."""
+    """The criteria of each candidate by name."""
     first, shared = _leads([w.loop for w in waves], lags, limits)
     own = [p.number("evidence") if p.cause is Cause.VALVE else 0.0 for p in peers]
     most = math.log1p(limits.much_evidence)
@@ -115,14 +114,14 @@ def _signs_by_name(
 
 
 class Lags:
-    """How much later each of some loops is than each other one; a pair is compared once."""
+    """Lags between pairs of loops; each is computed once."""
 
     def __init__(self, waves: Mapping[str, Wave]) -> None:
         self.waves = waves
         self._known: dict[tuple[str, str], Delay] = {}
 
     def between(self, one: str, other: str) -> Delay:
-        """How much later the second loop's wave is than the first one's."""
+        """Lag of the second loop's oscillation behind the first one's."""
         pair = one, other
         if pair not in self._known:
             self._known[pair] = _lag(self.waves[one], self.waves[other])
@@ -140,9 +139,8 @@ def _lag(one: Wave, other: Wave) -> Delay:
 
 
 def _foreseeing(waves: Sequence[Wave], asked: int | None = None) -> tuple[list[int], Floats]:
-    """Which of some waves have trends whose steps lie on each other, and Granger's F of each on each, or of the pairs
-    of so many of the first with those behind them, shape (k, k); none where fewer than two have, or over too few
-    steps."""
+    """Oscillations whose trends have common steps, and Granger's F of each on each, or of the pairs of the first
+    `asked` with the later ones, shape (k, k); none if fewer than two have them, or over too few steps."""
     step = max((w.step_s for w in waves if w.trend.size), default=0.0)
     found: list[tuple[int, int, Floats]] = []
     for i, w in enumerate(waves):
@@ -160,7 +158,7 @@ def _foreseeing(waves: Sequence[Wave], asked: int | None = None) -> tuple[list[i
 
 
 def foresees(waves: Sequence[Wave]) -> Floats:
-    """Mean over the others of how much better each foresees them than they foresee it (-1 to 1), by Granger's F."""
+    """Mean over the others of how much better each predicts them than they predict it (-1 to 1), by Granger's F."""
     out = np.zeros(len(waves))
     known, f = _foreseeing(waves)
     if not known:
@@ -172,7 +170,7 @@ def foresees(waves: Sequence[Wave]) -> Floats:
 
 
 def foresight(ones: Sequence[Wave], others: Sequence[Wave]) -> Floats:
-    """F with which each wave's past foresees others, in the median, shape (k,); 0 where theirs foresees it as well or
+    """Median F with which each oscillation's past predicts others, shape (k,); 0 if theirs predicts it as well or
     better."""
     out = np.zeros(len(ones))
     alike: dict[tuple[float, int, int], list[int]] = {}

@@ -1,7 +1,7 @@
-"""Which loop hangs on which, as the trends show: a set point that is another loop's output, or goes with its PV.
+"""Links between loops from the trends: a set point that is another loop's output, or proportional to its PV.
 
-Of each loop the moves of SP, PV and OP from block to block are kept, each less than three usual ones, so that one
-step of an operator does not outweigh a night; a set point and the output that it is differ by their recording alone.
+For each loop the moves of SP, PV and OP from block to block are stored, each limited to three usual ones, so that one
+step by an operator does not dominate a night; a set point differs from its source output only by recording.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from analyzer.limits import WAVES
 from identification.record import Floats, LoopRecord
 
 STEPS = 40
-"""Steps of a usual move that are kept; ours: a fortieth is far under what recorders add."""
+"""Steps per usual move that are stored; ours: a fortieth is far below the errors of recorders."""
 ROWS = 256
-"""Set points that are compared at a time."""
+"""Set points compared at a time."""
 Small = np.ndarray[tuple[int], np.dtype[np.int8]]
 
 
 class Tie(StrEnum):
-    """How a loop hangs on another: its set point is the other's output, or keeps a ratio to its PV, or its output is
-    a half of the other's."""
+    """Link of a loop to another: its set point is the other's output, or has a ratio to its PV, or its output is half
+    of the other's."""
 
     MASTER = "master"
     RATIO = "ratio"
@@ -36,7 +36,7 @@ class Tie(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """The loop that another one hangs on, how, and how well their moves agree [-]."""
+    """The loop to which another one is linked, the kind of link, and the agreement of their moves [-]."""
 
     loop: str
     tie: Tie
@@ -45,8 +45,8 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Moves:
-    """Moves of one loop's SP, PV and OP between blocks of the clock, the first of them number `first` since 1970, in
-    STEPS of a usual move, shape (n,) each; of no length where a signal stands most of the time."""
+    """Moves of one loop's SP, PV and OP between blocks of the clock, the first with the number `first` since 1970, in
+    STEPS of a usual move, shape (n,) each; of length 0 if a signal is mostly constant."""
 
     loop: str
     first: int
@@ -56,7 +56,7 @@ class Moves:
 
 
 def moves_of(record: LoopRecord) -> Moves | None:
-    """What is kept of a record; None where it is too short."""
+    """Stored moves of a record; None if it is too short."""
     at = np.floor((record.start_s + record.time_s) / WAVES.block_s).astype(np.int64)
     block = at - at[0]
     count = int(block[-1]) + 1
@@ -73,7 +73,7 @@ def moves_of(record: LoopRecord) -> Moves | None:
 
 
 def _in_steps(total: Floats, kept: Floats) -> Small:
-    """Moves between means of blocks, nothing where one of two has none."""
+    """Moves between means of blocks, zero if one of two has none."""
     there = kept > 0
     move = np.diff(total / np.maximum(kept, 1.0))
     move[~(there[1:] & there[:-1])] = 0.0
@@ -84,16 +84,16 @@ def _in_steps(total: Floats, kept: Floats) -> Small:
 
 
 def links_of(moves: Sequence[Moves], limits: PlantLimits) -> dict[str, Link]:
-    """The loop that each one hangs on, where one stands out.
+    """The loop to which each one is linked, if one stands out.
 
-    An output is asked for first: the PV of a master's process, or of another slave, moves with the set point as well.
+    Outputs are compared first: the PV of a master's process, or of another slave, moves with the set point as well.
     """
     found = _best(moves, "op", Tie.MASTER, limits.linked)
     return _best(moves, "pv", Tie.RATIO, limits.in_ratio) | found
 
 
 def _best(moves: Sequence[Moves], role: str, tie: Tie, least: float) -> dict[str, Link]:
-    """The loop whose signal each set point agrees with best, by at least so much [-]."""
+    """The loop whose signal agrees best with each set point, by at least `least` [-]."""
     asked = [m for m in moves if m.sp.size]
     given = [m for m in moves if getattr(m, role).size]
     if not asked or not given:
@@ -115,7 +115,7 @@ def _best(moves: Sequence[Moves], role: str, tie: Tie, least: float) -> dict[str
 
 
 def _on_one_clock(moves: Sequence[Moves], role: str, begin: int, size: int) -> np.ndarray:
-    """Moves on one clock, each of length one, shape (loops, size)."""
+    """Moves on one clock, each normalized to length one, shape (loops, size)."""
     out = np.zeros((len(moves), size), np.float32)
     for row, m in zip(out, moves, strict=True):
         x = getattr(m, role)
@@ -125,7 +125,7 @@ def _on_one_clock(moves: Sequence[Moves], role: str, begin: int, size: int) -> n
 
 
 def moves_table(moves: Sequence[Moves]) -> pa.Table:
-    """A row a loop."""
+    """One row per loop."""
     return pa.table({f.name: [getattr(m, f.name) for m in moves] for f in fields(Moves)})
 
 

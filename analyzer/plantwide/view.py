@@ -1,4 +1,4 @@
-"""The groups of a night as the list and the pages show them: where each starts, what to do there, what that gains."""
+"""The groups of a night for list and pages: the source of each, the action there, and the improvement."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ OF_LOOPS = (
     *("ti_unit", "pv_unit", "op_unit", "description", "area", "master", "spectrum", "start_s"),
     "average_absolute_error_pct",
 )
-"""What is read of the rows of the night."""
+"""Columns of the night's rows that are read."""
 ALWAYS = ("loop", "group", "role", "source_pct", "coherence", "group_period_s")
-"""Columns that every table of groups has."""
+"""Columns of every table of groups."""
 
 
 @dataclass(frozen=True, slots=True)
 class GroupView:
-    """One group: its number, its rows (the likeliest source first), and the night's rows of its loops by name."""
+    """One group: its number, its rows (the most likely source first), and the night's rows of its loops by name."""
 
     number: str
     rows: tuple[Row, ...]
@@ -30,34 +30,34 @@ class GroupView:
 
     @property
     def period_s(self) -> float:
-        """Period that is shared [s]."""
+        """Common period [s]."""
         return float(self.rows[0]["group_period_s"])
 
     @property
     def source(self) -> Row | None:
-        """The row of the source; None where it is not clear."""
+        """The row of the source; None if it is not clear."""
         first = self.rows[0]
         return first if first["role"] == GroupRole.SOURCE else None
 
     @property
     def candidates(self) -> tuple[Row, ...]:
-        """The rows of the source and of what else it may be."""
+        """The rows of the source and of the other candidates."""
         wanted = (GroupRole.SOURCE, GroupRole.CANDIDATE)
         return tuple(r for r in self.rows if r["role"] in wanted)
 
     @property
     def unseen_pct(self) -> float:
-        """Probability that it starts at none of the loops [%]."""
+        """Probability that none of the loops is the source [%]."""
         return max(100.0 - sum(r["source_pct"] for r in self.rows), 0.0)
 
     @property
     def gain_pct(self) -> float:
-        """Average absolute error that would go in the other loops together [% of span]."""
+        """Total average absolute error of the other loops that would disappear [% of span]."""
         return sum(r["gain_pct"] or 0.0 for r in self.rows if r is not self.source)
 
     @property
     def action(self) -> str:
-        """What to do at the source; empty where it is not clear."""
+        """The action at the source; empty if it is not clear."""
         source = self.source
         if source is None:
             return ""
@@ -65,7 +65,7 @@ class GroupView:
 
 
 def read_groups(store: Store, night: str) -> list[GroupView]:
-    """The groups of a night, those that cost most first; none where the store has no such table."""
+    """The groups of a night, highest loss first; empty if the store has no such table."""
     if not store.file("groups", night).exists():
         return []
     rows = store.rows("groups", night, names(GROUPS))
@@ -73,7 +73,7 @@ def read_groups(store: Store, night: str) -> list[GroupView]:
     loops = {r["loop"]: r for r in store.rows("nights", night, OF_LOOPS) if r["loop"] in wanted}
     by_number: dict[str, list[Row]] = {}
     for row in rows:
-        if row["loop"] in loops:  # a store that was put together by hand may lack some
+        if row["loop"] in loops:  # a manually combined store may lack some
             by_number.setdefault(row["group"], []).append(row)
     lacking = set(ALWAYS) - set(store.columns("groups", night))
     if by_number and lacking:

@@ -1,5 +1,5 @@
-"""What is kept of a loop for the plant-wide pass: the lines of its error about each period that it might share, and
-how those of many loops come onto one clock."""
+"""Data of a loop for the plant-wide pass: the spectral lines of its error near each possible common period, and the
+conversion of many loops to one clock."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from identification.signals.spectrum import Complex, Spectrum, locked_harmonic, 
 FINE = 8
 """Samples of the envelope for each line."""
 BESIDE = 6
-"""Lines kept beyond that on either side."""
+"""Additional lines on either side."""
 HARMONICS = (2, 3)
-"""Harmonics that are looked at; ours: higher ones drown in noise."""
+"""Harmonics that are used; ours: higher ones are below the noise."""
 
 
 @dataclass(frozen=True, slots=True)
 class Wave:
-    """Lines of a loop's error about one period.
+    """Spectral lines of a loop's error near one period.
 
     loop; period_s [s]; harmonic, 1 for a period of the loop's own, m for the m-th harmonic of one; own, whether the
-    loop is seen to oscillate with it by itself; start_s, duration_s of the record [s], line k being the frequency
-    k / duration_s; first, the number of the first line kept; prominence of the peak [-]; share of the error's power
-    above slow drift that the band has [-]; nonlinearity, size of the harmonics locked to the fundamental over its own
-    [-]; lines, complex, shape (m,), scaled so that a sine of amplitude a [% of span] has a line of size a; trend, the
+    loop alone shows the oscillation; start_s, duration_s of the record [s], line k being the frequency k /
+    duration_s; first, the number of the first stored line; prominence of the peak [-]; share of the error's power
+    above slow drift in the band [-]; nonlinearity, size of the phase-locked harmonics over the fundamental [-];
+    lines, complex, shape (m,), scaled so that a sine of amplitude a [% of span] has a line of size a; trend, the
     error in steps of step_s [s] at the record's end, shape (t,), its first step the number trend_first since 1970.
     """
 
@@ -57,7 +57,7 @@ class Wave:
 
     @property
     def line(self) -> float:
-        """The period's frequency in lines: how many periods the record holds."""
+        """The period's frequency in lines: number of periods in the record."""
         return self.duration_s / self.period_s
 
     @property
@@ -68,7 +68,7 @@ class Wave:
 
     @property
     def oscillating_pct(self) -> float:
-        """Share of the time that the wave is on [%]."""
+        """Share of the time with the oscillation [%]."""
         size = next_fast_len(max(4 * self.lines.size, 16))
         power = (np.abs(ifft(self.lines, size)) * size) ** 2
         width = max(round(2 * size / self.line), 1)
@@ -87,10 +87,10 @@ def _centred(s: Spectrum, line: float) -> float:
 
 
 def _thinned_wave(error: Floats, dt_s: float, start_s: float, period_s: float) -> tuple[float, int, Floats]:
-    """Step [s], number of the first step and means of an error at 12 to 24 steps a period, the last ones.
+    """Step [s], number of the first step and means of an error at 12 to 24 steps per period, the last ones.
 
     Steps are the sample interval times a power of two and begin at whole multiples of themselves, so that those of
-    other loops with the same interval lie on them or join in pairs.
+    other loops with the same interval coincide or can be joined in pairs.
     """
     few = 2 ** max(math.floor(math.log2(max(period_s / (WAVES.steps * dt_s), 1.0))), 0)
     first, means = in_steps(error, round(start_s / dt_s), few)
@@ -109,9 +109,9 @@ def in_steps(x: Floats, first: int, few: int) -> tuple[int, Floats]:
 def _cut(
     s: Spectrum, power: Floats, loop: str, start_s: float, error: Floats, asked: tuple[float, int, bool]
 ) -> Wave | None:
-    """The wave about one period of a loop's error, None where the spectrum does not hold enough of it.
+    """The lines near one period of a loop's error, None if the spectrum has too few.
 
-    power : of all lines; asked : period [s], harmonic and whether the loop oscillates with it by itself.
+    power : of all lines; asked : period [s], harmonic and whether the loop alone shows the oscillation.
     """
     period_s, harmonic, own = asked
     line = s.duration_s / period_s
@@ -138,7 +138,7 @@ def _cut(
 
 
 def waves_of(loop: str, found: Oscillations, end_s: float, limits: PlantLimits) -> tuple[Wave, ...]:
-    """The waves of a loop: its oscillations, the harmonics of the first, and weaker peaks of its spectrum.
+    """The oscillations of a loop, the harmonics of the first, and weaker peaks of its spectrum.
 
     found : with spectrum and bands; end_s : end of the record [s since 1970-01-01 UTC]; the spectrum is of its last
     samples.
@@ -167,7 +167,7 @@ SCALARS = [f.name for f in fields(Wave) if f.name not in ("lines", "trend")]
 
 
 def waves_table(waves: Sequence[Wave]) -> pa.Table:
-    """A row a wave."""
+    """One row per oscillation."""
     columns = {name: [getattr(w, name) for w in waves] for name in SCALARS}
     real = [w.lines.real.astype(np.float32) for w in waves]
     imag = [w.lines.imag.astype(np.float32) for w in waves]
@@ -176,7 +176,7 @@ def waves_table(waves: Sequence[Wave]) -> pa.Table:
 
 
 class Laid:
-    """An array that lies in a file, read where it is asked for."""
+    """An array in a file, read when needed."""
 
     __slots__ = ("_at", "_file", "_kind", "size")
 
@@ -195,7 +195,7 @@ class Laid:
 
 
 def waves_in(tables: Iterable[pa.Table], file: BinaryIO | None = None) -> list[Wave]:
-    """The waves of some tables; with a file their lines and trends lie in it, for a large plant has many."""
+    """The oscillations of some tables; with a file their lines and trends stay in it, to save memory."""
     found = []
     for table in tables:
         known = table.select(SCALARS).to_pylist()
@@ -208,7 +208,7 @@ def waves_in(tables: Iterable[pa.Table], file: BinaryIO | None = None) -> list[W
 
 
 def on_one_clock(waves: Sequence[Wave]) -> list[Wave]:
-    """The waves that can be compared, all over the span that most of them have."""
+    """The comparable oscillations, all over the span of most of them."""
     if not waves:
         return []
     counted = Counter((w.start_s, w.duration_s) for w in waves)
@@ -218,8 +218,8 @@ def on_one_clock(waves: Sequence[Wave]) -> list[Wave]:
 
 
 def _on_span(wave: Wave, span: tuple[float, float]) -> Wave | None:
-    """The wave with the lines that it has over another span, start and duration [s]; None where its record covers too
-    little of that."""
+    """The lines of an oscillation over another span, start and duration [s]; None if its record covers too little of
+    it."""
     start, length = span
     if abs(wave.start_s - start) + abs(wave.duration_s - length) <= WAVES.same * wave.period_s:
         return wave

@@ -1,1 +1,1 @@
-"""Results kept as Parquet, and what looks after them."""
+"""Results stored as Parquet, and maintenance of the store."""

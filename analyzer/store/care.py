@@ -1,4 +1,4 @@
-"""A store looked after: what in it is damaged or left over, and nights that are old enough to go."""
+"""Maintenance of a store: detection of damaged and leftover files, and deletion of old nights."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ AGAIN = "restore it from a backup, or delete it and run its night anew"
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """Something in a store that is not as it should be: what was seen, and what to do."""
+    """A fault in a store: what was seen, and what to do."""
 
     seen: str
     remedy: str
 
 
 def size_text(store: Store) -> str:
-    """What a store holds: nights, tables, and megabytes in all."""
+    """Size of a store: nights, tables, and total megabytes."""
     tables = sum(len(list((store.path / t.name).glob("*.parquet"))) for t in KEPT)
     total = sum(p.stat().st_size for p in store.path.rglob("*") if p.is_file())
     return f"{len(store.nights())} nights, {tables} tables, {total / 1e6:.1f} MB"
 
 
 def problems(store: Store) -> Iterator[Problem]:
-    """All that is wrong with a store, every table read whole. Raises InputError where there is no such directory."""
+    """All faults of a store, with every table read completely. Raises InputError where there is no such directory."""
     if not store.path.is_dir():
         raise InputError(f"{store.path}: no such directory", "a store", MAKE_ONE)
     yield from _version(store)
@@ -65,7 +65,7 @@ def _version(store: Store) -> Iterator[Problem]:
 
 
 def _wrong(path: Path, whole: set[str]) -> Problem | None:
-    """What is wrong with something among the nights of a table, if anything."""
+    """Fault of a file among the nights of a table, if any."""
     if path.suffix == SUFFIX:
         seen = f"{path}: left over from a process that died"
         return Problem(seen, "'triage store prune' deletes it after a day")
@@ -87,12 +87,12 @@ def _wrong(path: Path, whole: set[str]) -> Problem | None:
 
 
 def pruned(store: Store, keep_d: int, detail_d: int | None, dry: bool = False) -> list[Path]:
-    """Delete nights that lie more than `keep_d` days before the latest, and files left over; what was deleted.
+    """Delete nights more than `keep_d` days before the latest, and leftover files; return what was deleted.
 
-    Bulky tables, hours and trends, are kept for `detail_d` days, None as long as the nights; a dry run only says what
-    would go. A night ahead of this machine's clock, of a historian whose clock was wrong, is no measure of what is
-    old: without an earlier one nothing goes. The table of nights goes first, so that no reader meets half of one.
-    Notes stay. The caller holds the store.
+    Large tables, hours and trends, are kept for `detail_d` days, None as long as the nights; a dry run only reports
+    what would be deleted. A night in the future, from a wrong clock of a historian, is not used as the latest:
+    without an earlier one nothing is deleted. The table of nights is deleted first, so that no reader finds an
+    incomplete night. Notes stay. The caller holds the lock of the store.
     """
     tomorrow = (date.today() + timedelta(days=1)).isoformat()
     latest = date.fromisoformat(max((n for n in store.nights() if n <= tomorrow), default=NEVER))
@@ -108,5 +108,5 @@ def pruned(store: Store, keep_d: int, detail_d: int | None, dry: bool = False) -
 
 
 def _days_before(day: date, days: int) -> str:
-    """A day so many days earlier, the first of all where there is none."""
+    """A day so many days earlier, at least the first possible day."""
     return (day - timedelta(days=min(days, day.toordinal() - 1))).isoformat()

@@ -1,4 +1,5 @@
-"""Changes of a store that are kept all together or not at all: written beside, and renamed at the end."""
+"""Changes of a store that are kept all together or not at all: written to a separate folder, and renamed at the
+end."""
 
 from __future__ import annotations
 
@@ -17,11 +18,11 @@ from analyzer.store.store import Store
 from analyzer.store.table import KEPT, write_table
 
 FOLDER = "finished"
-"""Where tables lie among the pieces of a run until all are written."""
+"""Folder of the finished tables among the pieces of a run, until all are written."""
 
 
 class Draft(Store):
-    """A store as it will be: what was written is read from beside it, all else from the store itself."""
+    """A store with pending changes: changed tables are read from the draft, all others from the store."""
 
     def __init__(self, path: Path, folder: Path) -> None:
         super().__init__(path)
@@ -42,7 +43,8 @@ class Draft(Store):
         self._made[table, night] = made
 
     def keep(self) -> None:
-        """Put all that was written in its place, the tables of nights last: a reader meets whole nights."""
+        """Move all changed tables to the store, the tables of nights last, so that readers find only complete
+        nights."""
         order = [t.name for t in reversed(KEPT)]
         for table, night in sorted(self._made, key=lambda made: (order.index(made[0]), made[1])):
             _moved(self._beside(table, night), super().file(table, night), self._made[table, night])
@@ -64,7 +66,7 @@ def _moved(made: Path, to: Any, there: bool) -> None:
 
 @contextmanager
 def drafted(store: Store) -> Iterator[Draft]:
-    """A draft of a store, kept at the end; where an error comes first, the store is what it was."""
+    """A draft of a store, kept at the end; after an error the store is unchanged."""
     if is_remote(store.path):
         with tempfile.TemporaryDirectory(prefix="triage-finished-") as made:
             draft = Draft(store.path, Path(made))

@@ -1,8 +1,8 @@
-"""One run on a store at a time: the lock, and who holds it.
+"""Lock of a store for one run at a time, and its owner.
 
-In a directory the lock is the system's own (filelock: flock or its like), so it ends with its owner, however that
-ends, and the signature beside it is for people. Shared storage has no locks: there the signature holds the store, and
-is written anew while its run lives.
+In a directory the lock is that of the operating system (filelock: flock or similar). It ends with its owner, in any
+case, and the signature file is for people. Shared storage has no locks: there the signature is the lock, and its
+owner renews it.
 """
 
 from __future__ import annotations
@@ -36,21 +36,21 @@ if TYPE_CHECKING:
 LOCK, OWNER = "run.lock", "run.owner.json"
 """Names within the store."""
 SCRATCH, MAKING = ".copies-", ".making"
-"""Beginning of the names of directories of copies, and what stands before it until they are locked."""
+"""Prefix of the names of directories of copies, and the additional prefix until they are locked."""
 TRIED = ".written"
-"""Name of an object that shows whether shared storage can be written."""
+"""Name of an object that tests whether shared storage can be written."""
 Signature = dict[str, Any]
-"""User, host, process, since when, a mark of its own, and when it last signed (alive_s [s])."""
+"""User, host, process, start time, a mark of its own, and time of the last signature (alive_s [s])."""
 
 
 @contextmanager
 def scratch(store: Path, resume: bool = False) -> Iterator[Path]:
-    """A directory in the store for the copies that a run makes of packed and of big exports; beside a store of shared
-    storage one of this machine.
+    """A directory in the store for a run's copies of packed and of large exports; for a store on shared storage a
+    local one.
 
-    That it can be made shows, before any work is done, that the store can be written. It goes with the run; where an
-    exception ends the run and a whole copy was made, it stays, as that of a run that was killed does: a run that goes
-    on (`resume`) takes it up, any other forgets it. Raises OSError where the store cannot be made or written.
+    Its creation tests, before any work, that the store can be written. It is removed after the run. If an exception
+    ends the run after a complete copy was made, it stays, as after a killed run: a resumed run (`resume`) uses it,
+    any other removes it. Raises OSError where the store cannot be made or written.
     """
     if is_remote(store):
         with answering(store):
@@ -74,7 +74,7 @@ def scratch(store: Path, resume: bool = False) -> Iterator[Path]:
 
 
 def _lock(folder: Path) -> BaseFileLock | None:
-    """The lock of a directory, held; None where somebody else holds it."""
+    """The acquired lock of a directory; None if another process has it."""
     from filelock import FileLock, Timeout
 
     lock = FileLock(folder / LOCK)
@@ -86,8 +86,8 @@ def _lock(folder: Path) -> BaseFileLock | None:
 
 
 def _held_scratch(store: Path, resume: bool) -> tuple[Path, BaseFileLock]:
-    """A directory of copies and the lock that says that it is in use: the newest that nobody uses where a run goes
-    on, else a new one. Others that nobody uses are removed."""
+    """A directory of copies and its lock: for a resumed run the newest unused one, otherwise a new one. Other unused
+    ones are removed."""
     for left in store.glob(f"{MAKING}{SCRATCH}*"):
         if time.time() - _changed_s(left) > STORE.left_over_s:
             shutil.rmtree(left, ignore_errors=True)
@@ -107,8 +107,8 @@ def _held_scratch(store: Path, resume: bool) -> tuple[Path, BaseFileLock]:
         return taken
     made = Path(tempfile.mkdtemp(prefix=f"{MAKING}{SCRATCH}", dir=store))
     own = _lock(made)
-    assert own is not None  # nobody knows of the directory yet
-    return made.rename(made.with_name(made.name.removeprefix(MAKING))), own  # others see it once it is locked
+    assert own is not None  # no other process knows the directory yet
+    return made.rename(made.with_name(made.name.removeprefix(MAKING))), own  # others see it when locked
 
 
 def _changed_s(path: Path) -> float:
@@ -120,7 +120,7 @@ def _changed_s(path: Path) -> float:
 
 @contextmanager
 def locked(store: Path) -> Iterator[None]:
-    """Hold the store for one run. Raises InputError where another run holds it; says who, where and since when."""
+    """Lock the store for one run. Raises InputError if another run has it, with user, host and start time."""
     mine = _signature_of_this()
     with ExitStack() as held:
         if is_remote(store):
@@ -139,8 +139,8 @@ def locked(store: Path) -> Iterator[None]:
 
 
 def _sign_alone(store: Path, mine: Signature) -> None:
-    """Sign a store of shared storage that nobody holds: the storage makes the object only where there is none, so
-    that of two runs that begin at one moment one is refused. Raises InputError where another run holds it."""
+    """Sign a store on shared storage that has no owner. The storage creates the object only if there is none, so that
+    of two runs starting at the same time one is rejected. Raises InputError where another run has it."""
     with answering(store):
         dead = _require_unsigned(store)
         if dead:
@@ -148,7 +148,7 @@ def _sign_alone(store: Path, mine: Signature) -> None:
         try:
             known = _made_alone(store / OWNER, _as_text(mine).encode("utf-8"))
         except Exception:
-            if _signature(store).get("mark") != mine["mark"]:  # else the answer was lost, and it is made
+            if _signature(store).get("mark") != mine["mark"]:  # otherwise only the response was lost
                 _require_unsigned(store)
                 raise
             known = True
@@ -159,7 +159,7 @@ def _sign_alone(store: Path, mine: Signature) -> None:
 
 
 def _made_alone(path: Any, data: bytes) -> bool:
-    """Make an object where there is none; whether the storage is known to refuse where there is one."""
+    """Create an object if there is none; return whether the storage is known to reject an existing one."""
     try:
         path.fs.pipe_file(path.path, data, mode="create")
     except (TypeError, NotImplementedError):
@@ -169,7 +169,7 @@ def _made_alone(path: Any, data: bytes) -> bool:
 
 
 def _is_dead_here(known: Signature) -> bool:
-    """Whether a signature is of a process of this machine that is no more."""
+    """Whether a signature is of a process of this machine that has ended."""
     process = known.get("process")
     if sys.platform == "win32" or known.get("host") != socket.gethostname() or not isinstance(process, int):
         return False
@@ -183,7 +183,7 @@ def _is_dead_here(known: Signature) -> bool:
 
 
 def _require_unsigned(store: Path) -> bool:
-    """Whether shared storage holds the signature of a dead run. Raises InputError where the run may be alive."""
+    """Whether shared storage has the signature of a dead run. Raises InputError if the run may be alive."""
     known = _signature(store)
     alive_s = known.get("alive_s")
     if _is_dead_here(known):
@@ -196,7 +196,7 @@ def _require_unsigned(store: Path) -> bool:
 
 @contextmanager
 def _renewed(store: Path, mine: Signature) -> Iterator[None]:
-    """Sign anew from time to time, in a thread, until the end."""
+    """Renew the signature periodically, in a thread, until the end."""
     ended = threading.Event()
 
     def live() -> None:
@@ -215,7 +215,7 @@ def _renewed(store: Path, mine: Signature) -> Iterator[None]:
 
 def _in_use(store: Path, more: str = "") -> InputError:
     owner = "another run"
-    with contextlib.suppress(OSError, KeyError):  # as far as it is written down
+    with contextlib.suppress(OSError, KeyError):  # as far as it is known
         known = _signature(store)
         owner = f"process {known['process']} of {known['user']} on {known['host']} since {known['since']}"
     remedy = f"wait until that run ends, or give another --store{more}"
@@ -223,7 +223,7 @@ def _in_use(store: Path, more: str = "") -> InputError:
 
 
 def _signature_of_this() -> Signature:
-    """Who holds a store that this process holds from now on."""
+    """Signature of this process as owner of a store."""
     return {
         "user": user() or "a user without a name",
         "host": socket.gethostname(),
@@ -234,7 +234,7 @@ def _signature_of_this() -> Signature:
 
 
 def _sign_lock(store: Path, mine: Signature) -> None:
-    """Write down who holds the store, and that it lives."""
+    """Write the signature of the living owner of a store."""
     (store / OWNER).write_text(_as_text(mine), encoding="utf-8")
 
 
@@ -243,14 +243,14 @@ def _as_text(mine: Signature) -> str:
 
 
 def _unsign(store: Path, mine: Signature) -> None:
-    """Take away a signature that is still one's own; what stays on shared storage is a dead run's in ten minutes."""
-    with contextlib.suppress(Exception):  # a storage that fails, too
+    """Remove a signature if it is still this process's; one left on shared storage expires in ten minutes."""
+    with contextlib.suppress(Exception):  # including a failing storage
         if _signature(store).get("mark") == mine["mark"]:
             (store / OWNER).unlink(missing_ok=True)
 
 
 def _signature(store: Path) -> Signature:
-    """What the holder of a store has written down; empty where that is nothing, or no signature."""
+    """The signature of the owner of a store; empty if there is none, or no valid one."""
     try:
         found = json.loads(content(store / OWNER).decode("utf-8"))
     except (FileNotFoundError, ValueError):

@@ -1,6 +1,6 @@
-"""What people write about loops: kept in the store line by line, the newest standing for the loop.
+"""Users' notes on loops: stored line by line, the newest valid for the loop.
 
-A line is one JSON object; lines are only ever added, so that two writers lose nothing and a night can run meanwhile.
+A line is one JSON object; lines are only appended, so that two writers lose nothing and a night can run meanwhile.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from reports.texts import visible
 FILE = "notes.jsonl"
 """Name within the store."""
 STATES = ("open", "ordered", "done", "checked")
-"""How far the work on a loop has come."""
+"""States of the work on a loop."""
 FINISHED = STATES[2:]
-"""Those in which it is done: the nights since are held against those before."""
+"""States of finished work: the nights after it are compared with those before."""
 LATEST_S = 32503680000.0
-"""Times of notes beyond the year 3000 are none [s since 1970-01-01 UTC]."""
+"""Times of notes after the year 3000 are invalid [s since 1970-01-01 UTC]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """A note: the loop, when [s since 1970-01-01 UTC], what, by whom, the date until which the loop is hidden, the
-    state of the work (STATES) and the date by which it is due, '' each where it says nothing of them."""
+    """A note: the loop, time [s since 1970-01-01 UTC], text, author, the date until which the loop is hidden, the
+    state of the work (STATES) and its due date, each '' if not given."""
 
     loop: str
     time_s: float
@@ -43,7 +43,7 @@ class Note:
     due: str = ""
 
     def said(self, zone: str | None) -> str:
-        """The note in one line, its time on the plant's clock."""
+        """The note in one line, with its time on the plant's clock."""
         more = f", {self.state}" if self.state else ""
         more += f", due {self.due}" if self.due else ""
         more += f", hidden until {self.hidden_until}" if self.hidden_until else ""
@@ -51,7 +51,7 @@ class Note:
 
 
 def user() -> str:
-    """Who writes, as the system names them; '' where it does not."""
+    """User name from the system; '' if there is none."""
     try:
         return getpass.getuser()
     except (OSError, KeyError, ImportError):
@@ -59,10 +59,10 @@ def user() -> str:
 
 
 def add(store: Path, note: Note) -> None:
-    """Add a note to a store, on a line of its own whatever stands before it. Raises OSError where it could not be
-    written whole, on a full disk for example."""
+    """Append a note to a store, on its own line whatever precedes it. Raises OSError if it could not be written
+    completely, on a full disk for example."""
     line = (json.dumps(asdict(note), ensure_ascii=False) + "\n").encode("utf-8")
-    if is_remote(store):  # an object cannot be added to
+    if is_remote(store):  # an object cannot be appended to
         path = store / FILE
         before = path.read_bytes() if path.exists() else b""
         path.write_bytes(before + (b"" if before[-1:] in (b"", b"\n") else b"\n") + line)
@@ -78,7 +78,7 @@ def add(store: Path, note: Note) -> None:
 def new(
     loop: str, text: str, owner: str | None, hidden_until: str = "", state: str = "", due: str = ""
 ) -> Note:
-    """A note of now. Raises InputError where the text says nothing."""
+    """A note with the present time. Raises InputError where the text is empty."""
     told, by = " ".join(visible(text).split()), visible(user() if owner is None else owner)
     if not told:
         remedy = 'say it: triage note STORE LOOP "..."'
@@ -94,7 +94,7 @@ def _note_lines(store: Path) -> list[str]:
 
 
 def read_notes(store: Path) -> dict[str, tuple[Note, ...]]:
-    """The notes of a store by loop, oldest first; lines that are none are passed over."""
+    """The notes of a store by loop, oldest first; invalid lines are skipped."""
     out: dict[str, list[Note]] = {}
     for note in filter(None, map(_parsed_note, _note_lines(store))):
         out.setdefault(note.loop, []).append(note)
@@ -102,12 +102,12 @@ def read_notes(store: Path) -> dict[str, tuple[Note, ...]]:
 
 
 def broken(store: Path) -> int:
-    """Lines of a store's notes that are none."""
+    """Number of invalid lines in a store's notes."""
     return sum(bool(line.strip()) and _parsed_note(line) is None for line in _note_lines(store))
 
 
 def _parsed_note(line: str) -> Note | None:
-    """The note of a line; None where it is none, whatever else it is."""
+    """The note of a line; None for an invalid line of any kind."""
     try:
         kept = json.loads(line)
         parts = [kept.get(k, "") for k in ("loop", "text", "owner", "hidden_until", "state", "due")]
@@ -128,8 +128,8 @@ def last(notes: Mapping[str, tuple[Note, ...]], loop: str) -> Note | None:
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """The work on a loop, by its notes: the newest of them, who has it, how far it has come, when it came there
-    [s since 1970-01-01 UTC], and the date by which it is due, '' for none."""
+    """The work on a loop from its notes: the newest note, the owner, the state, its time [s since 1970-01-01 UTC],
+    and the due date, '' for none."""
 
     note: Note
     owner: str
@@ -139,9 +139,9 @@ class Work:
 
 
 def work_on(notes: Sequence[Note]) -> Work:
-    """The work that a loop's notes make, oldest first: each part as the newest note that speaks of it says.
+    """The state of work from a loop's notes, oldest first: each part from the newest note that contains it.
 
-    Work that was done and then checked is done since it was done.
+    The time of work that was done and then checked is that of done.
     """
     states = [n for n in notes if n.state] or [notes[0]]
     reached = states[-1]
@@ -154,10 +154,10 @@ def work_on(notes: Sequence[Note]) -> Work:
 
 
 def is_hidden(note: Note | None, night: str) -> bool:
-    """Whether a note keeps its loop out of the list of a night."""
+    """Whether a note hides its loop from the list of a night."""
     return note is not None and hides(note.hidden_until, night)
 
 
 def hides(until: str | None, night: str) -> bool:
-    """Whether a night lies before the date until which a loop is hidden, if any."""
+    """Whether a night is before the date until which a loop is hidden, if any."""
     return bool(until) and night < str(until)

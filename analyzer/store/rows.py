@@ -1,7 +1,7 @@
-"""Findings as rows of tables and back: the one door between what is known of a loop and the columns that are kept.
+"""Conversion of findings to rows of tables and back: the only interface between a loop's results and stored columns.
 
-In the pieces that workers write of a night signs are figures, and so is the column `reason`, which holds what a loop
-lacks; the words are made last.
+In the pieces that workers write, signs are figures, and the column `reason` contains a loop's missing data; texts are
+made last.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ SWING = {
     "period_s": "period_s",
     "pv_amplitude_pct": "amplitude_pct",
 }
-"""Columns of what oscillates, and what they are called there."""
+"""Columns of the oscillation, and their names there."""
 TYPED = (
     *("loop", "night", "status", "lack", "cause", "valve_fault", "signs", "source_loop", "lanes", "group"),
     *("action", "advice", "kp_new", "ti_new", "due", "reason", *SWING, *(f"osc_{c}_pct" for c in CAUSES)),
 )
-"""Columns that a Finding holds as values of their own."""
+"""Columns that are separate attributes of a Finding."""
 
 
 def night_row(found: Finding) -> dict[str, Any]:
@@ -56,7 +56,7 @@ def night_row(found: Finding) -> dict[str, Any]:
 
 
 def piece_row(found: Finding) -> dict[str, Any]:
-    """The same as a worker keeps it, before the night is put together."""
+    """The same as stored by a worker, before the night is combined."""
     swing = found.swing
     ok = found.status is Status.OK
     row = {
@@ -84,7 +84,7 @@ def piece_row(found: Finding) -> dict[str, Any]:
 
 
 def finding_of(row: Row) -> Finding:
-    """What a worker's piece says of a loop."""
+    """The finding of a loop from a worker's piece."""
     swing, action = None, _or_none(Action, row["action"])
     if row["oscillating_pct"] is not None:
         swing = Swing(**{name: row[c] for c, name in SWING.items()})
@@ -119,7 +119,7 @@ def _or_none(kind: Any, text: str | None) -> Any:
 
 
 def finite(value: Any) -> Cell:
-    """None for numbers that are none, so that nothing unknown reaches a table as a number."""
+    """None for non-finite numbers, so that nothing unknown is stored as a number."""
     if value is None or isinstance(value, str):
         return value
     return float(value) if math.isfinite(value) else None

@@ -1,14 +1,14 @@
-"""Results kept as Parquet, a file a night and table; written under a temporary name and renamed.
+"""Results stored as Parquet, one file per night and table; written under a temporary name and renamed.
 
-STORE/nights/NIGHT.parquet   one row a loop (docs/columns.md)
-STORE/hours/NIGHT.parquet    one row a loop and hour
-STORE/groups/NIGHT.parquet   one row a loop and group
-STORE/beliefs/NIGHT.parquet  one row a loop: what this night and those before it say together
-STORE/explained/NIGHT.parquet  one row a loop that was explained
-STORE/compared/NIGHT.parquet  one row a loop for which settings were sought, of the newest night alone
-STORE/trends/NIGHT.parquet   thinned trends, one row a loop and bucket
-STORE/parts/NIGHT/...        the same in pieces while a night is being worked on; a resumed run reads them
-STORE/notes.jsonl            what people wrote; STORE/store.json the version of the tables
+STORE/nights/NIGHT.parquet   one row per loop (docs/columns.md)
+STORE/hours/NIGHT.parquet    one row per loop and hour
+STORE/groups/NIGHT.parquet   one row per loop and group
+STORE/beliefs/NIGHT.parquet  one row per loop: joint result of this night and earlier ones
+STORE/explained/NIGHT.parquet  one row per explained loop
+STORE/compared/NIGHT.parquet  one row per loop with compared settings, of the newest night only
+STORE/trends/NIGHT.parquet   decimated trends, one row per loop and bucket
+STORE/parts/NIGHT/...        the same in pieces during a run; a resumed run reads them
+STORE/notes.jsonl            users' notes; STORE/store.json the version of the tables
 """
 
 from __future__ import annotations
@@ -42,19 +42,18 @@ from identification.errors import InputError
 from reports.whole_file import whole_file
 
 SCHEMA = 2
-"""Version of the tables. 1: no lanes, no half-cycles; a store without a version is one. 2: every column that is
-declared."""
+"""Version of the tables. 1: no lanes, no half-cycles; a store without a version has it. 2: every declared column."""
 VERSION_FILE = "store.json"
 """Name within the store."""
 MAKE_ONE = "run 'triage run EXPORT --store DIR' first"
 OWN = frozenset({"parts", "run.lock", "run.owner.json", "notes.jsonl", "lost+found"})
-"""What a store may hold before it has a night or a version, beside names that begin with a point."""
+"""Allowed contents of a new store, besides names that begin with a point."""
 GO_ON = "go on with the same command and --resume"
-"""What to do about pieces of a night that are not whole."""
+"""Advice for incomplete pieces of a night."""
 
 
 def is_night(name: str) -> bool:
-    """Whether a name is that of a night: a date."""
+    """Whether a name is that of a night, which is a date."""
     try:
         return name == date.fromisoformat(name).isoformat()
     except ValueError:
@@ -62,7 +61,7 @@ def is_night(name: str) -> bool:
 
 
 def listed(folder: Path) -> list[Path]:
-    """What a folder holds, nothing where there is none. Raises NotNowError where it cannot be looked into."""
+    """Contents of a folder, empty if there is none. Raises NotNowError where it cannot be read."""
     try:
         return list(afresh(folder).iterdir())
     except (FileNotFoundError, NotADirectoryError):
@@ -74,12 +73,12 @@ def listed(folder: Path) -> list[Path]:
 
 
 def is_store(path: Path) -> bool:
-    """Whether a folder is a store: it has a version, or nights of the time before there was one."""
+    """Whether a folder is a store: it has a version, or nights from before versions existed."""
     return (path / VERSION_FILE).exists() or (path / "nights").is_dir()
 
 
 def require_place(path: Path) -> None:
-    """Raise InputError where a store cannot be made at a path: it is a file, or a folder of something else."""
+    """Raise InputError where a store cannot be made at a path: it is a file, or a folder with other contents."""
     if not is_remote(path) and path.exists() and not path.is_dir():
         raise InputError(f"--store {path}: a file", "a folder for the results, or none yet", "give a folder")
     others = sorted(p.name for p in listed(path) if p.name not in OWN and p.name[:1] != ".")
@@ -96,11 +95,11 @@ class Store:
         self.path = path
 
     def file(self, table: str, night: str) -> Path:
-        """Where one night of one table lies."""
+        """Path of one night of one table."""
         return self.path / table / f"{night}.parquet"
 
     def files(self, table: str) -> list[Path]:
-        """What a table has of nights; files of other names are nobody's nights."""
+        """Files of a table's nights; files with other names are ignored."""
         return sorted(p for p in listed(self.path / table) if p.suffix == ".parquet" and is_night(p.stem))
 
     def nights(self) -> list[str]:
@@ -108,18 +107,18 @@ class Store:
         return [p.stem for p in self.files("nights")]
 
     def zone(self) -> str:
-        """The plant's time zone as the latest night states it, UTC where none does."""
+        """The plant's time zone as stated in the latest night, UTC without one."""
         return self.stated_zone(self.nights()[-1:]) or "UTC"
 
     def stated_zone(self, nights: Sequence[str]) -> str | None:
-        """The time zone that the first of some nights states, None where it states none."""
+        """The time zone stated by the first of some nights, None without one."""
         if not nights or "timezone" not in self.columns("nights", nights[0]):
             return None
         stated = self.read("nights", nights[0], ["timezone"]).column(0).to_pylist()
         return next((z for z in stated if z), None)
 
     def require(self) -> str:
-        """The latest night. Raises InputError where the path is no store, is one of a newer version, or holds no
+        """The latest night. Raises InputError where the path is no store, or a store of a newer version, or has no
         complete night."""
         self.require_known()
         nights = self.nights()
@@ -138,8 +137,7 @@ class Store:
         return found
 
     def columns(self, table: str, night: str) -> list[str]:
-        """Names of the columns that one night of one table has. Raises InputError where the store holds no such
-        night."""
+        """Names of the columns of one night of one table. Raises InputError where the store has no such night."""
         try:
             return stored_names(self.file(table, night))
         except FileNotFoundError:
@@ -148,9 +146,8 @@ class Store:
     def rows(
         self, table: str, night: str, columns: Sequence[str], loops: Collection[str] | None = None
     ) -> list[dict[str, Any]]:
-        """Rows of one night, of some loops or of all, as they are told: in the table of nights with what rests on all
-        nights as beliefs have it, where there are any that tell something of the loop. Columns that are not known are
-        None."""
+        """Rows of one night, of some loops or of all, as reported: in the table of nights the columns based on all
+        nights come from beliefs, for loops that have some. Unknown columns are None."""
         resting = [c.name for c in (*RESTING, *BELIEVED) if c.name in columns]
         if table != "nights" or not resting or not self.file("beliefs", night).exists():
             return self.own_rows(table, night, columns, loops)
@@ -164,7 +161,7 @@ class Store:
     def own_rows(
         self, table: str, night: str, columns: Sequence[str], loops: Collection[str] | None = None
     ) -> list[dict[str, Any]]:
-        """The same as the night by itself has them."""
+        """The same from the night alone."""
         names = set(self.columns(table, night))
         found = read_stored(self.file(table, night), [c for c in columns if c in names], loops)
         return [{**dict.fromkeys(columns), **row} for row in found.to_pylist()]
@@ -177,18 +174,18 @@ class Store:
             return None
 
     def parts_if_there(self, table: str, night: str) -> Iterator[pa.Table]:
-        """One night of one table in parts, none where the store has none."""
+        """One night of one table in parts, empty if the store has none."""
         with contextlib.suppress(FileNotFoundError):
             yield from stored_parts(self.file(table, night))
 
     def write(self, table: str, night: str, rows: pa.Table | Iterable[pa.Table] | None) -> None:
-        """Keep one night of one table, whole or in parts as they come; where there are no rows, keep none."""
+        """Store one night of one table, whole or in parts; without rows, store none."""
         if rows is None or not write_table(rows, self.file(table, night)):
             self.file(table, night).unlink(missing_ok=True)
 
     def set_aside_damaged(self, night: str) -> list[str]:
-        """Rename the damaged tables of a night, so that it can be written anew; sentences on them. Raises NotNowError
-        where one cannot be read at this time: what is not known to be damaged stays."""
+        """Rename the damaged tables of a night, so that it can be written again; return sentences on them. Raises
+        NotNowError if one cannot be read now: it is kept unless it is known to be damaged."""
         said = []
         for table in KEPT:
             try:
@@ -202,14 +199,14 @@ class Store:
         return said
 
     def forget_explained(self, night: str, loops: Sequence[str] | None) -> None:
-        """Drop the explanations of some loops of a night, of all where None: their records have been replaced."""
+        """Delete the explanations of some loops of a night, of all if None, because their records were replaced."""
         table = self.read_if_there("explained", night)
         if table is not None:
             stay = table.slice(0, 0) if loops is None else rows_of_loops(table, loops, others=True)
             self.write("explained", night, stay if stay.num_rows else None)
 
     def forget_compared(self) -> None:
-        """Drop the settings compared of all nights but the newest: they are for tomorrow, and large."""
+        """Delete the compared settings of all nights but the newest: only these are needed, and they are large."""
         newest = self.nights()[-1:]
         for path in self.files("compared"):
             if path.stem not in newest:
@@ -217,27 +214,27 @@ class Store:
 
     @property
     def run_file(self) -> Path:
-        """Where the run whose pieces lie here is written down."""
+        """Path of the description of the run with the present pieces."""
         return self.path / "parts" / "run.json"
 
     def part(self, night: str, table: str, key: str) -> Path:
-        """Where a piece of a night that is being worked on lies."""
+        """Path of a piece of a night in progress."""
         return self.path / "parts" / night / f"{table}-{key}.parquet"
 
     def whole_chunks(self, night: str) -> list[str]:
-        """Keys of the chunks whose last piece, that of the table of nights, is there."""
+        """Keys of the chunks whose last piece, that of the table of nights, exists."""
         pieces = (p for p in listed(self.path / "parts" / night) if p.suffix == ".parquet")
         return sorted(p.stem.removeprefix("nights-") for p in pieces if "nights-" in p.stem[:7])
 
     def begun(self) -> list[str]:
-        """Nights that were begun and not finished."""
+        """Nights that were started and not finished."""
         return sorted(p.name for p in (self.path / "parts").glob("*") if p.is_dir() and is_night(p.name))
 
     def read_parts(
         self, night: str, table: str, keys: Sequence[str], columns: Sequence[str] | None = None
     ) -> pa.Table | None:
-        """The pieces of one table of a night that some chunks have written, or some of its columns; None where there
-        are none. Raises DamagedError where one of them is gone."""
+        """The pieces of one table of a night from some chunks, or some of its columns; None if there are none. Raises
+        DamagedError if one is missing."""
         paths = [self.part(night, table, key) for key in keys]
         read = partial(self._piece, night, table, columns)
         found = [piece for piece in each(read, paths, keys) if piece is not None]
@@ -246,7 +243,7 @@ class Store:
     def _piece(
         self, night: str, table: str, columns: Sequence[str] | None, path: Path, key: str
     ) -> pa.Table | None:
-        """One piece of one table, None where the chunk has written none."""
+        """One piece of one table, None if the chunk has none."""
         try:
             return read_stored(path, columns)
         except FileNotFoundError:
@@ -256,7 +253,7 @@ class Store:
             raise DamagedError(error.seen, error.expected, GO_ON) from error
 
     def _require_unwritten(self, night: str, table: str, key: str) -> None:
-        """Raise DamagedError where a chunk has written a piece that is not there."""
+        """Raise DamagedError if a piece written by a chunk is missing."""
         try:
             written = table in tables_beside(self.part(night, "nights", key))
         except FileNotFoundError:
@@ -265,18 +262,18 @@ class Store:
             raise self.gone(self.part(night, table, key))
 
     def gone(self, piece: Path) -> DamagedError:
-        """What is said of a piece of a run that is no longer there, or never came."""
+        """Error for a missing piece of a run."""
         seen = f"{piece}: this piece of the night is gone"
         expected = "a store that nobody else changes, and that all workers see"
         return DamagedError(seen, expected, GO_ON)
 
     def drop_parts(self) -> None:
-        """Forget all pieces, and the run that they are of."""
+        """Delete all pieces, and their run."""
         remove_tree(self.path / "parts")
 
     def version(self) -> int:
-        """The version of its tables, 1 where it states none. Raises InputError where what states it is damaged,
-        NotNowError where it cannot be read at this time."""
+        """The version of its tables, 1 if none is stated. Raises InputError if the version file is damaged,
+        NotNowError if it cannot be read now."""
         path = self.path / VERSION_FILE
         try:
             with answering(self.path) if is_remote(self.path) else nullcontext():
@@ -298,16 +295,15 @@ class Store:
             raise InputError(seen, f"version {SCHEMA} at most", "install a newer triage")
 
     def upgrade(self) -> int:
-        """Bring its tables up to date in place, one by one, and say so in it; returns how many were changed.
+        """Update its tables in place, one by one, and record the version; return the number of changed tables.
 
-        From 1 to 2 tables of nights get every column that is declared, empty where nothing is known. An upgrade that
-        was cut short is done again from where it stood; a table is whole at any time. Raises InputError where the
-        store is of a newer version.
+        From 1 to 2 tables of nights get every declared column, empty if unknown. An interrupted upgrade continues
+        where it stopped; a table is complete at any time. Raises InputError where the store is of a newer version.
         """
         self.require_known()
         path, old, changed = self.path / VERSION_FILE, self.version() < SCHEMA, 0
         for table in self.files("nights") if old else ():
-            with contextlib.suppress(DamagedError):  # a damaged table stays for `store check` to name
+            with contextlib.suppress(DamagedError):  # `store check` reports a damaged table
                 held = set(stored_names(table))
                 lacking = [c for c in NIGHTS if c.name not in held]
                 if lacking:

@@ -1,4 +1,4 @@
-"""The tables of a night: which there are, and how one is read, checked and written whole as a file."""
+"""The tables of a night: their list, and atomic reading, checking and writing of one as a file."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from reports.whole_file import whole_file
 
 @dataclass(frozen=True, slots=True)
 class StoredTable:
-    """A table of a night, kept in STORE/name/NIGHT.parquet.
+    """A table of a night, stored in STORE/name/NIGHT.parquet.
 
-    columns, those that its rows declare, none where they are declared here (trends) or beside what alone reads them
-    (waves, moves); in_pieces, whether chunks write it while a night is worked on; kept, whether a finished night has
-    it; bulky, whether it may go before its night does.
+    columns, those declared for its rows, none if they are declared here (trends) or in the module that reads them
+    (waves, moves); in_pieces, whether chunks write it during a night; kept, whether a finished night has it; bulky,
+    whether it may be deleted before its night.
     """
 
     name: str
@@ -49,21 +49,21 @@ OF_A_NIGHT = (
     StoredTable("explained", declared.EXPLAINED, in_pieces=False),
     StoredTable("compared", declared.SETTINGS),
 )
-"""All there are; whoever deletes begins with the first, without which there is no night."""
+"""All tables; deletion begins with the first, without which there is no night."""
 KEPT = tuple(t for t in OF_A_NIGHT if t.kept)
 TREND = ("time_s", *(f"{signal}_{end}" for signal in ("sp", "pv", "op") for end in ("min", "max")), "bad")
-"""Columns of a table of trends beside `loop`, all of them numbers."""
+"""Columns of a table of trends besides `loop`, all numeric."""
 SHADED = ("manual", "frozen")
-"""Further ones, which earlier versions did not keep."""
+"""Further columns, which earlier versions did not store."""
 DECLARED = {c.name: c for table in reversed(OF_A_NIGHT) for c in table.columns}
-"""Every column that a table of results may have, by name, but for those of trends."""
+"""Every possible column of a table of results, by name, except those of trends."""
 WITH_JSON = *declared.NIGHTS, *declared.GROUPS, *declared.BELIEFS
 PARSED = frozenset(c.name for c in WITH_JSON if c.kind is Kind.JSON)
-"""Columns that hold JSON; pages that are kept whole are not among them: those of another version are passed over."""
+"""Columns of JSON; whole stored pages are excluded, because those of another version are skipped."""
 WORDS: Mapping[str, Sequence[str]] = {"action": tuple(Action), "ti_unit": (*SECONDS, "repeats/min")}
-"""Columns that hold one of a few words."""
+"""Columns with one of a few words."""
 ROWS_AT_ONCE = 65_536
-"""Rows of a table that are read at a time where it is read in parts."""
+"""Rows of a table per part."""
 WRITTEN = "a table that 'triage run' wrote"
 REMEDY = (
     "'triage store check' names all such: restore them from a backup, or delete them and run the night anew"
@@ -71,12 +71,12 @@ REMEDY = (
 
 
 class DamagedError(InputError):
-    """A table of the store holds what no run has written, or a piece of a run is gone."""
+    """A table of the store has contents that no run wrote, or a piece of a run is missing."""
 
 
 def rows_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]) -> pa.Table:
-    """Rows as a table with the types that its columns declare, empty where not known. Raises ValueError for a cell
-    whose column is declared nowhere."""
+    """Rows as a table with the declared types of its columns, empty if unknown. Raises ValueError for a cell of an
+    undeclared column."""
     schema = pa.schema([(c.name, pa.float64() if c.is_number else pa.string()) for c in columns])
     return pa.Table.from_pylist([row_of(row, columns) for row in rows], schema=schema)
 
@@ -91,13 +91,13 @@ def rows_of_loops(table: pa.Table, loops: Collection[str], others: bool = False)
 
 
 def write_table(rows: pa.Table | Iterable[pa.Table], path: Path) -> bool:
-    """Write a table, or parts of one below each other as they come, so that a reader sees all of it or nothing;
-    whether there was anything to write."""
+    """Write a table, or its parts one after another, so that a reader sees all of it or nothing; return whether there
+    were any rows."""
     parts = iter((rows,) if isinstance(rows, pa.Table) else rows)
     first = next(parts, None)
     if first is None:
         return False
-    if is_remote(path):  # from memory: nothing is left on this machine, however the process ends
+    if is_remote(path):  # from memory: nothing remains on this machine, however the process ends
         remote, sink = cast(Any, path), pa.BufferOutputStream()
         _write_parts(chain((first,), parts), first.schema, sink)
         remote.fs.pipe_file(remote.path, sink.getvalue().to_pybytes())
@@ -114,17 +114,16 @@ def _write_parts(parts: Iterable[pa.Table], schema: pa.Schema, sink: Any) -> Non
 
 
 BESIDE = b"beside"
-"""Metadata of a chunk's piece of the table of nights: which other pieces the chunk has written."""
+"""Metadata of a chunk's piece of the table of nights: the chunk's other pieces."""
 
 
 def naming(table: pa.Table, beside: Iterable[str]) -> pa.Table:
-    """A chunk's piece of the table of nights, which names the chunk's other pieces."""
+    """A chunk's piece of the table of nights, with the names of the chunk's other pieces."""
     return table.replace_schema_metadata({BESIDE: " ".join(beside).encode()})
 
 
 def tables_beside(path: Path) -> list[str]:
-    """The tables of which a chunk has written pieces beside its piece of the table of nights; errors as of
-    `read_stored`."""
+    """The tables of which a chunk has written further pieces; errors as of `read_stored`."""
     with _for_parquet(path) as held:
         return (pq.read_schema(held).metadata or {}).get(BESIDE, b"").decode().split()
 
@@ -133,8 +132,8 @@ def read_stored(
     path: Path, columns: Sequence[str] | None = None, loops: Collection[str] | None = None
 ) -> pa.Table:
     """A table of the store, or some of its columns, of some loops or of all. Raises FileNotFoundError where there is
-    none; DamagedError where Parquet finds the file damaged, or it holds other columns than results have; NotNowError
-    where it cannot be read at this time."""
+    none; DamagedError where Parquet finds damage, or there are other columns than results have; NotNowError where it
+    cannot be read now."""
     wanted = list(columns) if columns else None
     with _for_parquet(path) as held, pq.ParquetFile(held, page_checksum_verification=True) as file:
         table = file.read(columns=wanted) if loops is None else _of_loops(file, wanted, loops)
@@ -143,7 +142,7 @@ def read_stored(
 
 
 def stored_parts(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-    """The same in parts of so many rows that memory holds few; errors as of `read_stored`."""
+    """The same in parts with few rows in memory; errors as of `read_stored`."""
     wanted = list(columns) if columns else None
     with _for_parquet(path) as held, pq.ParquetFile(held, page_checksum_verification=True) as file:
         for group in range(file.num_row_groups):
@@ -154,10 +153,10 @@ def stored_parts(path: Path, columns: Sequence[str] | None = None) -> Iterator[p
 
 
 def _of_loops(file: pq.ParquetFile, columns: list[str] | None, loops: Collection[str]) -> pa.Table:
-    """Rows of some loops; parts of the file that hold none of them are not read."""
+    """Rows of some loops; parts of the file without them are not read."""
     names = file.schema_arrow.names
     if "loop" not in names:
-        return file.read(columns=columns)  # which is refused
+        return file.read(columns=columns)  # which raises
     asked = [name for name in names if columns is None or name in columns]
     at, found = names.index("loop"), [file.schema_arrow.empty_table()]
     first, last = min(loops, default=""), max(loops, default="")
@@ -185,7 +184,7 @@ def stored_names(path: Path) -> list[str]:
 
 @contextmanager
 def _for_parquet(path: Path) -> Iterator[Any]:
-    """A path as Parquet's reader takes it: itself, or all bytes of an object of shared storage."""
+    """A path for Parquet's reader: itself, or all bytes of an object of shared storage."""
     try:
         if is_remote(path):
             yield pa.BufferReader(content(path))
@@ -205,12 +204,12 @@ def _for_parquet(path: Path) -> Iterator[Any]:
 
 
 def no_column(path: Path, column: str) -> DamagedError:
-    """What is said of a table without a column that every one of its kind has."""
+    """Error for a table without a column that all of its kind have."""
     return DamagedError(f"{path}: no column {column}", WRITTEN, REMEDY)
 
 
 def _require_declared(path: Path, schema: pa.Schema, wanted: list[str] | None) -> None:
-    """Raise DamagedError where a table has no loops, or a declared column is of another kind."""
+    """Raise DamagedError if a table has no loops, or a declared column has another type."""
     if (wanted is None or "loop" in wanted) and "loop" not in schema.names:
         raise no_column(path, "loop")
     for field in schema:
@@ -227,7 +226,7 @@ def _of_another_kind(path: Path, column: str, held: str, wanted: str) -> Damaged
 
 
 def _require_meant(path: Path, table: pa.Table) -> None:
-    """Raise DamagedError where a column of JSON, or of a few words, holds other text."""
+    """Raise DamagedError if a column of JSON, or of a few words, has other text."""
     for name in (PARSED | WORDS.keys()).intersection(table.column_names):
         known = WORDS.get(name)
         for text in table.column(name).unique().to_pylist():

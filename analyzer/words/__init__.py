@@ -1,4 +1,4 @@
-"""What is told in sentences: results in, text out; those that need no rule stand in texts.toml."""
+"""Results as sentences; those without a rule are in texts.toml."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import Any
 
 @cache
 def toml_of(room: str, name: str) -> dict[str, Any]:
-    """A TOML file of a room of the analyzer."""
+    """A TOML file of a subpackage of the analyzer."""
     return tomllib.loads((files(room) / name).read_text("utf-8"))
 
 
 def sentences(subject: str) -> dict[str, str]:
-    """What texts.toml says of a subject."""
+    """The texts of a subject in texts.toml."""
     found: dict[str, str] = toml_of("analyzer.words", "texts.toml")[subject]
     return found

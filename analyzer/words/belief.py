@@ -1,4 +1,4 @@
-"""What beliefs say: the columns of a loop that rest on all nights, its reason, and what is new of it."""
+"""Texts on beliefs: the columns of a loop based on all nights, its reason, and its changes."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ REPAIRED = re.compile(
     r"\b(repaired|replaced|overhauled|exchanged|renewed|repacked|new (valve|actuator|positioner|packing|stem))\b",
     re.I,
 )
-"""Words of a note that say a valve is another one from then on."""
+"""Words of a note on a repaired or replaced valve."""
 NOT_YET = re.compile(
     r"\b(to be|not|will be|should be|must be|must|needs? to be|order(ed)?|plan(ned)?|next)\b", re.I
 )
-"""Words that say it is not yet done."""
+"""Words for work that is not yet done."""
 IS = {Fault.BACKLASH: "backlash", Fault.STICTION: "stiction"}
 
 
 def says_repaired(text: str) -> bool:
-    """Whether a note says that a valve was repaired."""
+    """Whether a note reports a repaired valve."""
     return bool(REPAIRED.search(text)) and not NOT_YET.search(text)
 
 
 def width_text(now: Belief) -> str:
-    """What is wrong with a worn valve, with the pooled width and its interval."""
+    """The fault of a worn valve, with the pooled width and its interval."""
     pool = now.constants.get("width")
     width = None if pool is None else pool.pooled
     fault = now.told.fault if now.told.fault in IS else now.valve.fault(None)
@@ -46,7 +46,7 @@ def width_text(now: Belief) -> str:
 
 
 def wear_text(row: Row) -> str:
-    """How fast a valve wears, since when, and when it will have reached its next size."""
+    """Rate of a valve's wear, its start, and the date at which it reaches the next size."""
     ends = f"{row['wear_low_pct']:.2g} to {row['wear_high_pct']:.2g}"
     text = f"{row['wear_pct_per_month']:.2g} % of OP in 30 days ({ends}) since {row['wear_since']}"
     size, first, last = row["reaches_pct"], row["reaches_from"], row["reaches_by"]
@@ -57,7 +57,7 @@ def wear_text(row: Row) -> str:
 
 
 def told(now: Belief, row: Row) -> dict[str, Any]:
-    """The columns of a loop's row that rest on all nights."""
+    """The columns of a loop's row based on all nights."""
     t = now.told
     pair = t.pair if t.action is Action.RETUNE else None
     out: dict[str, Any] = {f"osc_{c}_pct": t.confidence.get(c) for c in CAUSES}
@@ -76,8 +76,8 @@ def told(now: Belief, row: Row) -> dict[str, Any]:
 
 
 def _advice(now: Belief, row: Row) -> str | None:
-    """The advice in full: that of the night which the pair is of, with what else nights have advised; else the
-    night's own where it is told."""
+    """The full advice: that of the night that gave the pair, with other advice of nights; otherwise the night's own
+    if it is reported."""
     t, pairs = now.told, now.remedy.pairs
     if t.calmed:
         return sentences("settings")["calmed"]
@@ -94,7 +94,7 @@ def _advice(now: Belief, row: Row) -> str | None:
 
 
 def _valve_columns(now: Belief, row: Row) -> dict[str, Any]:
-    """Play or stickband: the night's own, the pooled one where it has none of the fault that is told."""
+    """Backlash or stickband: the night's own, the pooled one if it has none of the reported fault."""
     names = ("backlash_pct", "stickband_pct", "slip_jump_pct")
     found = {k: p.pooled for k, p in now.constants.items()}
     width, jump = found.get("width"), found.get("slip_jump")
@@ -108,8 +108,8 @@ def _valve_columns(now: Belief, row: Row) -> dict[str, Any]:
 
 
 def belief_reason(now: Belief, row: Row) -> str:
-    """The sentence of a loop: the night's own where the nights agree, else what they say together; with the valve's
-    width over the nights where it is worn."""
+    """The reason of a loop: the night's own if the nights agree, otherwise the joint one; with the valve's width over
+    the nights if it is worn."""
     t, nights = now.told, now.valve.nights
     worn = nights > 1 and t.fault in IS and now.valve.certain
     sure = f"confirmed by {nights} nights" if worn else None
@@ -122,7 +122,7 @@ def belief_reason(now: Belief, row: Row) -> str:
 
 
 def _calmed(now: Belief) -> str:
-    """What is left of a cycle since its settings were changed."""
+    """Remaining part of a cycle since its settings were changed."""
     left, then = now.last, now.before
     assert left is not None
     assert then is not None
@@ -134,7 +134,7 @@ def _calmed(now: Belief) -> str:
 
 
 def _sizes(seen: Calm | None) -> str:
-    """How large a cycle and the error are."""
+    """Size of a cycle and of the error."""
     if seen is None:
         return "an amplitude that is not known"
     error = f", average absolute error {number(seen.error_pct)} %" if seen.error_pct is not None else ""
@@ -142,7 +142,7 @@ def _sizes(seen: Calm | None) -> str:
 
 
 def _together(now: Belief, row: Row) -> str:
-    """What the nights say of the cycle, and of the valve beside it."""
+    """Joint result of the nights on the cycle, and on the valve."""
     t, cycles = now.told, counts(row["oscillating_pct"])
     cycle = f"cycles every {duration(row['period_s'])}" if cycles else "does not oscillate"
     nights = f"{now.cycle.nights} nights since {now.cycle.since}"
@@ -159,14 +159,14 @@ def _together(now: Belief, row: Row) -> str:
 
 
 def news(before: Belief | None, now: Belief, row: Row) -> tuple[str, str]:
-    """What is new of a loop since the night before, and its colour; '' where nothing is."""
-    if before is None or now.recorder == now.night:  # another recorder shows other sizes of the same
+    """Change of a loop since the previous night, and its colour; '' if there is none."""
+    if before is None or now.recorder == now.night:  # another recorder shows different sizes of the same
         return "", ""
     return _swing_news(before, now, row) or _fault_news(before, now) or ("", "")
 
 
 def growing(phase: PhaseKnown, found: Growth, row: Row) -> str:
-    """That the overshoot of a phase grows, and since which repetition."""
+    """Text on the growing overshoot of a phase, with the repetition at which it began."""
     low, span = row["pv_lo"] or 0.0, (row["pv_hi"] or 100.0) - (row["pv_lo"] or 0.0)
     begin, end = (low + span * x / 100.0 for x in (phase.begin, phase.end))
     when = local(found.start_s, row["timezone"]).strftime("%Y-%m-%d %H:%M")
@@ -177,8 +177,8 @@ def growing(phase: PhaseKnown, found: Growth, row: Row) -> str:
 
 
 def _swing_news(before: Belief, now: Belief, row: Row) -> tuple[str, str] | None:
-    """That a loop began or ceased to oscillate, or does so more or less than it used to; nothing of a slave, whose
-    error behind a set point that moves is a cycle on one night and none on the next: its master tells."""
+    """Text if a loop started or stopped to oscillate, or oscillates more or less than usual; none for a slave, whose
+    error behind a moving set point may or may not be a cycle: its master reports it."""
     if row["master"]:
         return None
     changed = now.cycle.since != before.cycle.since and now.cycle.nights == 1
@@ -196,7 +196,7 @@ def _swing_news(before: Belief, now: Belief, row: Row) -> tuple[str, str] | None
 
 
 def _fault_news(before: Belief, now: Belief) -> tuple[str, str] | None:
-    """That a valve is known to be worn, or to be sound again; that the cause of a cycle is told as another one, or
+    """Text if a valve is now known to be worn, or fault-free again; if the reported cause of a cycle changed, or
     other settings are advised."""
     if now.valve.certain and not before.valve.certain:
         return f"{width_text(now)}: confirmed by {now.valve.nights} nights", "worse"

@@ -1,4 +1,4 @@
-"""What a night decided of a loop, in lines: the same words wherever a command tells it."""
+"""The decision of a night on a loop as lines, with the same words in every command."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ TOLD = (
     ),
     *("lanes", "source_loop", "action", "due", "kp", "ti", "kp_new", "ti_new", "reason", "advice"),
 )
-"""Columns of a decision that commands tell, as the contract of the ranking names them."""
+"""Columns of a decision shown by commands, named as in the contract of the ranking."""
 INDICES = ("harris", "hagglund", "horch", "idle", "kano", "choudhury", "yamashita", "ellipse", "he")
-"""The literature's indices in the order of publication."""
+"""The published indices in the order of publication."""
 ABOVE_ACTION = (Cause.VALVE, Cause.TUNING, Cause.LOAD)
 
 
 def as_data(row: Row) -> Row:
-    """A decision as plain data, with what to do in words and the indices of the literature beside it."""
+    """A decision as plain data, with the action in words and the published indices."""
     return {name: row[name] for name in TOLD} | {"do": _do(row), "field_indices": indices(row)}
 
 
 def indices(row: Row) -> list[dict[str, Any]]:
-    """The literature's indices of a row, in the order of publication: name, values, and whether the index finds what
-    it looks for, None where it is undecided or its publication draws no line."""
+    """The published indices of a row, in the order of publication: name, values, and the index's conclusion, None if
+    it is undecided or its publication gives no limit."""
     found = json.loads(row["field_indices"] or "{}")
     if row["harris_index"] is not None:
         found["harris"] = [row["harris_index"]]
@@ -50,7 +50,7 @@ def indices(row: Row) -> list[dict[str, Any]]:
 
 
 def decided(data: Mapping[str, Any]) -> str:
-    """What the night decided of an explained loop, in sentences; '' where that is not known."""
+    """The night's decision on an explained loop, in sentences; '' if unknown."""
     row = data.get("night")
     if row is None:
         return ""
@@ -60,7 +60,7 @@ def decided(data: Mapping[str, Any]) -> str:
 
 
 def decision_lines(row: Row) -> list[str]:
-    """Cause, fault and action with what they rest on, a line each."""
+    """Cause, fault and action with their evidence, one line each."""
     at = f"{row['loop']}, night {row['night']}: cause {row['cause'] or 'not told'}{_surely(row)}"
     lines = [at + _fault(row), f"action: {row['action'] or 'none'}{_due(row)}"]
     if _do(row):
@@ -75,7 +75,7 @@ def decision_lines(row: Row) -> list[str]:
 
 
 def _do(row: Row) -> str:
-    """What to do, '' of a loop of which nothing is to be done."""
+    """The action, '' for a loop without one."""
     return dict(order(row))["Do"] if row["action"] not in (None, Action.NONE) else ""
 
 
@@ -84,14 +84,14 @@ def _sentence(text: str) -> str:
 
 
 def _surely(row: Row) -> str:
-    """How sure a cause is."""
+    """Confidence in a cause."""
     cause = row["cause"]
     share = row[f"osc_{cause}_pct"] if cause in ABOVE_ACTION else None
     return f" ({share:.0f} %)" if share else ""
 
 
 def _fault(row: Row) -> str:
-    """What is wrong with the valve, with its width."""
+    """The fault of the valve, with its width."""
     fault, width = row["valve_fault"], row["stickband_pct"] or row["backlash_pct"]
     if fault in (None, Fault.NONE):
         return ""

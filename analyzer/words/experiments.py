@@ -1,4 +1,4 @@
-"""Experiments in words: where they lie, the model that they make, settings from it, and what they leave open."""
+"""Experiments in words: their times, the model, settings from it, and what remains unknown."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ TITLES: Mapping[str, str] = {
     "backlash_pct": "backlash",
     "drift_pct_per_h": "drift of PV, told apart",
 }
-"""Constants in words, in the order in which they are told."""
+"""Constants in words, in reporting order."""
 
 
 def name_of(x: Experiment) -> str:
-    """An experiment in words: how many moves of what size."""
+    """An experiment in words: number and size of its moves."""
     if x.course is Course.SETPOINT:
         steps = "set point step" if x.moves == 1 else f"{x.moves} set point steps"
         return f"{steps} in automatic, up to {number(x.size)} %"
@@ -43,7 +43,7 @@ def name_of(x: Experiment) -> str:
 
 
 def found_lines(of: Learned, zone: str) -> Iterator[str]:
-    """A line for each experiment: when, and what it is."""
+    """A line for each experiment: time and kind."""
     start_s, dt_s = of.prepared.record.start_s, of.prepared.record.dt_s
     for x in of.found:
         first, last = (stamp(start_s + dt_s * k, zone) for k in (x.first, x.last))
@@ -77,7 +77,7 @@ def model_text(model: Pooled) -> str:
 
 
 def in_a_clause(of: Learned) -> str:
-    """What a row says of its experiments; '' where they tell no model."""
+    """Text on the experiments in a row; '' if they give no model."""
     if of.model is None:
         return ""
     used = of.model.used
@@ -92,7 +92,7 @@ def settings_text(pid: Pid, spec: LoopSpec, pv_span: float) -> str:
 
 
 def settings_lines(of: Learned, spec: LoopSpec, present: Pid | None) -> Iterator[str]:
-    """Settings from the model: ours, and SIMC's beside, each with its maximum sensitivity."""
+    """Settings from the model: ours, and SIMC's for comparison, each with its maximum sensitivity."""
     if of.settings is None:
         return
     s, span = of.settings, of.prepared.scale.span
@@ -103,7 +103,7 @@ def settings_lines(of: Learned, spec: LoopSpec, present: Pid | None) -> Iterator
 
 
 def lines(of: Learned, spec: LoopSpec, present: Pid | None, zone: str) -> Iterator[str]:
-    """All that experiments tell of a loop."""
+    """All results of a loop's experiments."""
     yield from found_lines(of, zone)
     for x, why in of.untold:
         yield f"  tells no model ({name_of(x)}): {why}"
@@ -128,7 +128,7 @@ def lines(of: Learned, spec: LoopSpec, present: Pid | None, zone: str) -> Iterat
 
 
 def controller_lines(of: Learned) -> Iterator[str]:
-    """What an experiment in automatic tells of its controller."""
+    """Results of an experiment in automatic on its controller."""
     seen = of.controlled
     if seen is None:
         return
@@ -142,7 +142,7 @@ def controller_lines(of: Learned) -> Iterator[str]:
 
 
 def lone_lines(of: Learned, zone: str) -> Iterator[str]:
-    """Single values that were left out, each by its time."""
+    """Excluded single values, each with its time."""
     start_s = of.prepared.record.start_s
     for m in of.models:
         for name, times in (("PV", m.lone_pv), ("OP", m.lone_op)):
@@ -151,7 +151,7 @@ def lone_lines(of: Learned, zone: str) -> Iterator[str]:
 
 
 def left_open(of: Learned) -> tuple[str, ...]:
-    """What the experiments do not tell, and so is not in the settings."""
+    """Properties not identified by the experiments, and so not in the settings."""
     model = of.model
     if model is None:
         return ()

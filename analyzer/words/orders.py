@@ -1,5 +1,5 @@
-"""What to do: the order of a loop in three lines by its row, the same on every page and in every command, and the
-sentence for several loops of one kind of work. The texts stand in orders.toml."""
+"""Actions: the order of a loop in three lines from its row, the same on every page and in every command, and the
+sentence for several loops with one kind of work. The texts are in orders.toml."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def fault_width(row: Row) -> float | None:
 
 
 def stroke(row: Row) -> tuple[str, str]:
-    """Steps of the stroke test of a valve at fault [%], and what it does in them; '' where it does not answer."""
+    """Steps of the stroke test of a faulty valve [%], and its response to them; '' if it does not respond."""
     width, kind = fault_width(row), texts("by_hand").get(row["valve_fault"], "")
     if width is None:
         return "5", kind.format(width="some steps")
@@ -66,9 +66,9 @@ CASES: Cases = {
     ),
     Action.NEEDS_DATA: _of_lack,
 }
-"""Which case of an action a row is, where an action has several."""
+"""The case of an action from a row, if an action has several."""
 RETUNED = {Cause.VALVE: "retune worn", Cause.NONE: "retune sluggish", Cause.TUNING: "retune"}
-"""Kinds of work that new settings are, by the cause; of others an experiment tells the process."""
+"""Kinds of work for new settings, by the cause; for others an experiment identifies the process."""
 
 
 EXPECTED = {
@@ -76,17 +76,17 @@ EXPECTED = {
     Cause.NONE: "PV comes back to its set point several times sooner, and OP moves more",
     Cause.TUNING: "the swing is smaller, and dies away sooner after a disturbance",
 }
-"""What new settings make of a loop of which no cycle is predicted, by the cause."""
+"""Effect of new settings on a loop without a predicted cycle, by the cause."""
 
 
 def case_of(row: Row) -> str:
-    """The case of a row's action: of some actions the row says which."""
+    """The case of a row's action; for some actions it depends on the row."""
     action = Action(row["action"])
     return CASES[action](row) if action in CASES else action
 
 
 def _expected(row: Row) -> str:
-    """What new settings make of the cycle."""
+    """The expected effect of new settings on the cycle."""
     if None not in (row.get("expected_period_s"), row.get("expected_pv_amplitude_pct")):
         swing = f"{row['expected_pv_amplitude_pct']:.2g} % of span"
         return f"a cycle of {duration(row['expected_period_s'])} and {swing}: the valve stays as it is"
@@ -94,7 +94,7 @@ def _expected(row: Row) -> str:
 
 
 def order(row: Row) -> tuple[tuple[str, str], ...]:
-    """Lead and text of three lines, '' where there is nothing to say; none for a night that advised nothing."""
+    """Lead and text of three lines, '' for an empty one; none for a night without advice."""
     if not row["action"]:
         return ()
     said = {name: row.get(name) or "" for name in ("loop", "advice", "reason")}
@@ -110,7 +110,7 @@ def order(row: Row) -> tuple[tuple[str, str], ...]:
 
 
 def kind_of_work(row: Row) -> str:
-    """The kind of work that a row asks for, of which one sentence tells all loops; '' of none."""
+    """The kind of work required by a row, which one sentence gives for all loops; '' for none."""
     if not row["action"]:
         return ""
     kind = (
@@ -120,7 +120,7 @@ def kind_of_work(row: Row) -> str:
 
 
 def asked(work: str, rows: Sequence[Row], names: str) -> str:
-    """The sentence of a kind of work on some loops, which `names` lists."""
+    """The sentence on a kind of work for some loops, listed in `names`."""
     sticks = sum(r["valve_fault"] == Fault.STICTION for r in rows)
     kinds = {len(rows): "has stiction", 0: "has backlash"}
     said, period = texts("work")[work], duration(rows[0]["period_s"])

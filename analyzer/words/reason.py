@@ -1,8 +1,8 @@
-"""What a finding says: the reason of a loop's row, what was found and why, what matters most first, and each sign of
-its cause, in words for everybody and figures for an expert.
+"""Texts on a finding: the reason in a loop's row, with the finding and its evidence, most important first, and each
+sign of its cause, in words for everybody and figures for an expert.
 
-Lists and pages show the clauses of a reason that make a sentence (`in_short`); the others are evidence and stand
-folded. The sentences of signs stand in texts.toml, and here is which of them a sign's figures ask for.
+Lists and pages show the first clauses of a reason as a sentence (`in_short`); the others are evidence and are folded.
+The sentences of signs are in texts.toml; this module chooses one by a sign's figures.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ from analyzer.words import sentences
 from analyzer.words.units import duration
 
 MOST_NAMES = 5
-"""Followers that are named in a row."""
+"""Maximum number of followers listed in a row."""
 MOST_AMPLIFIED = 10.0
-"""Times from which it is not told how many; ours: a loop that amplified by 0.55 was told 35 times by a model that its
-load had bent."""
+"""Amplification above which the number is not reported; ours: a model bent by its load reported 35 times for a loop
+that amplified by 0.55."""
 SAID_AT_ONCE = (Action.CHECK_SETTINGS, Action.NEEDS_DATA)
-"""Actions whose words belong into the list."""
+"""Actions whose words are in the list."""
 NightDecision = tuple[str, str]
-"""Words for everybody, and figures for an expert, '' where the words hold them."""
+"""Words for everybody, and figures for an expert, '' if the words contain them."""
 Chosen = tuple[Any, ...]
-"""A sentence of texts.toml by its name, and the figures that it is filled with."""
+"""A sentence of texts.toml by its name, and its figures."""
 
 
 def in_short(text: str) -> tuple[str, str]:
-    """The first clauses of a reason, as many as make a short sentence (one at least), and the others."""
+    """The first clauses of a reason, as many as make a short sentence (at least one), and the others."""
     clauses = text.split("; ")
     words = [len(clause.split()) for clause in clauses]
     kept = max([n for n in range(1, len(clauses) + 1) if sum(words[:n]) <= PAGES.reason_words], default=1)
@@ -50,10 +50,10 @@ def in_short(text: str) -> tuple[str, str]:
 
 
 def reason(found: Finding) -> str:
-    """What was found and why, what the lanes add, and since when it is told."""
+    """The finding and its evidence, additions by the lanes, and the time since which it is reported."""
     known = (
         {Lane.MANUAL} if found.lack is MissingData.AUTOMATIC else set()
-    )  # what it lacks has said so already
+    )  # the missing data have been reported already
     said = [SAID[lane](found) for lane in found.lanes if lane in SAID and lane not in known]
     text = joined(_whole(found), *said)
     changed = found.text("settings_changed")
@@ -65,7 +65,7 @@ def reason(found: Finding) -> str:
 
 
 def _whole(found: Finding) -> str:
-    """What was found of the loop, and what it has to do with others."""
+    """The finding on the loop, and its relation to others."""
     lacking = str(found.lacking or "")
     if found.status is not Status.OK:
         return lacking
@@ -90,7 +90,7 @@ def _whole(found: Finding) -> str:
 
 
 def _cause(found: Finding) -> str:
-    """Whether the loop cycles, and why, with the figures that say so at the end."""
+    """Whether the loop cycles, and the cause, with the figures at the end."""
     cycle = cycle_text(found)
     if found.cause is Cause.VALVE:
         return f"{cycle}: {valve_text(found)}"
@@ -104,7 +104,7 @@ def _cause(found: Finding) -> str:
 
 
 def cycle_text(found: Finding) -> str:
-    """Whether the loop cycles, and for how much of the time where it is too little to count."""
+    """Whether the loop cycles, and the share of the time if it is too small to count."""
     swing = found.swing
     if swing is None or not swing.oscillating_pct or not swing.period_s:
         return f"moves with {found.moves[0]}" if found.moves else "does not oscillate"
@@ -113,7 +113,7 @@ def cycle_text(found: Finding) -> str:
 
 
 def to_stroke(found: Finding) -> str:
-    """The test that a valve's fault asks for; '' where its width is not known or the action is another."""
+    """The test for a valve's fault; '' if its width is unknown or the action is another."""
     width = found.width_pct
     if found.remedy.action is not Action.REPAIR_VALVE or width is None:
         return ""
@@ -121,7 +121,7 @@ def to_stroke(found: Finding) -> str:
 
 
 def valve_text(found: Finding) -> str:
-    """What is wrong with the valve, in figures where there are any."""
+    """The fault of the valve, in figures if there are any."""
     size, width, fault = found.known.get("valve_size"), found.width_pct, found.fault
     if fault not in sentences("width") or not isinstance(size, float):
         return f"the valve is at fault; {_strongest(found, 2)}"
@@ -131,20 +131,20 @@ def valve_text(found: Finding) -> str:
 
 
 def _strongest(found: Finding, most: int, *first: SignKind) -> str:
-    """The strongest signs of the cause, those that show some things before all others."""
+    """The strongest signs of the cause, with some kinds before all others."""
     signs = [s for s in found.signs if s.points_to is found.cause]
     order = sorted(signs, key=lambda s: (s.kind not in first, -s.strength))
     return "; ".join(sign_text(s) for s in order[:most])
 
 
 def below_first(below: Finding, tie: str = "master") -> str:
-    """Why a master gets no advice of its own."""
+    """Why a master has no advice of its own."""
     sign = Sign(Cause.LOAD, 1.0, SignKind.OF_BELOW, (below.loop, below.cause, tie))
     return f"{sign_text(sign)}: mend that first, then look again."
 
 
 def joined(*clauses: str | None) -> str:
-    """Clauses with a semicolon between, those that say nothing left out; a full stop at the end of one goes."""
+    """Clauses joined by semicolons, without empty ones; a full stop at the end of a clause is removed."""
     said = ((clause or "").strip() for clause in clauses)
     kept = (text if text[-2:] == ".." else text.removesuffix(".").strip() for text in said)
     return "; ".join(filter(None, kept))
@@ -158,7 +158,7 @@ def sign_parts(sign: Sign) -> NightDecision:
 
 
 def sign_text(sign: Sign) -> str:
-    """A sign in words alone."""
+    """A sign in words only."""
     return sign_parts(sign)[0]
 
 
@@ -169,7 +169,7 @@ def sign_in_full(sign: Sign) -> str:
 
 
 def as_stored(sign: Sign) -> dict[str, Any]:
-    """A sign as the store keeps it; one that rests on none of the measures that are weighed has no name."""
+    """A sign as stored; it has no name if none of the weighted measures supports it."""
     text, figures = sign_parts(sign)
     name = "" if sign.kind in UNNAMED else sign.kind
     told = {"points_to": sign.points_to, "strength": sign.strength}
@@ -177,7 +177,7 @@ def as_stored(sign: Sign) -> dict[str, Any]:
 
 
 def _evidence(nat: float, agreeing: float = 0.0, count: int | None = None) -> Chosen:
-    """How a faulty valve explains PV against an ideal one."""
+    """Text on how much better a faulty valve explains PV than an ideal one."""
     if nat <= 0:
         return ("no_evidence",)
     return "evidence" if count is None else "evidence_in_stretches", nat, 100 * agreeing, count
@@ -204,12 +204,12 @@ def _regularity(kurtosis: float, third: float) -> Chosen:
 
 
 def later(lag_s: float | None) -> str:
-    """How much later a loop moves than the one that it follows."""
+    """Text on the lag of a loop behind the one that it follows."""
     return f" {duration(abs(lag_s))} later" if lag_s is not None and lag_s > 0 else ""
 
 
 def _of_below(loop: str, cause: str | None, tie: str) -> Chosen:
-    """What a loop's output hangs on: one that has a fault, or answers as a faulty valve would."""
+    """Text on the loop to which a loop's output is linked: it has a fault, or responds like a faulty valve."""
     own = cause if cause in (Cause.VALVE, Cause.TUNING) else "no"
     return f"below_of_{own}_fault", "moves" if tie == "split" else "is the set point of", loop
 
@@ -241,9 +241,9 @@ SAYS: Mapping[SignKind, Callable[..., Chosen]] = {
     SignKind.OF_BELOW: _of_below,
     SignKind.OF_ABOVE: lambda loop, tie: (f"above_by_{tie}", loop),
 }
-"""Which sentence a sign takes, by its figures, and what is filled into it."""
+"""The sentence for a sign, by its figures, and the values inserted in it."""
 UNNAMED = (
     *(SignKind.CALM_EVIDENCE, SignKind.CALM_WIDTH, SignKind.AGAIN, SignKind.DEAD_VALVE),
     *(SignKind.FOLLOWS, SignKind.OF_BELOW, SignKind.OF_ABOVE),
 )
-"""Signs that no measure is named for."""
+"""Signs without a named measure."""

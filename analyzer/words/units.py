@@ -1,4 +1,4 @@
-"""Times and controller settings in words, with their units; no settings stand anywhere without them."""
+"""Times and controller settings in words, with their units; settings are never shown without them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def number(value: float | None) -> str:
-    """Three digits, all before the point of larger numbers; empty where not known."""
+    """Three digits, all before the point for larger numbers; empty if unknown."""
     if value is None:
         return ""
     if value == 0:
@@ -21,7 +21,7 @@ def number(value: float | None) -> str:
 
 
 def duration(seconds: float | None) -> str:
-    """A length of time in the unit that reads best."""
+    """A length of time in the most readable unit."""
     if seconds is None:
         return ""
     if seconds < 120:
@@ -30,14 +30,14 @@ def duration(seconds: float | None) -> str:
 
 
 def gain_unit(kind: str | None, pv_unit: str | None, op_unit: str | None = "%") -> str:
-    """The unit of a controller gain as loops.csv states it; op_unit: % or, where OP has a range of its own, OP."""
+    """The unit of a controller gain as in loops.csv; op_unit: % or, if OP has its own range, OP."""
     if kind == "band":
         return "% band"
     return f"{op_unit or '%'}/{pv_unit or 'PV unit'}" if kind == "engineering" else "%/%"
 
 
 def settings(kp: float | None, ti: float | None, gain: str, time: str) -> str:
-    """Kp and Ti with their units; '' where neither is known, 'no integral action' for a Ti of 0."""
+    """Kp and Ti with their units; '' if neither is known, 'no integral action' for a Ti of 0."""
     parts = [f"Kp {number(kp)} {gain}"] if kp is not None else []
     if ti is not None:
         parts.append(f"Ti {number(ti)} {time}" if ti else "no integral action")
@@ -45,13 +45,13 @@ def settings(kp: float | None, ti: float | None, gain: str, time: str) -> str:
 
 
 def row_settings(row: Row, kp: str = "kp", ti: str = "ti") -> str:
-    """The settings in two columns of a row of the night, with the units that the row states."""
+    """The settings in two columns of a row of the night, with the row's units."""
     gain = gain_unit(row["gain_unit"], row["pv_unit"], row.get("op_unit"))
     return settings(row[kp], row[ti], gain, row["ti_unit"] or "s")
 
 
 SECONDS = {"s": 1.0, "min": 60.0}
-"""Seconds of a unit of integral time; repeats a minute are counted the other way round."""
+"""Seconds of a unit of integral time; repeats per minute are the reciprocal."""
 
 
 def seconds_of(ti: float, unit: str) -> float | None:
@@ -62,7 +62,7 @@ def seconds_of(ti: float, unit: str) -> float | None:
 
 
 def changed_settings(row: Row) -> str:
-    """Old and new settings of a row with their units; a band in gain and other times in seconds too."""
+    """Old and new settings of a row with their units; a band also as gain and other times also in seconds."""
     gain, time = gain_unit(row["gain_unit"], row["pv_unit"], row.get("op_unit")), row["ti_unit"] or "s"
     old, new = (row["kp"], row["ti"]), (row["kp_new"], row["ti_new"])
     kp = f"Kp {arrow(old[0], new[0])} {gain}"
@@ -76,12 +76,12 @@ def changed_settings(row: Row) -> str:
 
 
 def arrow(old: float | None, new: float | None) -> str:
-    """An old and a new number, 'none' for one that is not known."""
+    """An old and a new number, 'none' for an unknown one."""
     return f"{number(old) or 'none'} \u2192 {number(new) or 'none'}"
 
 
 def of_controller(pid: Pid, spec: LoopSpec, pv_span: float) -> str:
-    """A controller's settings as they are typed into it."""
+    """A controller's settings in the units of entry."""
     from analyzer.loops.tags import as_stated, derivative_as_stated
 
     kp, ti = as_stated(pid, spec, pv_span)
@@ -91,7 +91,7 @@ def of_controller(pid: Pid, spec: LoopSpec, pv_span: float) -> str:
 
 
 def beside_settings(stated: Pid, shown: Pid, spec: LoopSpec, pv_span: float) -> str:
-    """The columns of loops.csv, and what to write into them, with which a stated controller is the one shown."""
+    """The columns of loops.csv, and their new values, with which a stated controller equals the one in the record."""
     pv, op = pv_span / 100.0, (spec.op_hi - spec.op_lo) / 100.0
     columns = (
         ("gap", stated.gap, shown.gap, shown.gap * pv),
@@ -107,7 +107,7 @@ def beside_settings(stated: Pid, shown: Pid, spec: LoopSpec, pv_span: float) -> 
 
 
 def settings_changed(old: LoopSpec, new: LoopSpec, clock: str) -> str:
-    """What was typed in within the night, and at which time of day."""
+    """Settings changed within the night, and the time of day."""
     gain = gain_unit(new.gain_unit, new.pv_unit, new.op_unit)
     parts = [
         f"{name} {arrow(a, b)} {unit}"

@@ -1,1 +1,1 @@
-"""Which law gives OP from SP and PV."""
+"""Identification of the control law that gives OP from SP and PV."""

@@ -1,4 +1,4 @@
-"""Does the stated controller give OP from SP and PV: settings, clock, gap and logic, judged before any physics."""
+"""Check of the stated controller against OP, SP and PV: settings, clock, gap and logic, before any physics."""
 
 from __future__ import annotations
 
@@ -25,26 +25,26 @@ from identification.simulation.pi import due_moves, gapped
 
 @dataclass(frozen=True, slots=True)
 class StatedSettings:
-    """What the plant says of the controller: kp [% OP/% PV], ti [samples], and scans per sample of the recording."""
+    """The controller stated by the plant: kp [% OP/% PV], ti [samples], and scans per sample of the recording."""
 
     kp: float
     ti: float
     scans: float = 1.0
 
     def thinned(self, limits: ControllerLimits) -> bool:
-        """Whether OP answered values of PV that the recording does not hold."""
+        """Whether OP responded to values of PV that were not recorded."""
         return self.scans >= limits.thinned
 
 
 GAPS = (0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4, 0.55, 0.75, 1.0, 1.35, 1.8, 2.5, 3.5, 5.0)
-"""Gaps tried, in medians of the error's size."""
+"""Candidate gaps, in medians of the error's size."""
 LATE_SAMPLES = "late_samples"
-"""Name of the number by which a finding says how late PV's clock is [samples]."""
+"""Name of the number for the lateness of PV's clock in a finding [samples]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What was found about recorder or controller: its numbers, where it is (bool, shape (n,)), the effect's name."""
+    """A finding about recorder or controller: its numbers, its samples (bool, shape (n,)), the effect's name."""
 
     values: Mapping[str, float]
     where: Mask = field(repr=False)
@@ -58,7 +58,7 @@ def op_step(op: Floats) -> float:
 
 
 def frozen_width(x: Trends, e: Floats, said: StatedSettings) -> float:
-    """Largest error [% PV] under which due moves of OP do not happen while those beyond do; 0 without one."""
+    """Largest error [% PV] below which due moves of OP are missing and above which they occur; 0 without one."""
     due = np.abs(due_moves(e, said.kp, said.ti)) > max(op_step(x.op), 1e-6)
     still = np.diff(x.op, prepend=x.op[0]) == 0
     size = np.maximum(np.abs(e), np.abs(np.concatenate((e[:1], e[:-1]))))
@@ -75,7 +75,7 @@ def frozen_width(x: Trends, e: Floats, said: StatedSettings) -> float:
 
 
 def gap(x: Trends, e: Floats, said: StatedSettings) -> Finding | None:
-    """OP standing still while the error is small: a law with a gap gives OP where the one without does not."""
+    """Constant OP while the error is small: a law with a gap reproduces OP where the one without does not."""
     length = span_length(x.op.size, said.ti, x.limits)
     n = (x.op.size // length) * length
     y = centred(x.op[:n], length)
@@ -103,7 +103,7 @@ def runs(still: Mask) -> list[tuple[int, int]]:
 
 
 def asked(x: Trends) -> Mask:
-    """True where a move of SP or a limit of OP stands in for the law, and a sample about it, shape (n,)."""
+    """True where a move of SP or a limit of OP overrides the law, and at adjacent samples, shape (n,)."""
     least = x.limits.at_limit
     here = (
         (np.abs(np.diff(x.sp, prepend=x.sp[0])) > x.limits.asked) | (x.op <= least) | (x.op >= 100.0 - least)
@@ -112,7 +112,7 @@ def asked(x: Trends) -> Mask:
 
 
 def lawless(x: Trends, found: ControlLaw) -> Mask:
-    """True in spans of good samples where OP is far from the law that the others obey, shape (n,)."""
+    """True in spans of good samples where OP deviates far from the law of the other spans, shape (n,)."""
     n, length = found.residual.size, found.length
     size = np.sqrt((found.residual.reshape(-1, length) ** 2).mean(axis=1))
     whole = x.usable[:n].reshape(-1, length).all(axis=1)
@@ -122,7 +122,7 @@ def lawless(x: Trends, found: ControlLaw) -> Mask:
 
 
 def ruled(x: Trends, e: Floats, said: StatedSettings, found: ControlLaw) -> Finding | None:
-    """Spans in which something other than the law moves OP, or keeps it."""
+    """Spans in which something other than the law moves or holds OP."""
     off = lawless(x, found)
     if float(off.mean()) > x.limits.lawless_share and found.explained > 0.0:
         return Finding({"share": float(off.mean())}, off, "controller-logic")
@@ -130,7 +130,7 @@ def ruled(x: Trends, e: Floats, said: StatedSettings, found: ControlLaw) -> Find
 
 
 def logic(x: Trends, e: Floats, said: StatedSettings) -> Finding | None:
-    """Stretches in which OP stands although the law asks it to go, whatever the error."""
+    """Stretches in which OP is constant although the law requires moves, whatever the error."""
     path, limits = np.cumsum(due_moves(e, said.kp, said.ti)), x.limits
     least = limits.stuck_move * max(op_step(x.op), 0.02)
     where = np.zeros(x.op.size, dtype=bool)
@@ -147,8 +147,8 @@ def typical(residual: Floats, length: int) -> float:
 
 
 def obeys(x: Trends, said: StatedSettings, found: ControlLaw) -> bool:
-    """Whether the stated law gives OP nearly as well as the one found, in most spans and in those that move it; on a
-    thinned recording, whether it gives most of OP."""
+    """Whether the stated law reproduces OP nearly as well as the identified one, overall and in the median span; on a
+    thinned recording, whether it reproduces most of OP."""
     n, length, limits = found.residual.size, found.length, x.limits
     e, y = found.error(x.sp, x.pv)[:n], centred(x.op[:n], length)
     left = y - said.kp * (centred(e, length) + centred(np.cumsum(e), length) / said.ti)
@@ -163,7 +163,7 @@ def obeys(x: Trends, said: StatedSettings, found: ControlLaw) -> bool:
 
 
 def settings(found: ControlLaw, said: StatedSettings, limits: ControllerLimits) -> Finding | None:
-    """Settings that reproduce OP where the stated ones do not."""
+    """Identified settings that reproduce OP where the stated ones do not."""
     if found.explained < limits.law_explains or found.ki == 0 or found.kp / found.ki <= 0:
         return None
     ti = integral_time(found.kp, found.ki, found.residual.size)
@@ -176,9 +176,9 @@ def settings(found: ControlLaw, said: StatedSettings, limits: ControllerLimits) 
 
 
 def judge(x: Trends, said: StatedSettings) -> tuple[Finding | None, ControlLaw | None]:
-    """The first thing that is wrong with clock or controller, and the law as found.
+    """The first finding about clock or controller, and the identified law.
 
-    said : of a thinned recording nothing but settings plainly wrong is said: the law is not seen at work;
+    said : on a thinned recording only clearly wrong settings are reported, because the law is not visible in detail;
     nothing at all where its integral acts between the samples.
     """
     limits, thinned = x.limits, said.thinned(x.limits)

@@ -1,5 +1,5 @@
-"""A stated law beside the one that the record shows: which of its settings are others, with all allowed that no list
-states."""
+"""Comparison of a stated control law with that of the record: which settings differ. All unlisted properties of the
+law are free."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ from identification.record import Floats, LoopRecord
 
 @dataclass(frozen=True, slots=True)
 class LawsCompared:
-    """A law found beside a stated one, over the increments that tell most against the stated: the shares of OP's
-    variance that each explains there [-], and whether the stated one is that of the record."""
+    """An identified and a stated law, compared on the increments with the strongest evidence against the stated one:
+    the share of OP's variance explained by each [-], and whether the stated law agrees with the record."""
 
     found: Pid
     explained: float
@@ -41,12 +41,12 @@ class LawsCompared:
 
     @property
     def left(self) -> float:
-        """What the stated law leaves over what the found one does [-]."""
+        """Ratio of the residual of the stated law to that of the identified law [-]."""
         return (1.0 - self.explained_stated) / max(1.0 - self.explained, 1e-9)
 
 
 def _ways(x: Look, stated: Pid) -> Iterator[Seen]:
-    """All ways, the stated shape's first, then those of what no list states."""
+    """All variants of the law, first with the stated error shape, then with unlisted properties."""
     own, gains = shape_of(stated), gains_of(stated)
     yield from usual_ways(x, own, stated)
     if stated.scan_s < x.record.dt_s:
@@ -59,10 +59,10 @@ def _ways(x: Look, stated: Pid) -> Iterator[Seen]:
 
 
 def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompared | None:
-    """A stated law, and the one that the record shows, which differs in as few settings as explain OP.
+    """Compare a stated law with that of the record, which differs in as few settings as explain OP.
 
-    period_s : period, or other time scale on which the loop moves [s]. None where the record tells none; the
-    stated law, with what the record shows beside, where that does.
+    period_s : period, or other time scale on which the loop moves [s]. None where the record does not show a law; the
+    stated law, completed by what the record shows, where it agrees.
     """
     gains, x = gains_of(stated), look(record, period_s, stated)
     best, given = None, None
@@ -84,7 +84,7 @@ def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompar
 
 
 def _way_needed(seen: Seen, before: Seen | None, stated: Pid) -> Way:
-    """The way in which the stated law gives OP; with the stated shape where that does about as well."""
+    """The variant in which the stated law reproduces OP; with the stated error shape if that is about as good."""
     own, gains = shape_of(stated), gains_of(stated)
     if seen.way.shape == own or before is None:
         return seen.way
@@ -93,10 +93,10 @@ def _way_needed(seen: Seen, before: Seen | None, stated: Pid) -> Way:
 
 
 def scheduled_over(record: LoopRecord, period_s: float, stated: Pid) -> str | None:
-    """The signal, 'op', 'pv' or 'sp', in a part of whose range the stated law gives OP; None where in none: a gain
-    that is scheduled over it has the stated value there alone.
+    """The signal, 'op', 'pv' or 'sp', in a part of whose range the stated law reproduces OP; None if there is no such
+    part. A gain scheduled over the signal has the stated value only there.
 
-    A part counts where the integral is seen in it, on increments of half an integral time.
+    A part counts if the integral is visible in it, on increments of half an integral time.
     """
     gains, whole = gains_of(stated), look(record, period_s, stated)
     for name in ("op", "pv", "sp"):
@@ -113,10 +113,10 @@ def scheduled_over(record: LoopRecord, period_s: float, stated: Pid) -> str | No
 
 
 def best_of(record: LoopRecord, period_s: float, laws: Sequence[Pid]) -> Pid:
-    """The one of some laws with a derivative that gives OP plainly best, the first where none does.
+    """The law, of several with a derivative, that reproduces OP clearly best; the first if none does.
 
-    Laws that agree with a record on a law's usual uncertainty are told apart here by what they leave of an OP whose
-    every scan is recorded.
+    Laws that agree with a record within the usual uncertainty are distinguished here by their residual of an OP with
+    every scan recorded.
     """
     poor = np.full(len(laws), np.inf)
     for seen in usual_ways(look(record, period_s, laws[0]), STRAIGHT, *laws, smoothing=False):
@@ -127,13 +127,13 @@ def best_of(record: LoopRecord, period_s: float, laws: Sequence[Pid]) -> Pid:
 
 
 def _settled(best: Seen, given: Seen, gains: Floats) -> bool:
-    """Whether another law gives all of OP and the stated one far from it, so that no further way changes that."""
+    """Whether another law reproduces OP fully and the stated one is far off, so that more variants are useless."""
     left = best.left_over_all(best.free)
     return left < LAW.small and given.left_over_all(gains) > max(10.0 * left, LAW.gives)
 
 
 def _most_apart(best: Seen, given: Seen, gains: Floats, pid: Pid, law: Floats) -> LawsCompared | None:
-    """The law found beside the stated one, over the increments that tell them apart."""
+    """The identified law and the stated one, over the increments that distinguish them most."""
     stated = {k: explained(m, gains) + blurred(m, gains) for k, m in given.moves.items()}
     laws = [
         LawsCompared(pid, explained(m, law), stated[k])
@@ -144,7 +144,7 @@ def _most_apart(best: Seen, given: Seen, gains: Floats, pid: Pid, law: Floats) -
 
 
 def _settings(gains: Floats, record_s: float, stated: Pid) -> Pid | None:
-    """The settings that gains make; None where no controller has them."""
+    """The controller settings for given gains; None if no controller has them."""
     kp, ki, kd = (float(g) for g in gains)
     if kp == 0:
         return replace(stated, kp=0.0, ti_s=1.0 / ki, td_s=0.0) if ki else None
@@ -156,7 +156,7 @@ def _settings(gains: Floats, record_s: float, stated: Pid) -> Pid | None:
 
 
 def _simplest(seen: Seen, gains: Floats, record_s: float, stated: Pid) -> tuple[Pid, Floats] | None:
-    """The law with the fewest settings that are not the stated ones, and its gains."""
+    """The law that differs from the stated one in the fewest settings, and its gains."""
     p, i, d = np.eye(3)
     none = np.zeros(3)
     whole = gains / gains[0] if gains[0] else i
@@ -168,7 +168,7 @@ def _simplest(seen: Seen, gains: Floats, record_s: float, stated: Pid) -> tuple[
         (np.stack((p + whole * d, i)), none),  # kp and ti
         (np.eye(3), none),
     ]
-    enough = LAW.as_well * seen.left_over_all(seen.free) + 1e-6  # of an exact law rounding alone is left
+    enough = LAW.as_well * seen.left_over_all(seen.free) + 1e-6  # an exact law has only a rounding residual
     for along, held in trials:
         law = best_gains(seen.moves.values(), seen.weight, along, held)
         pid = _settings(law, record_s, stated)

@@ -1,8 +1,8 @@
-"""The ways in which a controller may see error and slope, beside its settings: products of a recording's increments.
+"""Variants of a controller's error and slope, with any settings, as products of a recording's increments.
 
-Of what no list states (a filter of PV, one of the slope, what gain and derivative take of the set point's moves,
-one sample between PV's stamp and OP's, a gap, a squared error) every law takes what suits it best, a stated one too.
-Where OP stands at an end of its own, or moves as fast as it ever does time and again, no law is seen.
+Properties that no list states (a filter of PV, one of the slope, set point weights of gain and derivative, one sample
+between PV's stamp and OP's, a gap, a squared error) are chosen best for every law, also for a stated one. Where OP is
+at its own limit, or repeatedly moves at its highest rate, no law is visible.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ from identification.simulation.lag import first_order
 from identification.simulation.pi import Law, acting_error
 
 ON_ERROR = ((1.0, 1.0), (1.0, 0.0), (0.0, 0.0))
-"""What gain and derivative take of the set point's moves: the usual three [-]."""
+"""Set point weights of gain and derivative: the usual three [-]."""
 LATE = ((0, 0), (1, 0), (1, 1))
-"""By how many samples OP's stamps may be later than those of PV and of SP."""
+"""Candidate delays of OP's stamps relative to those of PV and of SP [samples]."""
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 Shape = tuple[float, float, bool]
 """Gap [% PV], gain inside it [-], and whether the error is squared."""
@@ -42,8 +42,8 @@ STRAIGHT: Shape = (0.0, 0.0, False)
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """What a law has beside its gains: the shape of the error, a filter of PV [samples], and what the gain takes of
-    the set point's moves [-], None where that is not known."""
+    """Properties of a law other than its gains: the error shape, a filter of PV [samples], and the set point weight
+    of the gain [-], None if unknown."""
 
     shape: Shape = STRAIGHT
     pv_filter: float = 0.0
@@ -52,8 +52,8 @@ class Way:
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """A record as one way of the law's sees it: products of increments by their length in samples, what each weighs,
-    the freest law, and what beside gains the way has."""
+    """A record under one variant of the law: products of increments by their length in samples, the weight of each
+    length, the least-squares law, and the variant."""
 
     moves: dict[int, Floats]
     weight: Floats
@@ -61,25 +61,25 @@ class Seen:
     way: Way
 
     def is_law(self, gains: Floats) -> bool:
-        """Whether the freest law may be a controller's beside stated gains: without the set point's moves, one of the
-        other sign is how PV answers OP."""
+        """Whether the least-squares law can be that of a controller with the stated gains: without set point moves, a
+        law of the opposite sign is the response of PV to OP."""
         return self.way.sp_weight == 1.0 or bool(self.free[0] * gains[0] >= 0.0)
 
     def left(self, gains: Floats) -> Floats:
-        """Share of OP's variance that gains leave at each length of increments [-]."""
+        """Residual share of OP's variance under given gains at each length of increments [-]."""
         return np.array([1.0 - explained(m, gains) for m in self.moves.values()])
 
     def left_over_all(self, gains: Floats) -> float:
-        """The same, of all of them by their weights [-]."""
+        """The same, averaged over all lengths by their weights [-]."""
         moved = self.weight * np.array([m[3, 3] for m in self.moves.values()])
         return float(moved @ self.left(gains) / moved.sum())
 
     def poorness(self, gains: Floats) -> float:
-        """How poorly gains give OP: mean logarithm of what they leave, alike in all ways of the law."""
+        """Misfit of given gains: mean logarithm of the residual, comparable between all variants of the law."""
         return float(np.mean(np.log(LAW.small + self.left(gains))))
 
     def does(self, gains: Floats) -> bool:
-        """Whether gains give OP about as well as any, and that well."""
+        """Whether the gains reproduce OP about as well as any, and well enough."""
         left, least = self.left(gains), self.left(self.free)
         unsure = np.array([blurred(m, gains) for m in self.moves.values()])
         return bool((left - unsure <= LAW.enough * least + LAW.small).all() and least.min() < LAW.gives)
@@ -91,8 +91,8 @@ def gains_of(c: Pid) -> Floats:
 
 
 def fastest(op: Floats) -> Mask:
-    """True where OP moves as fast as it ever does, and does so far oftener than a little slower, shape (n,): a limit
-    of its rate. The samples beside are with it, for a limit may act between two of them."""
+    """True where OP moves at its highest rate, if that occurs far more often than slightly lower rates, shape (n,): a
+    rate limit. Adjacent samples are included, because a limit may act between two of them."""
     size = np.abs(np.diff(op, prepend=op[0]))
     top = float(size.max())
     at = size >= LAW.at_rate * top
@@ -103,12 +103,12 @@ def fastest(op: Floats) -> Mask:
 
 
 def _spread(x: Mask) -> Mask:
-    """The samples and those beside them."""
+    """The samples and the adjacent ones."""
     return np.convolve(x, np.ones(3), mode="same") > 0
 
 
 def no_law(record: LoopRecord, stated: Pid) -> Mask:
-    """True where OP is not seen to follow a law: out of use, at a limit of its own, a stated one or of its rate."""
+    """True where OP does not follow a law visibly: out of use, at its own limit, a stated one or a rate limit."""
     ends = (record.op <= stated.op_lo) | (record.op >= stated.op_hi)
     limited = clamped(record.op) | ends
     between = stated.scan_s < record.dt_s
@@ -124,7 +124,7 @@ def _acting(error: Floats, law: Law) -> Floats:
 
 
 def shaped(error: Floats, shape: Shape) -> Floats:
-    """What of an error [% PV], shape (n,), a law acts on."""
+    """The part of an error [% PV], shape (n,), on which a law acts."""
     gap, inside, squared = shape
     return (
         error
@@ -147,14 +147,14 @@ def with_shape(c: Pid, shape: Shape) -> Pid:
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """A recording ready to be looked at: where it follows no law, and lengths of increments [samples]."""
+    """A recording prepared for comparison: samples without a law, and lengths of increments [samples]."""
 
     record: LoopRecord
     out: Mask
     lengths: tuple[int, ...]
 
     def seen(self, rows: Floats, way: Way) -> Seen | None:
-        """One way of it; None where no length tells a law."""
+        """The recording under one variant; None where no length shows a law."""
         every = len(self.record) // LAW.most_increments
         of = {k: increments(rows, self.out, k, max(k // 8, every, 1), True) for k in self.lengths}
         found = {k: m for k, m in of.items() if m is not None}
@@ -162,19 +162,17 @@ class Look:
         if not weight.any():
             return None
         free = best_gains(found.values(), weight, np.eye(3), np.zeros(3))
-        if (
-            free[2] * free[0] < 0.0
-        ):  # no controller has such a derivative: it mends a filter that is not the true one
+        if free[2] * free[0] < 0.0:  # no controller has such a derivative: it compensates for a wrong filter
             free = best_gains(found.values(), weight, np.eye(3)[:2], np.zeros(3))
         return Seen(found, weight, free, way)
 
     def plainly(self, shape: Shape) -> Seen | None:
-        """The plainest way, of an error of that shape."""
+        """The simplest variant with an error of that shape."""
         return self.seen(rows_of(self.record, shaped(self.record.error, shape)), Way(shape))
 
 
 def look(record: LoopRecord, scale_s: float, stated: Pid) -> Look:
-    """A recording of a loop that moves on a time scale [s]."""
+    """Prepare the recording of a loop that moves on a time scale [s]."""
     n, ti = len(record), stated.ti_s if stated.ki else 0.0
     reach = min(n / 20, max(LAW.reach * max(ti, scale_s) / record.dt_s, LAW.least_reach))
     lengths = tuple(LAW.longer**k for k in range(12) if LAW.longer**k <= reach)
@@ -182,14 +180,13 @@ def look(record: LoopRecord, scale_s: float, stated: Pid) -> Look:
 
 
 def slope_filters(dt_s: float, laws: Iterable[Pid]) -> tuple[float, ...]:
-    """Time constants of the slope's filter [samples]: usual parts of the laws' derivative times, then others."""
+    """Time constants of the slope's filter [samples]: usual fractions of the laws' derivative times, then others."""
     parts = {n * dt_s / c.td_s for c in laws if c.td_s > 0 for n in LAW.filter_parts}
     return (*(float(1.0 / np.log1p(part)) for part in sorted(parts)), *LAW.slope_filters)
 
 
 def usual_ways(x: Look, shape: Shape, *laws: Pid, smoothing: bool = True) -> Iterator[Seen]:
-    """The usual ways of laws on an error of that shape, the plainest first; smoothing : behind
-    filters of PV, too."""
+    """The usual variants of laws on an error of that shape, simplest first; smoothing : also with filters of PV."""
     record, narrow = x.record, slope_filters(x.record.dt_s, laws)
     moves = float(np.ptp(record.sp)) > 0 and not record.sp_estimated
     stated = sorted({c.pv_filter_s / record.dt_s for c in laws} - {0.0})
@@ -203,15 +200,15 @@ def usual_ways(x: Look, shape: Shape, *laws: Pid, smoothing: bool = True) -> Ite
 
 
 def delayed(x: Floats, samples: int) -> Floats:
-    """A signal so many samples later, shape (n,)."""
+    """A signal delayed by `samples`, shape (n,)."""
     return np.concatenate((np.repeat(x[:1], samples), x[: x.size - samples]))
 
 
 def _slopes(
     record: LoopRecord, sp: Floats, pv: Floats, narrow: Iterable[float], moves: bool, shape: Shape
 ) -> Iterator[tuple[Floats, float | None]]:
-    """Rows of every slope filter and every weight of the set point, and that weight; None with the rows in which what
-    goes with the set point's moves is left out."""
+    """Rows for every slope filter and set point weight, and that weight; None for the rows with the effect of set
+    point moves removed."""
     for (on_gain, on_slope), filtered in product(ON_ERROR if moves else ON_ERROR[:1], narrow):
         slope = np.diff(on_slope * sp - pv, prepend=on_slope * sp[0] - pv[0]) / record.dt_s
         rows = rows_of(record, shaped(sp - pv, shape), first_order(slope, filtered))
@@ -223,8 +220,8 @@ def _slopes(
 
 
 def rough_ways(x: Look, shape: Shape) -> Iterator[Seen]:
-    """Ways in which what PV does from sample to sample goes for nothing: between the samples a derivative, or a
-    filter, saw another PV."""
+    """Variants that ignore changes of PV from sample to sample: a derivative, or a filter, used other PV values
+    between the samples."""
     record, pv = x.record, x.record.pv
     beside = 0.5 * (np.concatenate((pv[:1], pv[:-1])) + np.concatenate((pv[1:], pv[-1:])))
     slope = np.gradient(-beside, record.dt_s)
@@ -238,8 +235,8 @@ def rough_ways(x: Look, shape: Shape) -> Iterator[Seen]:
 
 
 def bent_shapes(x: Look, gains: Floats) -> Iterator[Shape]:
-    """Shapes of the error, beside a straight one, that suit the record best: a squared one, and a gap as it suits the
-    freest law, and these gains."""
+    """Nonlinear error shapes that fit the record best: a squared one, and the best gaps for the least-squares law and
+    for these gains."""
     yield 0.0, 0.0, True
     size = float(np.median(np.abs(x.record.error[~x.out]))) if not x.out.all() else 0.0
     if size <= 0.0:
@@ -251,7 +248,7 @@ def bent_shapes(x: Look, gains: Floats) -> Iterator[Shape]:
 
 
 def _best_gap(x: Look, size: float, inside: float, gains: Floats | None) -> float:
-    """The gap with which gains, or the freest law, give OP best [% PV]; 0 where none does better than no gap."""
+    """The gap with which the given gains, or the least-squares law, reproduce OP best [% PV]; 0 if none is better."""
 
     def poor(width: float) -> float:
         seen = x.plainly((width, inside, False) if width > 0.0 else STRAIGHT)
@@ -269,8 +266,8 @@ def _best_gap(x: Look, size: float, inside: float, gains: Floats | None) -> floa
 
 
 def recognized(x: Look, stated: Pid, way: Way) -> Pid:
-    """A stated controller with what the record shows beside: what the way has in which it obeys the stated gains, and
-    limits of OP and of its rate at which it is seen."""
+    """A stated controller completed by what the record shows: the properties of the variant that agrees with the
+    stated gains, and the visible limits of OP and of its rate."""
     record, c = x.record, with_shape(stated, way.shape)
     if way.pv_filter >= LAW.seen_filter and not stated.pv_filter_s:
         c = replace(c, pv_filter_s=_best_filter(x, way, stated) * record.dt_s)
@@ -284,8 +281,8 @@ def recognized(x: Look, stated: Pid, way: Way) -> Pid:
 
 
 def _best_filter(x: Look, way: Way, stated: Pid) -> float:
-    """The filter of PV near that of a way with which the stated gains give OP best [samples]; the way's own beside a
-    derivative, which has a filter too."""
+    """The filter of PV, near that of a variant, with which the stated gains reproduce OP best [samples]; the
+    variant's own if there is a derivative, which also has a filter."""
     if stated.td_s:
         return way.pv_filter
 

@@ -1,7 +1,7 @@
-"""The PI law that gives OP from SP and PV, by levels over spans of an integral time.
+"""The PI law from SP and PV to OP, by regression of levels over spans of an integral time.
 
-Each span has a constant of its own; kp and Ti come without the bias that increments of rounded trends bring
-(pid_regression.py), and with PV's lateness and the filter before the controller.
+Each span has a constant of its own; kp and Ti avoid the bias that increments of rounded trends cause
+(pid_regression.py), and include PV's lateness and the filter before the controller.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from identification.simulation.lag import first_order
 
 @dataclass(frozen=True, slots=True)
 class ControlLaw:
-    """A PI law as found: kp [% OP/% PV], ki [% OP/(% PV sample)], the PV's lateness in samples, the residual of OP
+    """An identified PI law: kp [% OP/% PV], ki [% OP/(% PV sample)], the PV's lateness in samples, the residual of OP
     (scatter, in % OP, and per sample, shape (n,), less each span's constant), the share that the law explains, and
-    the time constant of the filter that PV passes before the controller [samples]."""
+    the time constant of the filter of PV before the controller [samples]."""
 
     kp: float
     ki: float
@@ -39,7 +39,7 @@ class ControlLaw:
 
 @dataclass(frozen=True, slots=True)
 class Trends:
-    """What a control law is sought in.
+    """Data for the identification of a control law.
 
     sp, pv, op : shape (n,) [% of span]; usable : bool, shape (n,), False in gaps, in manual and at OP's limits.
     """
@@ -52,7 +52,7 @@ class Trends:
 
 
 def shifted(x: Floats, late: float) -> Floats:
-    """The signal `late` samples earlier, shape (n,), by straight lines between samples."""
+    """The signal `late` samples earlier, shape (n,), by linear interpolation."""
     k = np.arange(x.size)
     return np.interp(k + late, k, x)
 
@@ -82,11 +82,10 @@ def trusted(residual: Floats, length: int, limits: ControllerLimits) -> Mask:
 
 
 def law(x: Trends, length: int, late: float, smoothed: float = 0.0) -> ControlLaw:
-    """The PI law at a given lateness of PV and a filter's time constant [samples], spans that do not obey it left
-    out twice.
+    """The PI law at a given lateness of PV and filter time constant [samples]; spans that deviate are excluded twice.
 
-    Spans count that are usable throughout, all samples where too few are: a limit or a hole within a span leaves the
-    integral another constant behind it than before.
+    Only fully usable spans count, or all samples if these are too few: a limit or a gap within a span changes the
+    constant of the integral.
     """
     e = x.sp - first_order(shifted(x.pv, late), smoothed)
     n = (e.size // length) * length
@@ -104,16 +103,16 @@ def law(x: Trends, length: int, late: float, smoothed: float = 0.0) -> ControlLa
 
 
 def span_length(n: int, ti_samples: float, limits: ControllerLimits) -> int:
-    """Samples in a span of the regression: an integral time, but at least so many spans in the record."""
+    """Samples in a span of the regression: an integral time, limited by the least number of spans in the record."""
     return int(np.clip(ti_samples, limits.span_samples, max(n // limits.spans, limits.span_samples)))
 
 
 def recovered_law(x: Trends, ti_samples: float, stated_kp: float = 1.0, late: bool = True) -> ControlLaw:
     """The PI law, with PV's lateness searched in whole samples and then between them.
 
-    Under an oscillation a law of the wrong sign, half a period late, gives OP as well; only laws whose gain has the
-    stated one's sign are looked for. late : whether PV's clock may be late at all. A filter before the controller
-    makes OP late too, so lateness is searched beside filters as well, up to what it is without one.
+    Under an oscillation a law of the wrong sign, half a period late, reproduces OP as well; only laws with the stated
+    sign of gain are searched. late : whether PV's clock may be late at all. A filter before the controller also
+    delays OP, so lateness is searched together with filters, up to its value without a filter.
     """
     at = partial(law, x, span_length(x.op.size, ti_samples, x.limits))
 
@@ -135,9 +134,9 @@ def recovered_law(x: Trends, ti_samples: float, stated_kp: float = 1.0, late: bo
 
 
 def unstated_law(x: Trends) -> ControlLaw | None:
-    """The PI law of a controller of which nothing is stated; None where none gives OP.
+    """The PI law of a controller without stated settings; None where no law reproduces OP.
 
-    The spans of the regression are as long as the integral time, so that is found in two steps.
+    The spans of the regression have the length of the integral time, so it is identified in two steps.
     """
     best = None
     for guess in LAW.guesses:
@@ -154,7 +153,7 @@ def unstated_law(x: Trends) -> ControlLaw | None:
 
 
 def fed_back(op: Floats, pv: Floats) -> float:
-    """Share [-] of what OP's own past leaves of its moves that PV's value and its last moves tell, 0 to 1.
+    """Share [-] of OP's moves, unexplained by OP's own past, that PV's value and its last moves explain, 0 to 1.
 
     Both of shape (n,). 0 for a record of fewer samples than twenty times the constants.
     """
@@ -170,7 +169,7 @@ def fed_back(op: Floats, pv: Floats) -> float:
 
 
 def _left(y: Floats, columns: list[Floats]) -> float:
-    """Sum of squares that a regression leaves."""
+    """Residual sum of squares of a regression."""
     x = np.stack(columns, axis=1)
     x = x / np.maximum(np.abs(x).max(axis=0), 1e-12)
     r = y - x @ np.linalg.lstsq(x, y, rcond=1e-10)[0]

@@ -1,9 +1,9 @@
-"""One regression of a controller's law on increments: OP's moves over many lengths of time beside those of the error,
-of its integral and of its slope.
+"""Regression of a controller's law on increments: OP's moves over many lengths of time against those of the error, of
+its integral and of its slope.
 
-Increments cancel drifts of a bias, and what spans a limit, a hole or time in manual is left out. Short ones show the
-proportional and the derivative action, long ones the integral; rounding spoils both, so each length counts by what
-the law explains there.
+Increments cancel slow bias drifts; those that span a limit, a gap or time in manual are left out. Short ones show the
+proportional and the derivative action, long ones the integral; rounding affects both, so the weight of each length is
+what the law explains there.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from identification.record import Floats, LoopRecord, Mask
 
 @dataclass(frozen=True, slots=True)
 class ControllerFit:
-    """PI settings found from a record: kp [% OP / % PV], ti_s [s] (inf where no integral action is seen), and the
-    share of the variance of OP's increments that they give [-]."""
+    """PI settings identified from a record: kp [% OP / % PV], ti_s [s] (inf where no integral action is visible), and
+    the share of the variance of OP's increments that they explain [-]."""
 
     kp: float
     ti_s: float
@@ -29,25 +29,25 @@ class ControllerFit:
 
 
 def integral_time(kp: float, ki: float, record_s: float) -> float:
-    """Integral time [s] of a law, inf where its integral does next to nothing in a record of so many seconds."""
+    """Integral time [s] of a law, inf where its integral is negligible in a record of so many seconds."""
     ti = kp / ki if ki != 0 and kp / ki > 0 else math.inf
     return ti if ti < LAW.longest_integral * record_s else math.inf
 
 
 def explained(products: Floats, gains: Floats) -> float:
-    """Share of OP's variance, in products of increments, that gains of error, integral and slope give, shape (3,)."""
+    """Share of OP's variance, in products of increments, explained by gains of error, integral, slope, shape (3,)."""
     law = np.append(-gains, 1.0)
     return 1.0 - float(law @ products[:4, :4] @ law) / float(products[3, 3])
 
 
 def blurred(products: Floats, gains: Floats) -> float:
-    """Share of OP's variance that the true law would leave for its integral being unsure, for the controller scans
-    between the samples [-]."""
+    """Share of OP's variance left by the true law because of the uncertain integral, as the controller scans between
+    samples [-]."""
     return float(gains[1] ** 2 * products[4, 4] / products[3, 3])
 
 
 def _level_by_turns(moved: Floats, inside: Mask, length: int) -> Floats:
-    """The mean of each row over each turn of so many columns, shape of `moved`; those outside are zero."""
+    """The mean of each row over each block of `length` columns, shape of `moved`; only those inside count."""
     starts = np.arange(0, max(inside.size - length // 2, 1), max(length, 1))
     counts = np.maximum(np.add.reduceat(inside.astype(float), starts), 1.0)
     means = np.add.reduceat(moved, starts, axis=1) / counts
@@ -57,10 +57,10 @@ def _level_by_turns(moved: Floats, inside: Mask, length: int) -> Floats:
 def increments(
     rows: Floats, out_of_law: Mask, samples: int, step: int = 1, level: bool = False
 ) -> Floats | None:
-    """Mean products, shape (5, 5), of increments over so many samples, begun every `step`, of the rows, shape (5, n),
-    that span none that is out of the law, less what goes with those of further rows, where there are any; `level`:
-    less their means over LAW.level_of of them in turn, for an error of SP's or PV's record that stays, as rounding
-    leaves it, makes the integral run away."""
+    """Mean products, shape (5, 5), of increments over `samples`, begun every `step`, of the rows, shape (5, n),
+    without those that span samples outside the law and without the part explained by further rows; `level`: less
+    their means over blocks of LAW.level_of of them, because a constant rounding error of SP or PV makes the integral
+    drift."""
     since = np.cumsum(out_of_law)
     inside = (since[samples::step] == since[:-samples:step]) & ~out_of_law[:-samples:step]
     count = int(np.count_nonzero(inside))
@@ -77,15 +77,15 @@ def increments(
 
 
 def _without(moved: Floats, feed: Floats) -> Floats:
-    """Increments without their part along those of what is fed forward (Frisch and Waugh 1933): its gain, whatever it
-    is, then changes nothing."""
+    """Increments without their part along the feedforward signal (Frisch and Waugh 1933): its gain then has no
+    effect."""
     size = float(feed @ feed)
     return moved - np.outer(moved @ feed, feed) / size if size > 0 else moved
 
 
 def rows_of(record: LoopRecord, error: Floats, slope: Floats | None = None) -> Floats:
-    """Error, integral [% s], slope [% / s], OP, and what the integral of every second sample lacks, shape (5, n);
-    what is fed forward as a sixth row, where there is some."""
+    """Error, integral [% s], slope [% / s], OP, and the error of an integral of every second sample, shape (5, n); a
+    feedforward signal, if any, as a sixth row."""
     none = np.zeros(error.size) if slope is None else slope
     coarser = np.repeat(error[::2], 2)[: error.size]
     whole, lacking = np.cumsum(error) * record.dt_s, np.cumsum(error - coarser) * record.dt_s
@@ -94,8 +94,8 @@ def rows_of(record: LoopRecord, error: Floats, slope: Floats | None = None) -> F
 
 
 def clamped(op: Floats) -> Mask:
-    """True where OP rests at an end of its own that it keeps to, shape (n,): one at which it stands far oftener than
-    at the next value, which no wave does."""
+    """True where OP is at an end of its own range, shape (n,), if it is there far more often than at the adjacent
+    value, unlike any oscillation."""
     levels, counts = np.unique(op, return_counts=True)
     ends = [
         levels[end]
@@ -106,7 +106,7 @@ def clamped(op: Floats) -> Mask:
 
 
 def out_of_law(record: LoopRecord) -> Mask:
-    """True where a sample is of no use or OP is at an end of its range, shape (n,)."""
+    """True where a sample is not usable or OP is at an end of its range, shape (n,)."""
     return ~record.usable | record.mask("saturated")
 
 
@@ -125,7 +125,7 @@ def fit_pi(record: LoopRecord, period_s: float) -> ControllerFit | None:
 
 
 def best_gains(of: Iterable[Floats], weight: Floats, free: Floats, held: Floats) -> Floats:
-    """Gains, shape (3,), that are `held` plus what suits best along the rows of `free`, shape (k, 3)."""
+    """Gains, shape (3,): `held` plus the best combination of the rows of `free`, shape (k, 3)."""
     total = np.einsum("i,ijk->jk", weight, np.stack([m[:4, :4] for m in of]))
     gram, asked = free @ total[:3, :3] @ free.T, free @ (total[:3, 3] - total[:3, :3] @ held)
     scale = np.sqrt(np.maximum(np.diag(gram), 0.0)) + 1e-150
@@ -134,7 +134,7 @@ def best_gains(of: Iterable[Floats], weight: Floats, free: Floats, held: Floats)
 
 
 def weights_of(of: Iterable[Floats]) -> Floats:
-    """Weight of each length of increments: by what its own best law explains of it."""
+    """Weight of each length of increments: the share that its own best law explains."""
     own = [explained(m, best_gains([m], np.ones(1), np.eye(3), np.zeros(3))) for m in of]
     share = np.clip(own, 0.0, 1.0)
     moved = np.array([m[3, 3] for m in of])

@@ -1,4 +1,4 @@
-"""Does OP switch between two values, as an on/off or a pulsed controller's does: then no PID law moves it."""
+"""Detection of an OP that switches between two values, by an on/off or pulsed controller; no PID law applies then."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from identification.record import Floats, Mask
 
 @dataclass(frozen=True, slots=True)
 class Switching:
-    """The two values between which OP switches [% OP], and how often it does."""
+    """The two values between which OP switches [% OP], and the number of switches."""
 
     low: float
     high: float
@@ -20,10 +20,10 @@ class Switching:
 
 
 def switching(op: Floats, use: Mask) -> Switching | None:
-    """OP's two values, where it has no others of note; None where it has, or hardly ever switches.
+    """The two values of OP, if it has no other significant values; None if it has, or if it hardly ever switches.
 
-    op : shape (n,) [% OP]; use : bool, shape (n,), False where a sample must not be used. Samples caught between the
-    two count as of neither.
+    op : shape (n,) [% OP]; use : bool, shape (n,), False where a sample must not be used. Samples between the two
+    values count for neither.
     """
     seen = op[use]
     if seen.size == 0 or float(np.ptp(seen)) < LAW.switched_pct:

@@ -1,1 +1,1 @@
-"""How process, valve and noise are estimated from OP and PV."""
+"""Estimation of process, valve and noise from OP and PV."""

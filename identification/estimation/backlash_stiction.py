@@ -1,5 +1,5 @@
-"""The best lag behind an ideal valve, behind a play, and behind stick-slip: scanned, then followed to the end;
-and how well plays of every width explain PV, which is kept so that several records can be added up."""
+"""The best first-order process behind an ideal valve, behind backlash and behind stick-slip: a scan, then a descent.
+A profile of likelihood over backlash widths is kept, so that the profiles of several records can be added."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ from identification.simulation.valve import HALTS, IDEAL, RESTS, SLIDES, StemLaw
 
 
 def fit_linear(window: Window, period_s: float) -> Fit:
-    """The process behind an ideal valve.
+    """Fit the process behind an ideal valve.
 
-    period_s : period of the oscillation, or other scale of the loop [s], about which the search begins.
+    period_s : period of the oscillation, or another time scale of the loop [s], about which the search begins.
     """
     noises, begins = (learnt_noise(window), generic_noise()), starts(window, period_s)
     fits = [descend(_ranked(window, ar, [IDEAL], begins, 3)[0]) for ar in noises]
@@ -46,7 +46,7 @@ def fit_linear(window: Window, period_s: float) -> Fit:
 def _ranked(
     window: Window, ar: Floats, valves: list[StemLaw], begins: list[Dynamics], halvings: int = 2
 ) -> list[Fit]:
-    """Starts for the descent: valves with dynamics searched anew under one noise model, best first."""
+    """Starts for the descent: each valve with its best dynamics under one noise model, best first."""
     trials, pv = [], white_pv(window, ar)
     for valve in valves:
         (t, dead), sigma2, count, beta = search(behind(pv, valve), begins, halvings)
@@ -56,24 +56,24 @@ def _ranked(
 
 
 def _chosen(near: Fit, valves: list[StemLaw], period_s: float, followed: int) -> list[Fit]:
-    """The best few of valves tried under two noise models."""
+    """The best few of the given valves under each of two noise models."""
     begins = [(near.time_constant_s, near.dead_time_s), *starts(near.window, period_s)]
     noises = generic_noise(), near.ar
     return [fit for ar in noises for fit in _ranked(near.window, ar, valves, begins)[:followed]]
 
 
 def _likeliest(fits: list[Fit]) -> Fit:
-    """The likeliest of what fits come to, each followed to its end."""
+    """Descend from each fit, and return the result with the highest likelihood."""
     ends = (descend(fit, free_width=True) for fit in fits)
     return max(ends, key=lambda fit: fit.log_likelihood)
 
 
 def fit_play(linear: Fit, period_s: float, hopeful: float | None = None) -> Fit:
-    """The best play followed by a lag: a screening, and the whole search where it finds anything.
+    """The best backlash followed by a lag: a screening, then the full search if the screening finds anything.
 
-    linear : the best fit behind an ideal valve; period_s : scale of the search [s]; hopeful : gain in log likelihood
-    [nat] of a quick screening from which the whole search follows; None: the screening is thorough, FIT.screened
-    enough.
+    linear : the best fit behind an ideal valve; period_s : time scale of the search [s]; hopeful : gain in log
+    likelihood [nat] of a quick screening above which the full search follows; None: the screening is thorough and the
+    limit is FIT.screened.
     """
     window = linear.window
     reach = window.reach
@@ -91,21 +91,22 @@ def fit_play(linear: Fit, period_s: float, hopeful: float | None = None) -> Fit:
 
 
 def better_linear(linear: Fit, play: Fit) -> Fit:
-    """The better of the plain fit and one followed from the dynamics that were found behind a play.
+    """The better of the linear fit and a linear fit that starts from the dynamics found behind backlash.
 
-    The plain process is the play of no width; found from there it is never unfairly behind. Where the two are as
-    likely, the one that was searched on its own stays.
+    An ideal valve is backlash of width zero, so this start makes the comparison fair. If both are equally likely, the
+    linear fit from its own search is returned.
     """
     trial = descend(replace(play, valve=IDEAL))
     return trial if trial.log_likelihood > linear.log_likelihood + FIT.clear else linear
 
 
 def fit_stick_slip(play: Fit, period_s: float) -> Fit:
-    """The best stick-slip (J > 0) followed by a lag, scanned whole and finely about the play.
+    """The best stick-slip (J > 0) followed by a lag: a coarse scan of the whole range and a fine scan near the
+    backlash.
 
-    play : the best play: its width is near the stickband, for OP tells both by its travel between slips, or up to
-    half as wide again, where the stem jumps by most of it: narrower bands have finalists of their own; period_s :
-    scale of the search [s].
+    play : the best backlash, near the stickband in width, because both set the travel of OP between slips. It is up
+    to half as wide again where the slip jump is most of the stickband; narrower bands have their own finalists.
+    period_s : time scale of the search [s].
     """
     short = play.window.y.size < FIT.short
     begun = _chosen(play, _coarse(play), period_s, FIT.followed_short if short else FIT.followed)
@@ -115,8 +116,8 @@ def fit_stick_slip(play: Fit, period_s: float) -> Fit:
 
 
 def refined(fit: Fit) -> Fit:
-    """The likeliest stick-slip about one that was found: pits of stickband and jump are about 1 % wide, so that a
-    scan about the play, whose time constant and dead time are others, lands beside the deepest."""
+    """The most likely stick-slip near a given one. Minima in stickband and slip jump are about 1 % wide, so a scan
+    that uses time constant and dead time of the backlash fit misses the deepest one."""
     for _ in range(FIT.refined_most):
         share = fit.valve.slip_jump / max(fit.valve.stickband, 1e-9)
         first, end, step = FIT.near_jumps
@@ -130,13 +131,13 @@ def refined(fit: Fit) -> Fit:
 
 
 def _grid(widths: tuple[float, ...], jumps: tuple[float, ...]) -> Floats:
-    """Stickbands in widths of a valve's and slip jumps as a share of them, shape (m, 2), of two ranges, each first,
-    end (not tried) and step."""
+    """Stickbands as multiples of a valve's width and slip jumps as shares of the stickband, shape (m, 2), from two
+    ranges, each given as start, end (exclusive) and step."""
     return np.array(list(product(np.arange(*widths), np.arange(*jumps))))
 
 
 def _coarse(play: Fit) -> list[StemLaw]:
-    """Stickbands up to OP's range, with stems that rest and stems that slide."""
+    """Stickbands up to the range of OP, with stems that rest and stems that slide."""
     reach = play.window.reach
     near = play.valve.stickband / reach
     widths = {round(s, 4) for s in FIT.middle + FIT.large} | {near, 1.1 * near}
@@ -151,12 +152,12 @@ def _coarse(play: Fit) -> list[StemLaw]:
 def pits(
     play: Fit, tolerances: tuple[float, ...], grid: Floats | None = None, later: tuple[float, ...] = FIT.later
 ) -> list[Fit]:
-    """The likeliest stick-slips about a play, or another stick-slip, of the best few of each behaviour at the bottom
-    of their pits.
+    """The most likely stick-slips near a backlash or another stick-slip: local minima of the best few of each
+    behaviour.
 
-    A slip more or less changes the stem until the next one, so likelihood has many narrow pits in S and J. grid :
-    shape (m, 2), stickbands in widths of the play and slip jumps as a share of them; later : dead times beyond the
-    play's [blocks].
+    One slip more or less changes the stem until the next slip, so the likelihood has many narrow optima in S and J.
+    grid : shape (m, 2), stickbands as multiples of the backlash width and slip jumps as shares of the stickband;
+    later : dead times added to that of the backlash fit [blocks].
     """
     window = play.window
     pairs = np.array([play.valve.stickband, 1.0]) * (
@@ -174,7 +175,7 @@ def pits(
 
 
 def _bottom(fit: Fit) -> Fit:
-    """Stickband and jump at the bottom of their pit, the rest following at the end."""
+    """Move stickband and slip jump to their local minimum, then descend in the other constants."""
     dynamics = fit.time_constant_s, fit.dead_time_s
     valve = settled(white_pv(fit.window, fit.ar), fit.valve, fit.sigma2, dynamics)
     return descend(replace(fit, valve=valve))
@@ -182,9 +183,9 @@ def _bottom(fit: Fit) -> Fit:
 
 @njit(cache=True)
 def _scan(pv: WhitePv, pairs: Floats, tolerance: float, time_constant_s: float, deads_s: Floats) -> Floats:
-    """Innovations variance of many stick-slips at once, of the best of some dead times [% PV squared], shape (m,).
+    """Innovations variance of many stick-slips at once, at the best of some dead times [% PV squared], shape (m,).
 
-    pairs : shape (m, 2), stickband [% OP] and slip jump as a share of it; tolerance : how the stems behave in motion
+    pairs : shape (m, 2), stickband [% OP] and slip jump as a share of it; tolerance : behaviour of the moving stem
     (valve.py).
     """
     n, level = pv.rows.shape[1], level_of(pv.ar)
@@ -206,10 +207,9 @@ def _scan(pv: WhitePv, pairs: Floats, tolerance: float, time_constant_s: float, 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
 def _later(whole: Floats, lag: Lag, rows: Floats, decay: Floats, out: Floats) -> tuple[Products, float]:
-    """The response at one dead time into `out`, from that without any, its products, and that with the decay, summed
-    in any order.
-
-    The stem is taken to rest at first."""
+    """Write the response at one dead time into `out`, from the one without; return its products and that with the
+    decay, summed in any order. The stem is assumed to be at rest at the start.
+    """
     n, delay = out.size, lag.delay
     out[: min(delay, n)] = 0.0
     if delay >= n:
@@ -229,17 +229,17 @@ def _later(whole: Floats, lag: Lag, rows: Floats, decay: Floats, out: Floats) ->
 
 
 WIDTHS = np.geomspace(0.1, 60.0, 29)
-"""Widths of a play that records are asked of [% OP], a quarter apart: from the least dead band of a positioner
-to that of a valve which has come loose."""
+"""Backlash widths of the likelihood profile [% OP], each a quarter wider than the last: from the smallest dead band
+of a positioner to a valve whose linkage is loose."""
 
 
 def width_profile(linear: Fit, play: Fit) -> Floats:
-    """Log likelihood of plays of all WIDTHS over that of an ideal valve [nat], shape of WIDTHS.
+    """Log likelihood of backlash at each of WIDTHS over that of an ideal valve [nat], shape of WIDTHS.
 
-    Each width has the process that suits it best, under the better of two noise models: that of the fit behind
-    a play, and one that knows nothing.
+    Each width has its best process, under the better of two noise models: that of the backlash fit and the generic
+    one.
 
-    linear, play : the fits to one window, behind an ideal valve and behind the play that fits best.
+    linear, play : the fits to one window behind an ideal valve and behind the best backlash.
     """
     window = linear.window
     blocks = replace(window, position=None)
@@ -267,7 +267,7 @@ def _dynamics(fit: Fit) -> Dynamics:
 
 
 def _swept(pv: WhitePv, widths: Floats, play: Fit) -> Floats:
-    """Innovations variance behind plays of rising widths, from that of the best one outwards either way."""
+    """Innovations variance behind backlash of increasing widths, computed from the best width outwards both ways."""
     out = np.empty(widths.size)
     first = int(np.argmin(np.abs(np.log(widths / max(play.valve.stickband, 1e-3)))))
     for way in (range(first, widths.size), range(first - 1, -1, -1)):

@@ -1,9 +1,9 @@
-"""Is the valve worn though another thing makes the cycle? Play, told by what is left beside the cycle's line.
+"""Valve backlash in a loop whose cycle has an external cause, identified from the signal outside the cycle's band.
 
-A load with a line drives PV and, through the controller, OP at one frequency. There OP follows the load, so neither
-process nor valve can be identified from it. A narrow band about that frequency is removed from PV and from the stem
-behind each valve; a process and a notch commute. A stem with play keeps its harmonics and its other motion, which
-differ from those of an ideal valve.
+A load with a spectral line drives PV and, through the controller, OP at one frequency. At that frequency OP follows
+the load, so neither process nor valve can be identified from it. A narrow band about the frequency is removed from PV
+and from the stem behind each valve; a process and a notch commute. A stem with backlash keeps its harmonics and its
+other motion, which differ from those of an ideal valve.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from identification.simulation.lag import respond, unit_lag
 from identification.simulation.valve import IDEAL, StemLaw, sticking
 
 SHARES = np.geomspace(0.05, 0.95, 20)
-"""Widths tried first, as shares of OP's range in a cycle."""
+"""Backlash widths of the first scan, as shares of the range of OP in a cycle."""
 NEAR = (0.9, 1.0, 1.1)
-"""And about the best of them."""
+"""Factors of the second scan about the best width."""
 FOLLOWED, ROUNDS = 4, 3
-"""Widths that are followed, and turns of process and noise model for each."""
+"""Number of widths that are refined, and alternations of process and noise model for each."""
 
 
 @dataclass(frozen=True, slots=True)
 class BesideLine:
-    """The play that explains best what is left beside a line: its fit, the gain in log likelihood over an ideal valve
-    [nat], no innovation counting for more than outliers do, and how the half-cycles agree on it."""
+    """The backlash that best explains the signal outside the line: its fit, the gain in log likelihood over an ideal
+    valve [nat] with outliers limited, and the agreement of the half-cycles."""
 
     play: Fit
     evidence: float
@@ -44,7 +44,7 @@ class BesideLine:
 
 @dataclass(frozen=True, slots=True)
 class _Explained:
-    """A valve with process and noise model: innovations, and where they count."""
+    """A valve with process and noise model: innovations and the mask of those that count."""
 
     valve: StemLaw
     dynamics: Dynamics
@@ -56,7 +56,7 @@ class _Explained:
 
 
 def beside_line(linear: Fit, play: Fit, period_s: float) -> BesideLine:
-    """Play beside a line of a period [s]. linear, play : fits of the whole record, from which the search begins."""
+    """Backlash outside a line of a period [s]. linear, play : fits of the whole record, used as starts."""
     window = linear.window
     begins = [(f.time_constant_s, max(f.dead_time_s, 0.0)) for f in (linear, play)]
     begins += starts(window, period_s)
@@ -78,13 +78,13 @@ def beside_line(linear: Fit, play: Fit, period_s: float) -> BesideLine:
 
 
 def _begun(window: Window, valve: StemLaw, period: float, begins: list[Dynamics]) -> _Explained:
-    """The best process behind a valve under a noise model that knows nothing."""
+    """The best process behind a valve under the generic noise model."""
     prepared = prepare(window, valve, generic_noise(), period)
     return _explained(prepared, valve, *search(prepared, begins, 3))
 
 
 def _settled(window: Window, x: _Explained, period: float) -> _Explained:
-    """Process and noise model found in turns from a start."""
+    """Fit process and noise model alternately from a start."""
     stem = notch(stem_of(window.stems_in_blocks, x.valve), period, FIT.notch_width)
     y = notch(window.centred, period, FIT.notch_width)
     counts = judged(window.usable, FIT.ar_order)
@@ -99,7 +99,7 @@ def _settled(window: Window, x: _Explained, period: float) -> _Explained:
 
 
 def _simulated(stem: Floats, dynamics: Dynamics, beta: Floats, dt_s: float) -> Floats:
-    """Response, mean, trend and decay, shape of the stem."""
+    """Simulated PV: response, mean, trend and decay, shape of the stem."""
     n = stem.size
     slow = beta[1] + beta[2] * (2.0 * np.arange(n) / n - 1.0)
     decay = beta[3] * np.exp(-dt_s / dynamics[0] * np.arange(n))

@@ -1,9 +1,9 @@
-"""What the controller did between two rows of a record: OP at its own scan.
+"""OP at the controller's scan interval, between the rows of a record.
 
-A stem behind play follows OP's extremes, and a historian keeps one row in ten of them. Between two rows OP follows
-the control law on PV. PV follows a model of the loop: its valve and process on that OP, a load whose level and slope
-are predicted from the rows before, and noise of the measured size. Each row sets OP and PV right again. No row is
-used before its time: OP would answer PV before PV moves, and no dead time could be identified.
+A stem behind backlash follows the extremes of OP, but a historian may keep one row in ten. Between two rows OP
+follows the control law on PV. PV follows a model of the loop: valve and process driven by that OP, a load whose level
+and slope are predicted from earlier rows, and noise of the measured size. Each row corrects OP and PV. No row is used
+before its time; otherwise OP would react to PV before PV moves, and no dead time could be identified.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from identification.simulation.pi import Law, next_op, per_scan
 from identification.simulation.valve import StemLaw, first_slip, stem_step
 
 Gains = tuple[float, float]
-"""Shares of a surprise that the load's level and its slope a row take [-]."""
+"""Shares of a prediction error that are added to the load's level and to its slope per row [-]."""
 _LEVEL = [0.05 + 0.1 * k for k in range(10)]
 _GAINS = [(a, b) for a in _LEVEL for b in (0.0, 2.0 * (2.0 - a) - 4.0 * math.sqrt(1.0 - a))]
-"""Those of the steady Kalman filter of a load that walks at random, or whose slope does (Kalata 1984), under white
-noise, of which the ones that predict the next row best are taken."""
+"""Candidate gains: steady-state Kalman filters of a load that is a random walk, or whose slope is one (Kalata 1984),
+under white noise. The gains with the best prediction of the next row are used."""
 ROUNDS = 3
-"""Turns of OP and model: ours, of ten worn valves of shared plants sizes move by less than .03 from the third on."""
+"""Alternations of OP and model: ours; in ten worn valves of shared plants sizes change by < .03 after the third."""
 PATHS = 6
-"""Paths of OP whose stems are averaged: the noise that is not known must not stand for the one that was."""
+"""Paths of OP whose stems are averaged, so that one random draw of the unknown noise does not decide."""
 SEED = 11
-"""Of the noise that is drawn: the same record gets the same answer."""
+"""Seed of the drawn noise: the same record gives the same answer."""
 
 
 class Rows(NamedTuple):
@@ -46,7 +46,7 @@ class Rows(NamedTuple):
 
 
 class Scans(NamedTuple):
-    """What a controller did within the rows of a window: those rows, its law, and its scans in each."""
+    """What between-row simulation needs: the rows of a window, the control law, and the scans per row."""
 
     rows: Rows
     law: Pid
@@ -54,7 +54,7 @@ class Scans(NamedTuple):
 
 
 class LoopAtScan(NamedTuple):
-    """A loop stepped at its controller's scan: the law, the valve, the process of unit gain and its gain."""
+    """A loop simulated at its controller's scan: control law, valve, process of unit gain, and its gain."""
 
     law: Law
     valve: StemLaw
@@ -63,14 +63,14 @@ class LoopAtScan(NamedTuple):
 
 
 def scans_per_row(law: Pid | None, row_s: float) -> int:
-    """Scans of a controller in one row of a record, 1 where it is not known or no faster than the record."""
+    """Controller scans per row of a record; 1 if unknown or if the scan is not faster than the record."""
     if law is None or not law.scan_s > 0.0:
         return 1
     return max(round(row_s / law.scan_s), 1)
 
 
 def settled(fit: Fit, scans: Scans) -> Fit:
-    """A fit with the OP that its own model makes within the rows, each found anew from the other; the likeliest."""
+    """Fit the model and the OP between rows alternately; return the most likely fit."""
     best = None
     for _ in range(ROUNDS):
         fit = descend(with_scans(fit, scans), free_width=fit.valve.stickband > 0.0)
@@ -79,16 +79,16 @@ def settled(fit: Fit, scans: Scans) -> Fit:
 
 
 def with_scans(fit: Fit, scans: Scans, count: int = PATHS) -> Fit:
-    """A fit whose window has so many paths of OP at the controller's scan, as its model makes it."""
+    """A fit whose window has `count` paths of OP at the controller's scan, simulated by its model."""
     window, paths = fit.window, op_at_scans(fit, scans, count)
     turn = window.turn // window.steps * scans.per_row
     return replace(fit, window=replace(window, op=paths[0], paths=paths, steps=scans.per_row, turn=turn))
 
 
 def op_at_scans(fit: Fit, scans: Scans, paths: int = PATHS) -> Floats:
-    """An even number of paths of OP at every scan [% OP], shape (paths, n * scans), each as likely as the next: the
-    recorded OP at each row, within rows what the law makes of PV with noise of its own. Noise is drawn from a fixed
-    seed, each with its opposite.
+    """An even number of equally probable paths of OP at every scan [% OP], shape (paths, n * scans): the recorded OP
+    at each row and, between rows, the control law on simulated PV with its own noise. The noise has a fixed seed;
+    each draw is used with both signs.
     """
     rows, count = scans.rows, scans.per_row
     step_s, process = fit.window.row_s / count, fit.process
@@ -104,7 +104,7 @@ def op_at_scans(fit: Fit, scans: Scans, paths: int = PATHS) -> Floats:
 
 
 def without_noise(x: Floats) -> Floats:
-    """A load [% PV], shape (n,), less its white noise: the mean of what is predicted best from both ends."""
+    """A load [% PV], shape (n,), without its white noise: the mean of the forward and the backward prediction."""
     left = [(float(np.mean(_tracked(x, g)[1] ** 2)), g) for g in _GAINS]
     gains = min(left)[1]
     return 0.5 * (_tracked(x, gains)[0] + _tracked(x[::-1].copy(), gains)[0][::-1])
@@ -112,7 +112,7 @@ def without_noise(x: Floats) -> Floats:
 
 @njit(cache=True)
 def _tracked(x: Floats, gains: Gains) -> tuple[Floats, Floats]:
-    """Level by the values up to each one, and the surprise of each, both of shape (n,)."""
+    """Level estimated from the values up to each sample, and the prediction errors, both of shape (n,)."""
     out, surprise = np.empty_like(x), np.empty_like(x)
     level, slope = x[0], 0.0
     for k in range(x.size):
@@ -123,7 +123,7 @@ def _tracked(x: Floats, gains: Gains) -> tuple[Floats, Floats]:
 
 
 def _predictor(rows: Rows, loop: LoopAtScan, scans: int) -> tuple[Gains, float]:
-    """The gains that predict the next row best, and the standard deviation of PV's noise [% PV]."""
+    """The gains with the best prediction of the next row, and the standard deviation of PV's noise [% PV]."""
     none = np.zeros((rows.pv.size, scans))
     left, gains = min((float(np.mean(_stepped(rows, loop, g, none)[1] ** 2)), g) for g in _GAINS)
     return gains, math.sqrt((1.0 - gains[0]) * left)
@@ -131,7 +131,7 @@ def _predictor(rows: Rows, loop: LoopAtScan, scans: int) -> tuple[Gains, float]:
 
 @njit(cache=True)
 def _stepped(rows: Rows, loop: LoopAtScan, gains: Gains, noise: Floats) -> tuple[Floats, Floats]:
-    """One path of OP, shape of noise, (n, scans), and the surprise of each row [% PV], shape (n,)."""
+    """One path of OP, shape of noise, (n, scans), and the prediction error of each row [% PV], shape (n,)."""
     n, scans = noise.shape
     out, surprise, stems = np.empty_like(noise), np.empty(n), np.empty(n * scans)
     rest = first_slip(rows.op, loop.valve)

@@ -1,8 +1,8 @@
-"""How every fit goes down, what it is worth, and how well its constants are known: Gauss-Newton steps, a compass
-search, evidence in nats, and the covariance from curvature and scatter of the scores.
+"""Optimization and uncertainty of every fit: Gauss-Newton steps, a compass search, likelihood gains in nats, and the
+covariance from curvature and scatter of the scores.
 
-Each search is written once and does not know what it searches: it is given a context and functions of it. Numba
-compiles it into the night's kernels; `explain` calls it as it stands.
+Each search is written once, independent of the model: it takes a context and functions of that context. Numba
+compiles it for the fast kernels of the batch run; `explain` calls it uncompiled.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from identification.record import Floats
 
 Point = TypeVar("Point")
 FIRST_DAMPING, LEAST_DAMPING, HEAVIEST = 1e-3, 1e-7, 5e4
-"""Damping of a first step, in a constant's own curvature, the least of any, and that from which none rises [-]."""
+"""Damping of the first step relative to the curvature, the smallest, and the largest that may rise [-]."""
 
 
 @register_jitable  # type: ignore[untyped-decorator]
 def nats(count: int, worse: float, better: float) -> float:
-    """Gain in log likelihood [nat] of Gaussian innovations whose mean square falls, in so many samples."""
+    """Gain in log likelihood [nat] of `count` Gaussian innovations as their mean square falls."""
     return 0.5 * count * math.log(max(worse, 1e-300) / max(better, 1e-300))
 
 
 class Descent(NamedTuple):
-    """How a descent goes and when it ends.
+    """Settings of a descent.
 
-    steps, trials : how many it may take, and may try; judged : samples that its loss is the mean square of; settled :
-    gain of a step [nat] below which it ends; raised, lowered : times that damping rises after a step that wins
-    nothing, and falls after one that does; failures : how often it may rise in a row.
+    steps, trials : largest number of steps taken and tried; judged : samples in the mean square of the loss; settled
+    : gain of a step [nat] below which the descent ends; raised, lowered : factors of damping after a step without and
+    with a gain; failures : largest number of consecutive increases of damping.
     """
 
     steps: int
@@ -48,7 +48,7 @@ class Descent(NamedTuple):
 
 @register_jitable  # type: ignore[untyped-decorator]
 def damped_step(gram: Floats, slope: Floats, damping: float) -> Floats:
-    """A damped Gauss-Newton step, shape (m,), in scaled constants; none where a number has run away."""
+    """A damped Gauss-Newton step, shape (m,), in scaled constants; zero if a number is not finite."""
     scale = np.diag(gram) + 1e-12 * np.trace(gram) + 1e-300
     level = (gram + np.diag(damping * scale)) / np.sqrt(np.outer(scale, scale)) + 1e-12 * np.eye(scale.size)
     if not (np.isfinite(level).all() and np.isfinite(slope).all()):
@@ -64,10 +64,10 @@ def down(
     stepped: Callable[[Any, Point, Floats], Point],
     rule: Descent,
 ) -> Point:
-    """Damped Gauss-Newton steps from a point to the least of its `loss`.
+    """Damped Gauss-Newton steps from a point to the minimum of its `loss`.
 
-    curved : whether it is worth going on from a point after so many steps, the Gauss-Newton matrix and the slope
-    there; stepped : the point behind a step, with an infinite loss where that leaves what is searched.
+    curved : whether to continue from a point after the given number of steps, the Gauss-Newton matrix and the
+    gradient there; stepped : the point after a step, with infinite loss outside the bounds.
     """
     damping, taken, tried, failed = FIRST_DAMPING, 0, 0, 0
     going, gram, slope = curved(context, best, taken)
@@ -104,11 +104,11 @@ def compass(
     worth: float = 0.0,
     most: int = 1_000_000,
 ) -> tuple[Point, float]:
-    """The least that moves of ever smaller steps come to: every move that wins is taken at once.
+    """Minimum found by moves of decreasing step size; each move that reduces the value is accepted at once.
 
-    least : what the first point has; tried : a point moved by a step, and what that has, inf where it is none;
-    share, worth : what a move must win, as a share of the least so far and outright; most : moves after which no
-    other round is begun.
+    least : value at the first point; tried : a point after a move and its value, inf where there is none; share,
+    worth : least reduction of an accepted move, relative to the minimum so far and absolute; most : number of moves
+    after which no new round begins.
     """
     taken = 0
     for step in steps:
@@ -129,13 +129,13 @@ NINETY = 1.645
 def scattered(inside: Floats, scores: Floats, sigma2: float) -> Floats:
     """Covariance of parameters, shape (m, m).
 
-    The inverse Gauss-Newton matrix times the innovations variance (Ljung 1999, eq. 9.31). Where the scores of whole
-    stretches scatter by more than that (Huber 1967: the model is not the truth, and what it lacks lasts longer than a
-    sample), the standard deviations are those of the scatter.
+    The inverse Gauss-Newton matrix times the innovations variance (Ljung 1999, eq. 9.31). Where the sums of scores
+    over longer stretches scatter more (Huber 1967: the model is not exact and its error lasts longer than a sample),
+    the standard deviations are those of the scatter.
 
-    inside : shape (m, m), inverse of the Gauss-Newton matrix, what was fitted beside the parameters eliminated;
-    scores : shape (n, m), derivative of half the squared innovation by each parameter, sample by sample; sigma2 :
-    variance of the innovations.
+    inside : shape (m, m), inverse of the Gauss-Newton matrix with the other fitted parameters eliminated; scores :
+    shape (n, m), derivative of half the squared innovation by each parameter at each sample; sigma2 : innovations
+    variance.
     """
     moves = np.array([part.sum(axis=0) for part in np.array_split(scores, INTERVALS.stretches)]) @ inside
     usual = sigma2 * np.diag(inside)
@@ -144,17 +144,17 @@ def scattered(inside: Floats, scores: Floats, sigma2: float) -> Floats:
 
 
 def inverse(gram: Floats) -> Floats:
-    """Inverse of a Gauss-Newton matrix, shape (m, m), directions that the data do not know left out."""
+    """Inverse of a Gauss-Newton matrix, shape (m, m), without directions that the data do not determine."""
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     unit = np.linalg.pinv(gram / np.outer(scale, scale), rcond=1e-10)
     return np.asarray(unit / np.outer(scale, scale))
 
 
 def half_width(deviation: float, least: float = 0.0) -> float:
-    """Half width of a 90 % interval, in the unit of the standard deviation, and not under what no model knows."""
+    """Half width of a 90 % interval, in the unit of the standard deviation, at least `least` (model error)."""
     return max(NINETY * INTERVALS.wider * deviation, least)
 
 
 def reaching(e: Estimate, *ends: float) -> Estimate:
-    """An estimate whose interval holds some values too."""
+    """An estimate whose interval is widened to include the given values."""
     return Estimate(e.value, min((e.low, *ends)), max((e.high, *ends)), e.unit)

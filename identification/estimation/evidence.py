@@ -1,4 +1,4 @@
-"""How much better one model explains PV than another, no single event deciding."""
+"""Likelihood gain of one model over another, limited so that no single event decides."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from identification.signals.turns import turns_of
 
 
 def evidence(ours: Fit, theirs: Fit) -> float:
-    """Gain in log likelihood [nat] of one fit over another, no innovation counting for more than outliers do."""
+    """Gain in log likelihood [nat] of one fit over another, with the innovations of outliers limited."""
     return float(clipped_gain(innovations(ours), innovations(theirs)).sum())
 
 
 def moves_begun(fit: Fit) -> np.ndarray:
-    """Blocks at which the stem of a valve sets out or turns, shape (m,)."""
+    """Blocks at which the stem of a valve starts to move or reverses, shape (m,)."""
     moved = np.sign(np.diff(stem_of(fit.window.stems_in_blocks, fit.valve)))
     set_out = np.concatenate(([0.0], moved))
     return np.flatnonzero((set_out[1:] != set_out[:-1]) & (set_out[1:] != 0))
 
 
 def stem_moves(fit: Fit) -> int:
-    """How often the stem of a valve sets out or turns: stretches of motion in one direction with rest between."""
+    """Number of times that the stem of a valve starts to move or reverses."""
     return int(moves_begun(fit).size)
 
 
 def with_load_step(fit: Fit, answering: Mask, noise: Floats) -> Fit:
-    """The plain process with one step of the load where its largest innovation is, if that is worth its penalty.
+    """The linear fit with one step of the load at its largest innovation, if the gain exceeds its penalty.
 
-    A single slip of a stem and a single step of the load look alike; only the slip that also explains why the
-    stem stood still before is evidence of the valve. Where PV is due to answer a set point move (`answering`,
-    bool, shape (n,)) its step is no load: a load does not wait for the operator. `noise` is the noise model of
-    the candidate, shape (p,), a second start: one fitted across the step is nearly an integrator.
+    A single slip of a stem and a single step of the load are indistinguishable; only a slip that also explains why
+    the stem did not move before is evidence of a valve fault. Where PV is due to respond to a set point move
+    (`answering`, bool, shape (n,)) a step is not attributed to the load. `noise` is the noise model of the candidate,
+    shape (p,), and a second start: a noise model fitted across the step is nearly an integrator.
     """
     counts = judged(fit.window.usable, fit.ar.size)
     white = np.where(answering[counts], 0.0, np.abs(innovations(fit)))
@@ -54,9 +54,9 @@ def with_load_step(fit: Fit, answering: Mask, noise: Floats) -> Fit:
 
 @dataclass(frozen=True, slots=True)
 class Trials:
-    """How trials agree that one model is better than another.
+    """Agreement of trials that one model is better than another.
 
-    count; agreeing, share of them in which it is [-]; steadiness, mean gain over its standard error [-].
+    count; agreeing : share of trials in which it is better [-]; steadiness : mean gain over its standard error [-].
     """
 
     count: int
@@ -65,14 +65,14 @@ class Trials:
 
 
 def gains(ours: Fit, theirs: Fit) -> Floats:
-    """Gain in log likelihood of one fit over another at every block [nat], shape (n,), outliers cut."""
+    """Gain in log likelihood of one fit over another at every block [nat], shape (n,), outliers limited."""
     out = np.zeros(ours.window.y.size)
     out[judged(ours.window.usable, ours.ar.size)] = clipped_gain(innovations(ours), innovations(theirs))
     return out
 
 
 def trials(ours: Fit, theirs: Fit, period_s: float) -> Trials | None:
-    """Agreement of the stretches between OP's turns that one fit explains PV better; None with fewer than four."""
+    """Agreement of the stretches between OP reversals that one fit explains PV better; None with fewer than four."""
     window = ours.window
     at = turns_of(window.op_blocks, period_s / window.dt_s)
     if at.size < 5:
@@ -81,14 +81,14 @@ def trials(ours: Fit, theirs: Fit, period_s: float) -> Trials | None:
 
 
 def agreement_of(gained: Floats) -> Trials:
-    """How stretches agree that one model is better, by its gain in each [nat], shape (t,), t > 1."""
+    """Agreement of stretches that one model is better, from its gain in each [nat], shape (t,), t > 1."""
     spread = float(gained.std(ddof=1)) / math.sqrt(gained.size)
     return Trials(gained.size, float((gained > 0).mean()), float(gained.mean()) / max(spread, 1e-9))
 
 
 def trials_between_moves(ours: Fit, theirs: Fit) -> Trials | None:
-    """The same of the stretches that the moves of our valve's stem part, for a loop without cycles; None without a
-    move. A ramp of the load while OP runs against it looks once like a stem that rests, and not again."""
+    """Agreement of the stretches between stem moves of our fit, for a loop without cycles; None without a move. A
+    load ramp opposed by OP resembles a resting stem once, but not repeatedly."""
     at = moves_begun(ours)
     at = at[at > 0]
     return agreement_of(np.add.reduceat(gains(ours, theirs), np.append(0, at))) if at.size else None

@@ -1,8 +1,8 @@
-"""All constants of a lag behind a valve at once to the least innovations variance: the night's fast descent.
+"""Joint descent in all constants of a lag behind a valve to the smallest innovations variance, for the batch run.
 
-Constants stand in one vector theta: log T, dead time [s], stickband [% OP], gain, coefficients of 1, t, decay and the
-load's step, and the noise model of single lags. It is the residual of `explain`'s plain loop behind a valve
-(prediction_error.py), its noise model fitted beside the rest; tests hold the two to one optimum.
+One vector theta holds the constants: log T, dead time [s], stickband [% OP], gain, coefficients of 1, t, decay and
+the load's step, and the noise model of single lags. The residual is that of `explain`'s baseline model behind a valve
+(prediction_error.py), with the noise model fitted jointly; tests check that both have the same optimum.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from identification.simulation.lag import respond, respond_together, unit_lag
 from identification.simulation.valve import StemLaw, sticking
 
 NARROWEST = FIT.narrowest
-"""Stickband after a step, in terms of that before, that is tried no more, as kernels take it."""
+"""Smallest ratio of a stickband after a step to that before, in the kernels' type."""
 BASE = 8
-"""Constants before the noise model."""
+"""Number of constants before the noise model."""
 STEP_T = 1.01
-"""Factor of the time constant over which its derivative is taken."""
+"""Factor of the time constant for its numeric derivative."""
 STEP_DEAD = 0.05
-"""Share of a block over which the dead time's derivative is taken."""
+"""Share of a block for the numeric derivative of the dead time."""
 
 
 class _Bench(NamedTuple):
-    """What all points of a descent share: PV less its mean, the stems known beforehand, the load's step, the samples
-    judged, whether the stickband is free, the interval of blocks, samples of a stem in a block, and the ranges of log
-    time constant and dead time."""
+    """Data shared by all points of a descent: PV less its mean, stems known beforehand, the load's step, the samples
+    judged, whether the stickband is free, the interval of blocks, stem samples per block, and the ranges of log time
+    constant and dead time."""
 
     y: Floats
     stems: Stems
@@ -63,13 +63,13 @@ class _Point(NamedTuple):
 
 @njit(cache=True)
 def _dead(b: _Bench, theta: Floats) -> float:
-    """The dead time from the stem's own samples on [s]: a block's mean stands later than its first sample."""
+    """Dead time counted from the stem's own samples [s]: the mean of a block is later than its first sample."""
     return theta[1] + 0.5 * (b.factor - 1) * b.dt_s / b.factor  # type: ignore[no-any-return]
 
 
 @njit(cache=True)
 def _decays(b: _Bench, theta: Floats) -> tuple[float, float]:
-    """What a decay starts from and its factor a block; none where the time constant outlasts half the window."""
+    """Start value of a decay and its factor per block; no decay if the time constant exceeds half the window."""
     t_s = math.exp(theta[0])
     return 0.0 if t_s > 0.5 * b.y.size * b.dt_s else 1.0, math.exp(-b.dt_s / t_s)
 
@@ -90,7 +90,7 @@ def _point(b: _Bench, theta: Floats, valve: StemLaw) -> _Point:
 
 @njit(cache=True)
 def _widened(valve: StemLaw, step: float) -> StemLaw:
-    """The valve with a stickband wider by a step, its jump share kept."""
+    """The valve with its stickband widened by a step and its jump share unchanged."""
     stickband = valve.breakaway + valve.sliding
     share = (valve.breakaway - valve.sliding) / stickband if stickband > 0 else 0.0
     return sticking(stickband + step, share, valve.tolerance)  # type: ignore[no-any-return]
@@ -114,8 +114,8 @@ def _responses(b: _Bench, p: _Point) -> Floats:
 
 @njit(cache=True)
 def _of_slow_terms(b: _Bench, theta: Floats, out: Floats) -> None:
-    """Derivatives by the coefficients of 1, t and decay into `out`, shape (3, m): their innovations have closed forms
-    from the order of the noise model on."""
+    """Write derivatives by the coefficients of 1, t and decay into `out`, shape (3, m). Their innovations have closed
+    forms beyond the order of the noise model."""
     n, ar, order = b.y.size, theta[BASE:], theta.size - BASE
     level, back = 1.0, 0.0
     for i in range(order):
@@ -136,7 +136,7 @@ def _of_slow_terms(b: _Bench, theta: Floats, out: Floats) -> None:
 
 @njit(cache=True)
 def _slopes(b: _Bench, p: _Point) -> Floats:
-    """Derivatives of the innovations judged, shape (8 + order, m), by theta; zero by what is held."""
+    """Derivatives of the innovations judged by theta, shape (8 + order, m); zero for fixed constants."""
     order = p.theta.size - BASE
     out, edges = np.zeros((BASE + order, b.at.size)), every_lag(order)
     responses = -p.theta[3] * _responses(b, p)
@@ -156,14 +156,14 @@ def _slopes(b: _Bench, p: _Point) -> Floats:
 
 @register_jitable  # type: ignore[untyped-decorator]
 def _curved(b: _Bench, p: _Point, taken: int) -> tuple[bool, Floats, Floats]:
-    """Gauss-Newton matrix and slope at a point; it is always worth going on."""
+    """Gauss-Newton matrix and gradient at a point; the flag to continue is always True."""
     rows = _slopes(b, p)
     return True, np.dot(rows, rows.T), -np.dot(rows, p.e)
 
 
 @register_jitable  # type: ignore[untyped-decorator]
 def _stepped(b: _Bench, p: _Point, step: Floats) -> _Point:
-    """The point behind a step; the same one, which wins nothing, where it leaves what is searched."""
+    """The point after a step; the unchanged point if the step leaves the bounds."""
     theta, valve = p.theta + step, p.valve
     theta[0] = min(max(theta[0], b.ranges[0]), b.ranges[1])
     theta[1] = min(max(theta[1], b.ranges[2]), b.ranges[3])
@@ -177,12 +177,12 @@ def _stepped(b: _Bench, p: _Point, step: Floats) -> _Point:
 
 @njit(cache=True)
 def _descend(b: _Bench, theta: Floats, valve: StemLaw, rule: Descent) -> _Point:
-    """Damped Gauss-Newton steps to the least mean square of the innovations judged."""
+    """Damped Gauss-Newton steps to the smallest mean square of the innovations judged."""
     return down(b, _point(b, theta, valve), _curved, _stepped, rule)  # type: ignore[no-any-return]
 
 
 def _at(fit: Fit, free_width: bool = False) -> tuple[_Bench, Floats, StemLaw]:
-    """Where a fit stands: what its descent shares, its constants and its valve, in the kernels' own types."""
+    """State of a fit in the kernels' types: the data that its descent shares, its constants and its valve."""
     window, (most_t, most_dead) = fit.window, fit.window.bounds
     factor, least_dead = (window.factor, -window.half_block_s) if window.fine else (1, 0.0)
     ranges = math.log(0.05 * window.dt_s), math.log(most_t), least_dead, most_dead
@@ -204,23 +204,23 @@ def disturbance(fit: Fit) -> Floats:
 
 
 def residual(fit: Fit) -> Floats:
-    """PV less the response to the stem [% PV], shape (n,): load and noise, with the model's slow terms in it.
+    """PV less the response to the stem [% PV], shape (n,): load and noise, including the model's slow terms.
 
-    In a fine window the response is stepped at the record's own interval and then averaged over blocks, as PV was.
+    In a fine window the response is computed at the record's own interval and then averaged over blocks, as PV was.
     """
     return np.asarray(fit.window.centred - fit.gain * _point(*_at(fit)).x)
 
 
 def slow_terms(fit: Fit) -> Floats:
-    """Mean, trend, decay and step of PV by a fit [% PV], shape (n,)."""
+    """Mean, trend, decay and step of PV in a fit [% PV], shape (n,)."""
     point = _point(*_at(fit))
     return np.asarray(fit.window.centred - fit.gain * point.x - point.r)
 
 
 def covariance(fit: Fit, free_width: bool = False) -> Floats:
-    """Covariance of (log T, L, stickband, gain) at a fit, shape (4, 4); zero for what was held.
+    """Covariance of (log T, L, stickband, gain) at a fit, shape (4, 4); zero for fixed constants.
 
-    The noise model's and the slow terms' share is in it (descent.py).
+    It includes the uncertainty from the noise model and the slow terms (descent.py).
     """
     b, theta, valve = _at(fit, free_width)
     found = _point(b, theta, valve)
@@ -234,10 +234,10 @@ def covariance(fit: Fit, free_width: bool = False) -> Floats:
 
 
 def descend(fit: Fit, free_width: bool = False) -> Fit:
-    """All constants of a model together to the least innovations variance, by damped Gauss-Newton steps.
+    """Move all constants of a model jointly to the smallest innovations variance, by damped Gauss-Newton steps.
 
-    Time constant, dead time, gain, slow terms and the noise model, and with `free_width` the stickband, move at
-    once, because they trade against each other along narrow valleys.
+    Time constant, dead time, gain, slow terms, the noise model and, with `free_width`, the stickband move together,
+    because their optimum lies in narrow valleys.
     """
     b, theta, valve = _at(fit, free_width)
     steps = FIT.iterations

@@ -1,4 +1,4 @@
-"""Stick-slip whose slips come at distances that scatter: friction, stem and process found together, path by path."""
+"""Stick-slip with irregular slip distances: joint identification of friction, stem and process by stem paths."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ MOVES = (
     *((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)),
     *((1, 0, -1), (-1, 0, 1), (1, -1, -1), (-1, 1, 1)),
 )
-"""Steps that are tried of stickband, jump and dead time: a wider band that jumps less answers sooner."""
+"""Relative steps of stickband, jump and dead time: a wider band with a smaller jump responds earlier."""
 
 
 Gains = dict[tuple[float, float], float]
-"""Gains under which frictions are tried, by width and share of the jump; 0 where one is not."""
+"""Gains under which frictions are tried, by width and jump share; 0 where the friction is not tried."""
 
 
 class SlipPath(NamedTuple):
-    """The fit behind a stem as decoded, which its window has as if recorded, and the log probability of its slips."""
+    """The fit behind a decoded stem, held in its window like a recorded one, and its slips' log probability."""
 
     fit: Fit
     chance: float
@@ -50,7 +50,7 @@ class SlipPath(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class _Trial:
-    """A friction, dead time and gain under which a stem was decoded, with its log probability and its slips."""
+    """A friction, dead time and gain under which a stem was decoded, with log probability and slips."""
 
     score: float
     slips: int
@@ -64,9 +64,9 @@ class _Trial:
 def _decoded(
     fit: Fit, mean: float, law: StemLaw, rest: int, noise: Noise, most: int, least: float = -math.inf
 ) -> tuple[Floats, float]:
-    """The most probable stem under a fit, and its log probability; none where that is under `least`.
+    """The most probable stem under a fit, and its log probability; none where that is below `least`.
 
-    mean : of the stem [% OP]; law, rest : of its friction, and its longest rest [samples]; most : paths side by side.
+    mean : of the stem [% OP]; law, rest : friction and its longest rest [samples]; most : number of parallel paths.
     """
     window = fit.window
     lag = unit_lag(fit.time_constant_s, fit.process.dead_time_s, window.step_s)
@@ -80,9 +80,9 @@ def _slips(stem: Floats) -> int:
 
 
 def _gain(play: Fit, band: float, share: float, half: int) -> float:
-    """The gain with which a friction's slips move PV as far in half a period (`half` blocks) as it moves.
+    """The gain at which a friction's slips move PV as far in half a period (`half` blocks) as PV moves.
 
-    0 where it is not far smaller than the play's.
+    0 unless it is far smaller than the gain of the backlash fit.
     """
     centred = play.window.centred
     stem = residual(replace(play, valve=sticking(band, share), gain=-1.0)) - centred
@@ -93,8 +93,8 @@ def _gain(play: Fit, band: float, share: float, half: int) -> float:
 
 
 def _screened(play: Fit, noise: Floats, rest: int, gains: Gains) -> list[_Trial]:
-    """The frictions and dead times about a play that are worth following, each with its stem, best first, under a
-    noise model of its own."""
+    """Promising frictions and dead times near a backlash fit, each with its decoded stem, best first, under a
+    separate noise model."""
     window = play.window
     e = whitened(disturbance(play), noise, every_lag(noise.size))[noise.size :]
     sigma2 = float(np.mean(e[window.usable[noise.size :]] ** 2))
@@ -107,23 +107,23 @@ def _screened(play: Fit, noise: Floats, rest: int, gains: Gains) -> list[_Trial]
                 law, least = sticking(band, share), _bound(out, band, share)
                 path, score = _decoded(fit, mean, law, rest, Noise(noise, sigma2), SLIPS.screened, least)
                 out = _chosen([*out, _Trial(score, _slips(path), band, share, later, gain, path)])
-        if not out:  # a gain under which no friction slips at the play's own dead time lets none slip later
+        if not out:  # a gain without slips at the backlash fit's dead time has none at later dead times
             break
     return out
 
 
 def _bound(best: list[_Trial], band: float, share: float) -> float:
-    """The score under which a trial is the best neither of its width nor of its share of the jump."""
+    """The score below which a trial is neither the best of its width nor the best of its jump share."""
     of_width = max((t.score for t in best if t.band == band), default=-math.inf)
     return min(of_width, max((t.score for t in best if t.share == share), default=-math.inf))
 
 
 def _chosen(tried: list[_Trial]) -> list[_Trial]:
-    """The best trial of each width and of each share of the jump, best first.
+    """The best trial of each width and of each jump share, best first.
 
-    Ours: so 13 of 16 simulated stems (tests/identification/estimation/test_slip_paths.py) are found, and 28 of 48 of
-    other bands, jumps and processes; by two of each share at two dead times, which come to one path, 11 and 22. By
-    widths alone 16 and 30 are, but of a valve of the sample mill that jumps by most of its band half the jump.
+    Ours: this rule finds 13 of 16 simulated stems (tests/identification/estimation/test_slip_paths.py), and 28 of 48
+    of other bands, jumps and processes; two of each share at two dead times, which lead to one path, find 11 and 22.
+    Widths alone find 16 and 30, but half the jump of a sample mill valve whose jump is most of its band.
     """
     best: dict[tuple[str, float], _Trial] = {}
     for t in sorted(tried, key=lambda t: -t.score):
@@ -134,7 +134,7 @@ def _chosen(tried: list[_Trial]) -> list[_Trial]:
 
 
 def _path(fit: Fit, valve: StemLaw, stem: Floats) -> SlipPath:
-    """The process behind a stem, as if that had been recorded."""
+    """The process fitted behind a decoded stem as if that were recorded."""
     told = replace(fit.window, position=stem, decoded=True)
     return SlipPath(
         descend(replace(fit, window=told, valve=valve)), log_chance(told.op, stem, valve.breakaway)
@@ -142,12 +142,12 @@ def _path(fit: Fit, valve: StemLaw, stem: Floats) -> SlipPath:
 
 
 def _decoded_anew(path: SlipPath, fit: Fit, law: StemLaw, rest: int, hot: float) -> Floats:
-    """The most probable stem under a fit near a path, shape of OP; hot : factor of the innovations' variance."""
+    """The most probable stem under a fit near a path, shape of OP; hot : factor of the innovations variance."""
     return _decoded(fit, path.mean, law, rest, Noise(fit.ar, hot * fit.sigma2), SLIPS.carried)[0]
 
 
 def _followed(play: Fit, begun: _Trial, rest: int) -> SlipPath:
-    """Process and stem found in turns from a trial; the most probable of them."""
+    """Fit process and stem alternately from a trial; return the most probable path."""
     valve, stem = sticking(begun.band, begun.share), begun.stem
     later_s = begun.later * play.window.dt_s
     fit = replace(play, dead_time_s=play.dead_time_s + later_s, gain=begun.gain)
@@ -166,14 +166,14 @@ def _followed(play: Fit, begun: _Trial, rest: int) -> SlipPath:
 
 
 def _settled(best: SlipPath) -> SlipPath:
-    """Stickband, jump and dead time moved by ever smaller steps to the most probable path."""
+    """Move stickband, jump and dead time by decreasing steps to the most probable path."""
     return compass(
         None, best, -best.worth, _moved, MOVES, SLIPS.steps, worth=SLIPS.worth, most=SLIPS.most_moves
     )[0]
 
 
 def _moved(_: None, best: SlipPath, move: tuple[int, int, int], step: float) -> tuple[SlipPath, float]:
-    """The path under another stickband, jump and dead time; worth nothing where there is none with slips."""
+    """The path with another stickband, jump and dead time; an infinite loss where no path has slips."""
     window = best.fit.window
     v, (wider, jumpier, later) = best.fit.valve, (step * m for m in move)
     band, share = v.stickband * (1.0 + wider), v.slip_jump / v.stickband + 2.0 * jumpier
@@ -190,11 +190,11 @@ def _moved(_: None, best: SlipPath, move: tuple[int, int, int], step: float) -> 
 
 
 def fit_irregular(play: Fit, noise: Floats, period_s: float, any_gain: bool = True) -> SlipPath | None:
-    """The most probable path of a sticking stem in a loop that cycles; None where none is as likely as the play.
+    """The most probable path of a sticking stem in a cycling loop; None where no path is as likely as backlash.
 
-    play : the best play, fitted in blocks, without a recorded stem; noise : shape (order,), a noise model that
-    takes no valve's side, under which the search begins; period_s : of the cycle [s]; any_gain : whether gains far
-    under the play's are tried too, where its own comes to nothing: where another stick-slip is known they lead to
+    play : the best backlash, fitted in blocks, without a recorded stem; noise : shape (order,), a noise model that
+    favours no valve, used at the start; period_s : period of the cycle [s]; any_gain : whether gains far below that
+    of the backlash fit are also tried when its own gain finds no path. If another stick-slip is known, they lead to
     narrower bands with longer dead times.
     """
     if play.gain == 0.0:
@@ -211,7 +211,7 @@ def fit_irregular(play: Fit, noise: Floats, period_s: float, any_gain: bool = Tr
 
 
 def near_path(play: Fit, path: SlipPath) -> Fit:
-    """A fit to the play's window with a path's process and mean friction: a start for one that slips alike."""
+    """A fit to the backlash fit's window with a path's process and mean friction: a start for regular slips."""
     found = path.fit
     t, dead, gain = found.time_constant_s, found.dead_time_s, found.gain
     share = min(found.valve.slip_jump / max(found.valve.stickband, 1e-9), 1.0)
@@ -220,12 +220,12 @@ def near_path(play: Fit, path: SlipPath) -> Fit:
 
 
 def _likeliest(play: Fit, noise: Floats, rest: int, gains: Gains) -> SlipPath | None:
-    """The most probable path that the best trials come to; None where none is as likely as the play."""
+    """The most probable path from the best trials; None where none is as likely as backlash."""
     paths = [_followed(play, t, rest) for t in _screened(play, noise, rest, gains)]
     best = max(paths, key=lambda p: p.worth, default=None)
     return None if best is None or best.worth < play.log_likelihood else best
 
 
 def path_evidence(path: SlipPath, rival: Fit) -> float:
-    """Log likelihood [nat] of a path, its slips' chance with it, over a fit of the same window without it."""
+    """Log likelihood [nat] of a path and its slips over a fit of the same window without it."""
     return evidence(path.fit, rival) + path.chance

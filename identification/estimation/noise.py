@@ -1,9 +1,9 @@
-"""The noise model: an autoregression that makes the residual of a model white; models are judged by innovations.
+"""The noise model: an autoregression that whitens the residual of a model. Models are compared by innovations.
 
-Judging by innovations and not by simulation error keeps answers free of the bias that feedback gives to direct
-identification (Ljung 1999, ch. 13) and sees small effects under large loads. Lags act in groups, by their mean, in
-two variants: single lags (every_lag), whose few constants the fit of one valve moves together with its own, and those
-that widen (edges_for), so that slow loads and fast noise both fit, whose constants are solved for.
+Comparison by innovations, not by simulation error, avoids the bias of direct identification in closed loop (Ljung
+1999, ch. 13) and detects small effects under large loads. Lags act in groups, by their mean, in two variants: single
+lags (every_lag), whose few constants are fitted jointly with those of one valve, and widening groups (edges_for),
+which fit both slow loads and fast noise and whose constants are solved for.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from identification.record import Floats, Mask
 
 Edges = NDArray[np.int64]
 EDGES = np.array(FIT.lag_edges, dtype=np.int64)
-"""Of a wide noise model: lags between consecutive edges act together, by their mean."""
+"""Edges of a wide noise model: the lags between consecutive edges act together, by their mean."""
 NO_NOISE = np.zeros(1, dtype=np.int64)
-"""Edges of no lags at all: innovations are the errors of the simulation themselves."""
+"""Edges without any lag: the innovations are the simulation errors themselves."""
 TILE = 1024
-"""Samples that are whitened at a time."""
+"""Samples whitened at a time."""
 
 
 def edges_for(usable: Mask) -> Edges:
-    """Edges of the lag groups for a record, as far back as half of its good samples have good ones before them.
+    """Edges of the lag groups for a record, as far back as half of its good samples have good predecessors.
 
-    Where single samples are missing all over a record, a noise model that looked back far would judge none.
+    If single samples are missing throughout a record, a longer noise model would judge no sample.
     """
     count = max(int(np.searchsorted(EDGES, usable.size / FIT.longest_lag, side="right")), FIT.fewest_edges)
     while (
@@ -62,7 +62,7 @@ def lag_means(r: Floats, edges: Edges) -> Floats:
 
 @njit(cache=True)
 def whitened(x: Floats, ar: Floats, edges: Edges) -> Floats:
-    """Innovations of x under a noise model, shape (n,); whole from the longest lag on."""
+    """Innovations of x under a noise model, shape (n,); complete from the longest lag on."""
     n, groups = x.size, edges.size - 1
     single = 0
     while single < groups and edges[single + 1] == single + 1:
@@ -72,7 +72,7 @@ def whitened(x: Floats, ar: Floats, edges: Edges) -> Floats:
         for k in range(n):
             total[k + 1] = total[k] + x[k]
     out = x.copy()
-    for first in range(0, n, TILE):  # a stretch at a time, lag by lag, for whole vectors that stay at hand
+    for first in range(0, n, TILE):  # one stretch at a time, lag by lag, so that the vectors stay in cache
         last = min(first + TILE, n)
         for i in range(single):
             if ar[i] == 0.0:
@@ -100,9 +100,9 @@ def judged(usable: Mask, reach: int) -> Mask:
 
 
 def fitted(columns: Floats, r: Floats) -> tuple[Floats, Floats]:
-    """Noise model, shape (groups,), of least innovations, and the products of the columns, shape (groups, groups).
+    """Noise model of least innovations, shape (groups,), and the products of the columns, shape (groups, groups).
 
-    `columns` from lag_means, shape (groups, n), and `r`, shape (n,), both times the root of what each sample counts.
+    `columns` from lag_means, shape (groups, n), and `r`, shape (n,), are both multiplied by the root of the weights.
     """
     gram = columns @ columns.T
     if gram.size == 0:
@@ -112,7 +112,7 @@ def fitted(columns: Floats, r: Floats) -> tuple[Floats, Floats]:
 
 
 def arx_noise(y: Floats, u: Floats, usable: Mask, order: int, lags: int) -> Floats:
-    """A first noise model of single lags, (order,), from a free ARX model, y = ar y[past] + b u[past] + c."""
+    """An initial noise model of single lags, (order,), from a free ARX model, y = ar y[past] + b u[past] + c."""
     top = max(order, lags)
     n = y.size
     past = [y[top - 1 - i : n - 1 - i] for i in range(order)]
@@ -125,7 +125,7 @@ def arx_noise(y: Floats, u: Floats, usable: Mask, order: int, lags: int) -> Floa
 
 
 def generic_noise() -> Floats:
-    """The noise model that knows nothing, shape (FIT.ar_order,)."""
+    """The generic noise model, used without knowledge of the record, shape (FIT.ar_order,)."""
     out = np.zeros(FIT.ar_order)
     out[0] = FIT.generic
     return out

@@ -1,4 +1,4 @@
-"""What is fitted to a recording: the recording prepared, a plain loop with what is added to it, and the outcome."""
+"""Prediction-error fit of a recording: its preparation, a baseline model with additions, and the result."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ BASE = (
     Param(Slot.BIAS, "bias_pct", "% PV", -2e3, 2e3),
     Param(Slot.START, "start_pct", "% PV", -300.0, 300.0),
 )
-"""Constants of the plain loop, free in every candidate."""
+"""Constants of the baseline model, free in every candidate."""
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
     """A recording prepared for fitting.
 
-    inputs : what drives the model; y : PV less inputs.level, shape (n,); usable : bool, shape (n,); weight : shape
-    (n,), what each innovation counts, 0 where it is not judged. limits : what decides about candidates; memory :
-    in an experiment, samples that tell as much as an independent one, at most; window : samples after which a
-    simulation that is judged by its own errors begins anew (without_lines), 0 for one run over all.
+    inputs : inputs of the model; y : PV less inputs.level, shape (n,); usable : bool, shape (n,); weight : shape
+    (n,), weight of each innovation, 0 where it is not judged. limits : thresholds for candidates; memory : in an
+    experiment, largest number of samples per independent one; window : samples after which a simulation judged by its
+    own errors restarts (without_lines), 0 for one run over all.
     """
 
     inputs: ModelInputs
@@ -47,16 +47,16 @@ class Problem:
 
     @property
     def count(self) -> int:
-        """Samples judged."""
+        """Number of samples judged."""
         return int((self.weight > 0).sum())
 
     @property
     def by_simulation(self) -> bool:
-        """Whether errors of the simulation are judged, with no noise model between."""
+        """Whether simulation errors are judged, without a noise model."""
         return self.edges.size == 1
 
     def independent(self, e: Floats) -> int:
-        """Samples judged of which each tells something by itself, of a model that leaves errors of shape (n,)."""
+        """Number of independent samples among those judged, for a model with errors of shape (n,)."""
         memory = min(self.memory, correlated(e[self.weight > 0])) if self.by_simulation else 1.0
         return max(int(self.count / memory), 1)
 
@@ -68,21 +68,21 @@ def problem(
     limits: ExplainLimits = LIMITS,
     edges: Edges | None = None,
 ) -> Problem:
-    """A problem whose usable samples all count alike, with lag groups of its own where none are given."""
+    """A problem whose usable samples have equal weight, with its own lag groups unless given."""
     edges = edges_for(usable) if edges is None else edges
     return Problem(inputs, y, usable, judged(usable, int(edges[-1])).astype(float), edges, limits)
 
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """What is added to the plain loop, and all constants, shape (SIZE,)."""
+    """The additions to the baseline model, and all constants, shape (SIZE,)."""
 
     added: tuple[Variant, ...]
     c: Floats
 
     @property
     def params(self) -> tuple[Param, ...]:
-        """What is free: the plain loop's constants that nothing replaces, and those of what is added."""
+        """Free constants: those of the baseline model that no addition replaces, and those of the additions."""
         own = tuple(p for v in self.added for p in v.params)
         replaced = {slot for v in self.added for slot in v.replaces}
         return (*(p for p in BASE if p.slot not in replaced), *own)
@@ -90,8 +90,8 @@ class Model:
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """A model at its optimum: `loss` the weighted mean square innovation, `ar` the noise model; count : innovations
-    that tell something each by itself."""
+    """A model at its optimum: `loss` the weighted mean square innovation, `ar` the noise model; count : number of
+    independent innovations."""
 
     model: Model
     loss: float
@@ -101,7 +101,7 @@ class Fitted:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of what is added."""
+        """Names of the additions."""
         return tuple(v.name for v in self.model.added)
 
 
@@ -111,7 +111,7 @@ def gain(better: Fitted, worse: Fitted) -> float:
 
 
 def scales(inputs: ModelInputs, c: Floats, param: Param) -> tuple[float, float]:
-    """Offset and factor that turn a row's numbers into the constant's own unit."""
+    """Offset and factor that convert a row's numbers to the unit of the constant."""
     op = inputs.op
     reach = max(float(np.ptp(op)), 1e-6)
     match param.scale:
@@ -137,7 +137,7 @@ def scales(inputs: ModelInputs, c: Floats, param: Param) -> tuple[float, float]:
 
 
 def bounds(inputs: ModelInputs, c: Floats, param: Param) -> tuple[float, float]:
-    """Lowest and highest value of a constant, in its own unit."""
+    """Lowest and highest value of a constant, in its unit."""
     if param.slot == Slot.T:
         longest = 2.0 * inputs.dt_s * inputs.op.size
         return 0.3 * inputs.dt_s, longest if c[Slot.LEAK] == 0 else min(longest, inputs.longest_s)
@@ -146,16 +146,16 @@ def bounds(inputs: ModelInputs, c: Floats, param: Param) -> tuple[float, float]:
 
 
 PRIOR = (Slot.START, Slot.BIAS)
-"""Constants that short time constants, or a load like a random walk, leave open; they are held near the recording."""
+"""Constants poorly determined with a short time constant or random-walk load; a prior holds them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Residual:
-    """What a model leaves, and the noise model that suits it best.
+    """Residual of a model and its best noise model.
 
-    simulated : what they give [% PV], shape (n,); ar : noise model, shape (groups,). What each sample counts is in
-    the rest: columns, lag means of the residual, shape (groups, n), gram, their products, white, the innovations,
-    shape (n,), and loss, their mean square.
+    simulated : simulated PV [% PV], shape (n,); ar : noise model, shape (groups,). The others include the weights:
+    columns, lag means of the residual, shape (groups, n), gram, their products, white, the innovations, shape (n,),
+    and loss, their mean square.
     """
 
     model: Model
@@ -183,7 +183,7 @@ def residual_fit(p: Problem, model: Model) -> Residual:
 
 
 def step_of(inputs: ModelInputs, c: Floats, param: Param) -> float:
-    """Step of the numeric derivative of a constant, in its own unit."""
+    """Step of the numeric derivative of a constant, in its unit."""
     if param.log:
         return 0.01 * float(c[param.slot])
     if param.slot == Slot.L:
@@ -198,8 +198,8 @@ def step_of(inputs: ModelInputs, c: Floats, param: Param) -> float:
 def sensitivities(p: Problem, model: Model, ar: Floats, here: Floats | None = None) -> Floats:
     """Whitened derivatives of the simulation by the free constants (logarithms where so searched), (m, n).
 
-    `here` is what the model simulates, to the last digit, where that is known: a constant that does nothing yet must
-    have no slope at all."""
+    `here` is the model's exact simulation, if known: a constant without effect must have a derivative of zero.
+    """
     here = simulate(p.inputs, model.c) if here is None else here
     out = np.empty((len(model.params), p.y.size))
     for i, param in enumerate(model.params):
@@ -226,8 +226,8 @@ def moved(p: Problem, model: Model, step: Floats) -> Model:
 
 
 def curvature(p: Problem, found: Residual) -> tuple[Floats, Floats, Floats]:
-    """Gauss-Newton matrix of the constants with the noise model eliminated, the slope, and what they are made of:
-    derivatives of the innovations, shape (m, n), weighted."""
+    """Gauss-Newton matrix of the constants with the noise model eliminated, the gradient, and the weighted
+    derivatives of the innovations that form them, shape (m, n)."""
     model = found.model
     moves = sensitivities(p, model, found.ar, found.simulated) * np.sqrt(p.weight)
     own, groups = found.columns, found.ar.size
@@ -250,7 +250,7 @@ def curvature(p: Problem, found: Residual) -> tuple[Floats, Floats, Floats]:
 
 
 def is_out_of_reach(p: Problem, found: Residual, gram: Floats, slope: Floats, aim: float) -> bool:
-    """Whether steps that win several times what the next one promises would not come to the loss aimed at."""
+    """Whether the target loss is out of reach even if the next steps gain several times the predicted amount."""
     if math.isinf(aim):
         return False
     promised = float(slope @ damped_step(gram, slope, 1e-6)) / max(float(found.white @ found.white), 1e-300)
@@ -264,7 +264,7 @@ def _with_place(model: Model, place: float) -> Model:
 
 
 def placed(p: Problem, model: Model) -> Model:
-    """The model with its stem's first place where PV says that it stood; none has slipped before a record begins."""
+    """The model with the initial stem position estimated from PV; no slip has occurred before the record begins."""
     if not model.c[Slot.STICKBAND] > 0.0:
         return model
     first = float(model.c[Slot.PLACE])
@@ -274,10 +274,10 @@ def placed(p: Problem, model: Model) -> Model:
 
 
 def descended(p: Problem, model: Model, steps: int, aim: float = math.inf) -> Fitted:
-    """Follow a model to the least innovations, its stem placed anew before and behind it where there is friction.
+    """Descend to the smallest innovations; with friction, the initial stem position is estimated before and after.
 
-    model : where to start; steps : steps at most, each time; aim : loss that is worth anything; from the second step
-    on a descent that will not come to it ends.
+    model : start; steps : largest number of steps of each descent; aim : largest loss of interest. From the second
+    step on, a descent that cannot reach it ends.
     """
     fit = _descend(p, placed(p, model), steps, aim)
     again = placed(p, fit.model)
@@ -285,7 +285,7 @@ def descended(p: Problem, model: Model, steps: int, aim: float = math.inf) -> Fi
 
 
 def _descend(p: Problem, model: Model, steps: int, aim: float) -> Fitted:
-    """Follow a model to the least innovations by damped Gauss-Newton steps."""
+    """Damped Gauss-Newton steps from a model to the smallest innovations."""
 
     def curved(p: Problem, found: Residual, taken: int) -> tuple[bool, Floats, Floats]:
         gram, slope, _ = curvature(p, found)
@@ -303,7 +303,7 @@ def _descend(p: Problem, model: Model, steps: int, aim: float) -> Fitted:
 
 
 def innovations_of(p: Problem, found: Residual) -> Floats:
-    """Innovations [% PV], shape (n,), also where they count nothing."""
+    """Innovations [% PV], shape (n,), including those with zero weight."""
     if not found.loss < FIT.far**2:
         return np.full(p.y.size, FIT.far)
     left = without_lines(p.y - found.simulated, p.window)

@@ -1,7 +1,7 @@
-"""Where a fit begins: time constant and dead time searched, and many valves tried, under a given noise model.
+"""Starts of a fit: a search for time constant and dead time, and a scan of valves, under a given noise model.
 
-The search knows blocks alone and solves gain and slow terms linearly; the descent ends at the record's own interval.
-So do the starts of `explain`'s plain loop, whose descent is another.
+The search uses blocks and solves gain and slow terms linearly; the descent ends at the record's own interval. The
+starts of `explain`'s baseline model come from the same search, but its descent is a different one.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from identification.simulation.lag import Lag, stepped, unit_lag
 from identification.simulation.valve import IDEAL, StemLaw, sticking
 
 FADED = 1e-17
-"""A decay under this share of its start is over; numbers have sixteen digits."""
+"""A decay below this share of its start is treated as zero; numbers have sixteen digits."""
 MOVES = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, -1.0))
-"""Steps of log time constant and dead time that are tried."""
+"""Compass moves in log time constant and dead time."""
 PIT_STEPS = FIT.pit_steps
-"""Steps of the search within a pit of stickband and jump, as kernels take them."""
+"""Step sizes of the local search in stickband and jump, in the kernels' type."""
 PIT_MOVES = ((1, 0), (-1, 0), (0, 1), (0, -1))
-"""Steps of stickband and jump that are tried in a pit."""
+"""Compass moves in stickband and jump."""
 NO_WHITENING = np.zeros(1)
-"""The noise model of a simulation judged by its own errors: none."""
+"""Empty noise model, for a simulation judged by its own errors."""
 
 
 @njit(cache=True)
 def solved(gram: Floats, cross: Floats) -> Floats:
-    """Least squares of a matrix of products of which the upper half is filled, shape (4,), by elimination in place: a
-    library's solver takes longer to call than four rows to eliminate."""
+    """Least squares from a product matrix whose upper half is filled, shape (4,), by elimination in place. A call of
+    a library solver takes longer than the elimination of four rows."""
     n, beta = cross.size, cross.copy()
     for i in range(n):
         gram[i, i] = gram[i, i] * (1 + 1e-9) + 1e-12
@@ -59,8 +59,8 @@ def solved(gram: Floats, cross: Floats) -> Floats:
 
 @njit(cache=True)
 def _known(y: Floats, judged: Mask, first: int) -> tuple[Floats, Floats]:
-    """What does not depend on dynamics: PV, weight and weight times t, shape (3, n), zero where nothing is judged,
-    and the sums over PV squared, PV, PV t, 1, t and t squared, shape (6,)."""
+    """Terms that do not depend on dynamics: PV, weight and weight times t, shape (3, n), zero where nothing is
+    judged, and the sums over PV squared, PV, PV t, 1, t and t squared, shape (6,)."""
     n = y.size
     rows = np.zeros((3, n))
     vv, v1, vt, count, t1, tt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -79,8 +79,8 @@ Products = tuple[float, float, float, float]
 
 @njit(cache=True)
 def _response(stem: Floats, lag: Lag, rows: Floats, out: Floats) -> Products:
-    """The response of a lag into `out`, as `respond`, and its products; each step of it waits for the one before, and
-    the sums are made meanwhile."""
+    """Write the response of a lag into `out`, as `respond`, and return its products. Each step depends on the one
+    before; the sums are computed meanwhile."""
     y, xv, x1, xt, xx = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(stem.size):
         out[k] = y
@@ -96,7 +96,7 @@ Faded = tuple[float, float, float, float, float]
 
 @njit(cache=True)
 def faded_products(x: Floats, rows: Floats, pole: float, outlasts: bool) -> Faded:
-    """Products of the decay of a response; none where its time constant outlasts half the window."""
+    """Products of the decay of a response; zero where its time constant exceeds half the window."""
     fv, fx, f1, ft, ff = 0.0, 0.0, 0.0, 0.0, 0.0
     free, k = 0.0 if outlasts else 1.0, 0
     while k < x.size and free > FADED:
@@ -130,7 +130,7 @@ Dynamics = tuple[float, float]
 class WhitePv(NamedTuple):
     """PV of a window under one noise model, whitened once for many valves.
 
-    stems : those of the window, in blocks; rows, shape (3, n), and sums, shape (6,): see `_known`; ar : the noise
+    stems : stems of the window, in blocks; rows, shape (3, n), and sums, shape (6,): see `_known`; ar : the noise
     model, shape (p,); dt_s : interval of blocks [s]; most : largest time constant and dead time searched [s].
     """
 
@@ -143,7 +143,7 @@ class WhitePv(NamedTuple):
 
 
 class Prepared(NamedTuple):
-    """The same with the stem behind one valve, whitened for many dynamics: a lag and A(q) commute."""
+    """Whitened PV and the whitened stem behind one valve, for many dynamics: a lag and A(q) commute."""
 
     pv: WhitePv
     stem: Floats
@@ -174,7 +174,7 @@ def level_of(ar: Floats) -> float:
 
 @njit(cache=True)
 def whitened_stem(x: Floats, ar: Floats) -> Floats:
-    """Innovations, zero where they are not whole yet: a lag or a notch would ring from those."""
+    """Innovations, zero where incomplete: a lag or a notch would ring from incomplete ones."""
     white = whitened(x, ar, every_lag(ar.size))
     white[: ar.size] = 0.0
     return white
@@ -189,14 +189,14 @@ def white_pv(window: Window, ar: Floats, notch_period: float = 0.0) -> WhitePv:
 
 
 def prepare(window: Window, valve: StemLaw, ar: Floats, notch_period: float) -> Prepared:
-    """Whiten PV and the stem with one noise model, a period [blocks] left out of both."""
+    """Whiten PV and the stem with one noise model, with a period [blocks] removed from both."""
     whole = behind(white_pv(window, ar, notch_period), valve)
     return whole._replace(stem=notch(whole.stem, notch_period, FIT.notch_width))  # type: ignore[no-any-return]
 
 
 @register_jitable  # type: ignore[untyped-decorator]
 def _tried(p: Prepared, at: Dynamics, move: Dynamics, step: float) -> tuple[Dynamics, float]:
-    """Log time constant and dead time moved by a step of .4 and of two blocks, and the variance left there."""
+    """Move log time constant and dead time by a step of .4 and of two blocks; return the residual variance there."""
     t, d = at[0] + move[0] * 0.4 * step, at[1] + move[1] * 2.0 * p.pv.dt_s * step
     if d < 0 or d > p.pv.most[1] or t < math.log(0.05 * p.pv.dt_s) or t > math.log(p.pv.most[0]):
         return (t, d), np.inf
@@ -205,7 +205,7 @@ def _tried(p: Prepared, at: Dynamics, move: Dynamics, step: float) -> tuple[Dyna
 
 @njit(cache=True)
 def _least(p: Prepared, begins: Floats, halvings: int) -> Dynamics:
-    """Best of the starts (rows of log time constant and dead time), then compass search from there."""
+    """Compass search from the best of the starts (rows of log time constant and dead time)."""
     best, least = (begins[0, 0], begins[0, 1]), np.inf
     for i in range(begins.shape[0]):
         found = score(p, math.exp(begins[i, 0]), begins[i, 1])[0]
@@ -216,8 +216,8 @@ def _least(p: Prepared, begins: Floats, halvings: int) -> Dynamics:
 
 
 def search(prepared: Prepared, begins: list[Dynamics], halvings: int) -> tuple[Dynamics, float, int, Floats]:
-    """Time constant and dead time [s] of least innovations variance, and their score: the best start, then compass
-    search."""
+    """Time constant and dead time [s] of least innovations variance, and their score: compass search from the best
+    start."""
     (most_t, most_dead), dt_s = prepared.pv.most, prepared.pv.dt_s
     first = [[math.log(min(max(t, 0.06 * dt_s), 0.95 * most_t)), min(d, most_dead)] for t, d in begins]
     found = _least(prepared, np.array(first), halvings)
@@ -228,7 +228,7 @@ def search(prepared: Prepared, begins: list[Dynamics], halvings: int) -> tuple[D
 def _valve_tried(
     at: tuple[WhitePv, Dynamics], valve: StemLaw, move: tuple[int, int], step: float
 ) -> tuple[StemLaw, float]:
-    """A valve with stickband or jump moved by a relative step, and the variance that it leaves."""
+    """A valve with stickband or jump moved by a relative step, and its residual variance."""
     pv, (time_constant_s, dead_time_s) = at
     width = (valve.breakaway + valve.sliding) * (1 + move[0] * step)
     share = min((valve.breakaway - valve.sliding) * (1 + 2 * move[1] * step), width) / width
@@ -238,13 +238,13 @@ def _valve_tried(
 
 @njit(cache=True)
 def settled(pv: WhitePv, valve: StemLaw, least: float, dynamics: Dynamics) -> StemLaw:
-    """The bottom of a pit: stickband and jump moved by ever smaller steps to the least innovations variance, `least`
-    at first, under given dynamics."""
+    """The local minimum in stickband and jump: decreasing steps to the least innovations variance, `least` at the
+    start, under given dynamics."""
     return compass((pv, dynamics), valve, least, _valve_tried, PIT_MOVES, PIT_STEPS, 1e-7)[0]  # type: ignore[no-any-return]
 
 
 def starts(window: Window, period_s: float) -> list[Dynamics]:
-    """Starts of the search: time constants and dead times spread over the period [s]."""
+    """Starts of the search: time constants and dead times distributed over the period [s]."""
     times = [period_s * s for s in (0.03, 0.12, 0.5, 2.5)]
     deads = [period_s * s for s in (0.0, 0.06, 0.15, 0.33)]
     most_t, most_dead = window.bounds
@@ -252,7 +252,7 @@ def starts(window: Window, period_s: float) -> list[Dynamics]:
 
 
 def record_starts(samples: int, dt_s: float) -> list[Dynamics]:
-    """Time constants and dead times [s] from which the search begins, over all time scales of the record."""
+    """Time constants and dead times [s] at which the search begins, over all time scales of the record."""
     count = 1 + math.ceil(math.log(max(samples / FIT.shortest, FIT.apart)) / math.log(FIT.apart))
     times = FIT.shortest * FIT.apart ** np.arange(count)
     pairs = {(t, min(round(t * d, 1), FIT.longest_delay * samples)) for t in times for d in FIT.delays}
@@ -260,25 +260,25 @@ def record_starts(samples: int, dt_s: float) -> list[Dynamics]:
 
 
 def _plain(window: Window, ar: Floats) -> Fopdt:
-    """The process behind an ideal valve that explains a window best under one noise model."""
+    """The best process behind an ideal valve in a window under one noise model."""
     prepared = behind(white_pv(window, np.ascontiguousarray(ar)), IDEAL)
     dynamics, _, _, beta = search(prepared, record_starts(window.y.size, window.dt_s), 2)
     return Fopdt(float(beta[0]), *dynamics)
 
 
 def simulated_best(y: Floats, op: Floats, usable: Mask, dt_s: float) -> Fopdt:
-    """The plain loop whose simulation leaves least of PV, a straight line of load taken out; see plain_processes."""
+    """The baseline model with the least simulation error of PV, linear load removed; see plain_processes."""
     return _plain(Window(y, op, usable, dt_s), NO_WHITENING)
 
 
 def learnt_noise(window: Window) -> Floats:
-    """A first noise model of a window, shape (FIT.ar_order,), learnt without a process."""
+    """An initial noise model of a window, shape (FIT.ar_order,), learnt without a process."""
     stem = window.stems_in_blocks.ideal
     return arx_noise(window.centred, stem, window.usable, FIT.ar_order, FIT.input_lags)
 
 
 def plain_processes(y: Floats, op: Floats, usable: Mask, dt_s: float) -> list[Fopdt]:
-    """Plain loops that explain PV from OP best: one step ahead under each of two first noise models, and simulated.
+    """The best baseline models of PV from OP: one step ahead under each of two initial noise models, and simulated.
 
     y, op : shape (n,), PV and OP [% of span]; usable : bool, shape (n,), False where a sample must not be used; dt_s
     : sample interval [s]. Returns starts for a descent, one for each; the last is the simulated one.

@@ -1,4 +1,4 @@
-"""Paths of a stem side by side: the chance of when it lets go, each path carried through blocks, divided, scored."""
+"""Beam search over stem paths: slip probability, and paths advanced by blocks, split and scored."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from identification.simulation.lag import Lag, stepped
 SCATTER, FAR, RARE, STUCK = SLIPS.scatter, SLIPS.far, SLIPS.rare, SLIPS.stuck
 WAITING, MOST_EVENTS = SLIPS.waiting, SLIPS.most_events
 PLACES, SAME, LOOKED = SLIPS.places, SLIPS.same, SLIPS.looked
-"""What limits.toml says of paths, as kernels take it."""
+"""Path settings of limits.toml in the kernels' type."""
 
 
 class Response(NamedTuple):
-    """How PV follows the stem: its lag, the gain, and PV's slow terms, shape (blocks,)."""
+    """Response of PV to the stem: its lag, the gain, and PV's slow terms, shape (blocks,)."""
 
     lag: Lag
     gain: float
@@ -28,14 +28,14 @@ class Response(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """Noise model of single lags, of blocks, shape (order,), and the variance of its innovations [% PV squared]."""
+    """Noise model of single lags of blocks, shape (order,), and the innovations variance [% PV squared]."""
 
     ar: Floats
     sigma2: float
 
 
 class SlipDistances(NamedTuple):
-    """Mean distances |OP - stem| at which a stem lets go and comes to rest [% OP], and its longest rest [samples]."""
+    """Mean distances |OP - stem| at start and end of a slip [% OP], and the longest rest [samples]."""
 
     breakaway: float
     sliding: float
@@ -49,7 +49,7 @@ def _normal(x: float) -> float:
 
 @njit(cache=True)
 def slip_chance(distance: float, farthest: float, breakaway: float) -> float:
-    """Chance that a stem lets go between the farthest distance that it has borne and a farther one."""
+    """Probability that a stem slips between the farthest distance so far without a slip and a farther one."""
     scatter = SCATTER * breakaway
     borne = _normal((farthest - breakaway) / scatter)
     return min((_normal((distance - breakaway) / scatter) - borne) / max(1.0 - borne, 1e-12), 1.0)
@@ -57,7 +57,7 @@ def slip_chance(distance: float, farthest: float, breakaway: float) -> float:
 
 @njit(cache=True)
 def log_chance(op: Floats, stem: Floats, breakaway: float) -> float:
-    """Log probability of when a stem, shape of op, has slipped, given OP [nat]."""
+    """Log probability of the slip times of a stem, shape of op, given OP [nat]."""
     below, above, out = 0.0, 0.0, 0.0
     for k in range(1, op.size):
         gap = op[k] - stem[k - 1]
@@ -73,23 +73,23 @@ def log_chance(op: Floats, stem: Floats, breakaway: float) -> float:
 
 Indices = NDArray[np.int64]
 STEM, X, TOTAL, SCORE, LATE, FAR_LOW, FAR_HIGH, PLACED = 0, 1, 2, 3, 4, 5, 6, 7
-"""Columns of a path's numbers: stem, response, its sum over the block, score, stem that PV answers now, farthest
-distance below and above since the last slip; then places of the stem that PV does not answer yet, and residuals."""
+"""Columns of a path's numbers: stem, response, its sum over the block, score, stem that acts on PV now, farthest
+distance below and above since the last slip; then stem positions still within the dead time, and residuals."""
 EVENT, RESTED, COMING, PENDING, DUE = 0, 1, 2, 3, 4
-"""Columns of its marks: last event, sample of the last slip, next sample, how many slips PV does not answer yet; then
-the samples from which it does."""
+"""Columns of a path's marks: last event, sample of the last slip, next sample, number of slips within the dead time;
+then the samples at which they act on PV."""
 
 
 class Beam(NamedTuple):
-    """Paths side by side, a row each, in two arrays: a function is handed each array at a cost."""
+    """Parallel paths, one per row, in two arrays: each array passed to a function has a cost."""
 
     numbers: Floats
     marks: Indices
 
 
 class SlipBlock(NamedTuple):
-    """A block's first sample, the one behind its last, and the extremes of OP in it; and where PV answers a stem at
-    rest, at u, what is left of a response x then, and the weights of x and of u in its sum over the block."""
+    """First sample of a block, the first one after it, and the extremes of OP in it. For a stem at rest at u: the
+    remaining share of a response x, and the weights of x and of u in its sum over the block."""
 
     first: int
     last: int
@@ -102,7 +102,7 @@ class SlipBlock(NamedTuple):
 
 @njit(cache=True)
 def copy_path(into: Beam, to: int, b: Beam, source: int) -> None:
-    """A path of one beam as one of another, or of the same."""
+    """Copy a path of one beam to another beam or to the same one."""
     for i in range(b.numbers.shape[1]):
         into.numbers[to, i] = b.numbers[source, i]
     for i in range(b.marks.shape[1]):
@@ -111,7 +111,7 @@ def copy_path(into: Beam, to: int, b: Beam, source: int) -> None:
 
 @njit(cache=True)
 def best_paths(b: Beam, other: Beam, count: int, most: int, near: float) -> int:
-    """The best paths of `b` in `other`, of two at the same place the better; how many they are."""
+    """Write the best paths of `b` to `other`, the better of two at the same position; return their number."""
     kept = 0
     for at in np.argsort(-b.numbers[:count, SCORE]):
         same = False
@@ -134,7 +134,7 @@ def room(rows: int, order: int) -> Beam:
 
 
 class Events(NamedTuple):
-    """Slips of all paths, shape (MOST_EVENTS,): the slip before on the same path, sample, and stem after it."""
+    """Slips of all paths, shape (MOST_EVENTS,): previous slip on the same path, sample, and stem after it."""
 
     parent: Indices
     moment: Indices
@@ -143,7 +143,7 @@ class Events(NamedTuple):
 
 @njit(cache=True, inline="always")
 def _answered(own: Floats, marks: Indices, k: int, r: Response) -> None:
-    """PV's response of a path stepped on by one sample."""
+    """Advance a path's PV response by one sample."""
     own[TOTAL] += own[X]
     before = own[LATE]
     if marks[PENDING] > 0 and marks[DUE] <= k:
@@ -156,7 +156,7 @@ def _answered(own: Floats, marks: Indices, k: int, r: Response) -> None:
 
 @njit(cache=True)
 def _slipped(b: Beam, events: Events, at: tuple[int, int, int, int], place: float, r: Response) -> None:
-    """Path `at[1]` as `at[0]` with the stem at another place from sample `at[2]` on, remembered as event `at[3]`."""
+    """Write path `at[0]` as `at[1]` with another stem position from sample `at[2]` on, recorded as event `at[3]`."""
     h, to, k, event = at
     copy_path(b, to, b, h)
     own, marks = b.numbers[to], b.marks[to]
@@ -182,7 +182,7 @@ def shares_of(r: Response, factor: int) -> tuple[float, float, float]:
 
 @njit(cache=True, inline="always")
 def _rests(numbers: Floats, marks: Indices, h: int, block: SlipBlock, f: SlipDistances) -> bool:
-    """Whether nothing becomes of a path over a block: its stem bears OP, and PV answers no slip anew."""
+    """Whether a path is unchanged over a block: its stem does not slip, and no earlier slip starts to act on PV."""
     if marks[h, COMING] != block.first or block.first == 0 or block.last - 1 - marks[h, RESTED] > f.rest:
         return False
     if marks[h, PENDING] > 0 and marks[h, DUE] < block.last:
@@ -203,9 +203,9 @@ def _through(
     f: SlipDistances,
     r: Response,
 ) -> tuple[int, int]:
-    """A path through the samples before `last`, with a new path for each slip that is likely enough.
+    """Advance a path through the samples before `last`, with a new path for each sufficiently probable slip.
 
-    `known` and what is returned: how many paths and events there are.
+    `known` and the return value: number of paths and events.
     """
     (count, slips), own, marks = known, b.numbers[h], b.marks[h]
     least = f.breakaway * (1.0 - FAR * SCATTER)
@@ -238,7 +238,7 @@ def divided(
     f: SlipDistances,
     r: Response,
 ) -> tuple[int, int]:
-    """All paths through a block, those that begin in it too; how many paths and events there are."""
+    """Advance all paths through a block, including those that begin in it; return the number of paths and events."""
     (count, slips), numbers, marks = known, b.numbers, b.marks
     h = 0
     while h < count:
@@ -273,7 +273,7 @@ def judge_block(
 
 @njit(cache=True)
 def _begun(b: Beam, op: Floats, first: float, breakaway: float) -> int:
-    """Paths from places of the stem from which it will have to slip; how many they are."""
+    """Paths from stem positions from which the stem must slip; return their number."""
     early = op[: max(op.size // 3, 1)]
     high, low, count = early.max(), early.min(), 0
     for k in range(PLACES):
@@ -310,10 +310,10 @@ def decoded(
 ) -> tuple[Floats, float]:
     """The stem [% OP], shape of op, of the most probable path, and its log probability.
 
-    Paths only lose: once all have come under `least` there is nothing to find, and the log probability is -inf.
+    Scores only decrease: the search ends once all are below `least`, and the log probability is then -inf.
 
     op : shape (n * factor,); y : shape (n,), PV less its mean, in blocks of `factor` samples; counts : bool, shape
-    (n,), blocks whose innovations are judged; most : paths that are carried side by side.
+    (n,), blocks whose innovations are judged; most : number of parallel paths.
     """
     factor, near = op.size // y.size, SAME * f.breakaway
     rows = 6 * most + PLACES

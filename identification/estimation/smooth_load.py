@@ -1,16 +1,15 @@
-"""What resonates: the loop, its load, or neither. A process is fitted under a load that is smooth, has a line,
-or both.
+"""Source of a resonance: the loop or its load. A process is fitted under a load that is smooth, has a line, or both.
 
-Direct identification with a free noise model cannot tell a loop that rings from a load that does: the noise model
+Direct identification with a free noise model cannot distinguish a resonant loop from a resonant load: the noise model
 takes over the resonance and the process gain goes to zero. Physics restricts the noise. A load that enters before the
 process and wanders is smooth: its noise model has real poles, one of them the process's own, and real zeros. Only a
-periodic load has a pair of complex poles. Under a smooth load the loop itself must make the resonance, and gain, time
-constant and dead time follow from it (prediction errors, Ljung 1999, ch. 13: consistent in closed loop where
-the noise model can hold the truth).
+periodic load has a pair of complex poles. Under a smooth load the loop itself must cause the resonance, and gain,
+time constant and dead time follow from it (prediction errors, Ljung 1999, ch. 13: consistent in closed loop if the
+noise model can represent the true one).
 
-The model of a record is y = K x + c + H w with x the response of a unit lag with dead time to the stem and
-H = (1 - z1 q)(1 - z2 q) / ((1 - p q)(1 - s q)) (1 - 2 v cos(a) q + v^2 q^2) / (1 - 2 r cos(a) q + r^2 q^2), q
-one block back, p the pole of the lag, s of the load's corner, r and v > 0 where the load has a line of angle a.
+The model of a record is y = K x + c + H w with x the response of a unit lag with dead time to the stem and H = (1 -
+z1 q)(1 - z2 q) / ((1 - p q)(1 - s q)) (1 - 2 v cos(a) q + v^2 q^2) / (1 - 2 r cos(a) q + r^2 q^2), q one block back,
+p the pole of the lag, s of the load's corner, r and v > 0 where the load has a line of angle a.
 """
 
 from __future__ import annotations
@@ -34,20 +33,20 @@ from identification.simulation.lag import Lag, stepped, unit_lag
 from identification.simulation.valve import IDEAL, StemLaw
 
 LOAD, LINE = 5, 8
-"""Constants of a model: log time constant [s], dead time [blocks], log corner time [s], inverse hyperbolic
-tangents of both zeros; and of a line log frequency over that sought for, log of the periods that it keeps its
-phase for, and log of how far it stands out."""
+"""Constants of a model: log time constant [s], dead time [blocks], log corner time [s], inverse hyperbolic tangents
+of both zeros; of a line: log frequency relative to the expected one, log of the coherence time in periods, and log of
+its height."""
 STEPS = np.array([0.01, 0.02, 0.02, 0.02, 0.02, 0.001, 0.02, 0.02])
-"""Steps of the constants over which derivatives are taken."""
+"""Steps of the constants for numeric derivatives."""
 LONGEST = np.array([1.0, 4.0, 1.5, 1.0, 1.0, 0.05, 1.5, 1.5])
-"""Longest steps of a descent in each constant: the least squares are no bowl."""
+"""Longest steps of a descent in each constant, because the least squares are not convex."""
 CORNERS, ZEROS = (1.0, 10.0, 100.0), ((0.0, 0.2), (0.4, 0.7), (1.0, 1.5))
-"""Starts of the load: its corner time [periods] and its zeros, never alike, for then they would not be told apart."""
+"""Starts of the load: its corner time [periods] and its zeros, which always differ to be distinguishable."""
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A periodic load: its period [s], and the periods for which it keeps its phase."""
+    """A periodic load: its period [s] and its coherence time [periods]."""
 
     period_s: float
     kept: float
@@ -71,8 +70,8 @@ class SmoothFit:
 
 
 class _Case(NamedTuple):
-    """What all points of a descent share: PV and stem in blocks, less their means; blocks judged; interval
-    [s]; ranges of the constants, shape (2, m); period sought for [s]."""
+    """Data shared by all points of a descent: PV and stem in blocks, less their means; blocks judged; interval [s];
+    ranges of the constants, shape (2, m); expected period [s]."""
 
     y: Floats
     stem: Floats
@@ -99,7 +98,7 @@ Pair = tuple[float, float, float, float]
 
 @njit(cache=True)
 def _whitened(y: Floats, stem: Floats, lag: Lag, noise: Noise, pair: Pair) -> tuple[Floats, Floats]:
-    """PV and the unit response to the stem, both without their load, shape (n,) each."""
+    """PV and the unit response to the stem, both whitened by the load model, shape (n,) each."""
     n = y.size
     yw, xw = np.zeros(n), np.zeros(n)
     a1, a2, b1, b2, lined = noise
@@ -126,7 +125,7 @@ def _whitened(y: Floats, stem: Floats, lag: Lag, noise: Noise, pair: Pair) -> tu
 
 
 def _noise(theta: Floats, pole: float, case: _Case) -> tuple[Noise, Pair]:
-    """The load of some constants as the kernel takes it."""
+    """The load model of the constants in the kernel's form."""
     slow = math.exp(-case.dt_s / math.exp(theta[2]))
     z1, z2 = math.tanh(theta[3]), math.tanh(theta[4])
     noise = -(pole + slow), pole * slow, -(z1 + z2), z1 * z2, float(theta.size > LOAD)
@@ -140,7 +139,7 @@ def _noise(theta: Floats, pole: float, case: _Case) -> tuple[Noise, Pair]:
 
 
 def _point(case: _Case, theta: Floats, gain: float | None = None) -> _Point:
-    """The innovations of some constants, gain and offset solved for, or the gain as it is given."""
+    """The innovations of the constants, with gain and offset solved for, or with the given gain."""
     lag = unit_lag(math.exp(theta[0]), theta[1] * case.dt_s, case.dt_s)
     yw, xw = (w[case.at] for w in _whitened(case.y, case.stem, lag, *_noise(theta, lag.pole, case)))
     x, y = xw - xw.mean(), yw - yw.mean()
@@ -172,7 +171,7 @@ def _stepped(case: _Case, p: _Point, step: Floats) -> _Point:
 
 
 def _judged(usable: Mask) -> NDArray[np.int64]:
-    """Blocks that are judged: usable, with as many usable ones before as the noise model needs to forget a hole."""
+    """Blocks that are judged: usable, with enough usable ones before for the noise model to forget a gap."""
     out = ~usable
     for k in range(1, SMOOTH.forgets + 1):
         out[k:] |= ~usable[:-k]
@@ -195,7 +194,7 @@ def _case(window: Window, law: StemLaw, period_s: float, lined: bool) -> _Case:
 
 
 def _descended(case: _Case, starts: Sequence[Floats]) -> _Point:
-    """The likeliest of what some starts come to: all go a few steps, the best of them to the end."""
+    """The most likely result of several starts: all take a few steps, the best of them descend to the end."""
 
     def went(begun: _Point, steps: int) -> _Point:
         rule = Descent(steps, 2 * steps, case.at.size, SMOOTH.settled, 10.0, 5.0, steps)
@@ -217,10 +216,11 @@ def _fit(window: Window, law: StemLaw, case: _Case, p: _Point) -> SmoothFit:
 
 
 def resonant_starts(window: Window, period_s: float, law_response: complex) -> list[tuple[Dynamics, float]]:
-    """Time constant and dead time [s] of lags with which the controller would ring at a period [s], and their gains.
+    """Time constant and dead time [s] of lags with which the controller would oscillate at a period [s], and their
+    gains.
 
-    law_response : the controller's response there [% OP / % PV]. The loop is at a phase of -180 degrees with the gain
-    margin SMOOTH.margin; none where no dead time makes it so.
+    law_response : the controller's response there [% OP / % PV]. The loop phase is -180 degrees with the gain margin
+    SMOOTH.margin; empty where no dead time achieves this.
     """
     omega, found = 2.0 * math.pi / period_s, []
     sign = 1.0 if law_response.real >= 0.0 else -1.0
@@ -240,10 +240,10 @@ def fit_smooth(
     law: StemLaw = IDEAL,
     like: SmoothFit | None = None,
 ) -> SmoothFit:
-    """The process under a smooth load, behind a valve.
+    """Fit the process under a smooth load, behind a valve.
 
-    starts : time constant and dead time [s] from which the search begins, with the gain there where it is
-    known; like : a fit whose load is a start too. Raises ValueError without a start.
+    starts : time constant and dead time [s] at which the search begins, with the gain if known; like : a fit whose
+    load is also a start. Raises ValueError without a start.
     """
     case = _case(window, law, period_s, False)
     loads = [like.theta[2:LOAD]] if like is not None else []
@@ -264,11 +264,11 @@ def fit_line(
     begins: Sequence[Dynamics] = (),
     law: StemLaw = IDEAL,
 ) -> SmoothFit:
-    """The process under a load that has a line near a period [s] beside its smooth part, behind a valve.
+    """Fit the process behind a valve under a load with a line near a period [s] and a smooth part.
 
-    near : fits under smooth loads from which the search begins, and whose loads are starts; begins : time
-    constants and dead times [s] from which it begins too: behind a line a smooth load leaves a process that is
-    far from the true one.
+    near : fits under smooth loads at which the search begins, and whose loads are starts; begins : further time
+    constants and dead times [s] at which it begins. If the load has a line, a fit under a smooth load can give a
+    process far from the true one.
     """
     case = _case(window, law, period_s, True)
     lines = [np.array([0.0, math.log(kept), 2.0]) for kept in SMOOTH.line_starts]
@@ -279,7 +279,7 @@ def fit_line(
 
 
 def as_fit(found: SmoothFit, window: Window) -> Fit:
-    """The same as a fit of the night, whose noise model has single lags: as many as leave the load's to
+    """The result as a fit of the batch run, whose noise model has single lags: as many as reproduce the load to
     SMOOTH.cut."""
     dt_s, p = window.dt_s, found.process
     pole, slow = math.exp(-dt_s / p.time_constant_s), math.exp(-dt_s / math.exp(found.theta[2]))

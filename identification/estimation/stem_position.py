@@ -1,4 +1,4 @@
-"""The valve's fault read from a recorded stem position: OP in, stem out, no process between."""
+"""Valve fault from a recorded stem position: OP in, stem out, no process between."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from identification.signals.robust import robust_deviation
 from identification.simulation.valve import StemLaw, first_slip, sticking, walk
 
 WIDTHS = tuple(float(w) for w in np.geomspace(0.03, 1.2, 60))
-"""Plays tried, in OP's range: steps of a sixteenth."""
+"""Backlash widths tried, relative to the range of OP: steps of a sixteenth."""
 
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """A valve as its position shows it: its play, and the stick-slip where it has one."""
+    """A valve identified from its position: its backlash, and its stick-slip if any."""
 
     play: StemLaw
     jumping: StemLaw | None
 
 
 def left(op: Floats, position: Floats, law: StemLaw) -> float:
-    """Mean square that a valve leaves of a position, an offset between both signals freed [% of span squared]."""
+    """Mean square residual of a valve against a position, with a free offset [% of span squared]."""
     return float(np.var(position - walk(op, law, first_slip(op, law))))
 
 
 def closed_in(op: Floats, position: Floats, width: float) -> StemLaw:
-    """The play after its width [% OP] has been moved by ever smaller steps."""
+    """The backlash after its width [% OP] is refined by decreasing steps."""
 
     def tried(op: Floats, width: float, way: int, step: float) -> tuple[float, float]:
         other = width * (1 + way * step)
@@ -42,7 +42,7 @@ def closed_in(op: Floats, position: Floats, width: float) -> StemLaw:
 
 
 def least_move(position: Floats) -> float:
-    """Move within a sample that stands above the stem's noise and resolution [% OP]."""
+    """Smallest move within a sample that exceeds the stem's noise and resolution [% OP]."""
     step = np.diff(position)
     noise = robust_deviation(step - np.median(step)) / np.sqrt(2.0)
     resolution = float(np.min(np.abs(step)[np.abs(step) > 0], initial=np.inf))
@@ -50,10 +50,10 @@ def least_move(position: Floats) -> float:
 
 
 def slips(op: Floats, position: Floats) -> Floats:
-    """Slips of a stem, shape (m, 3): |OP - stem| [% OP] as it lets go and as it comes to rest, and the way between.
+    """Slips of a stem, shape (m, 3): |OP - stem| [% OP] at the start and at the end of the slip, and its length.
 
-    A slip is a run of samples in which the stem goes one way by more than its noise; medians of what stands about it
-    need no model of when it lets go.
+    A slip is a run of samples in which the stem moves in one direction by more than its noise; the medians of its
+    start and end need no model of when the stem slips.
     """
     step = np.diff(position)
     going = np.where(np.abs(step) > least_move(position), np.sign(step), 0.0)
@@ -69,10 +69,10 @@ def slips(op: Floats, position: Floats) -> Floats:
 
 
 def seen(op: Floats, position: Floats) -> Seen | None:
-    """Play or stick-slip between a recorded OP and a recorded stem.
+    """Backlash or stick-slip between a recorded OP and a recorded stem.
 
-    op, position : shape (n,), OP and stem [% of span]. None where the stem follows OP, or nothing of this
-    kind explains why it does not.
+    op, position : shape (n,), OP and stem [% of span]. None where the stem follows OP, or where neither backlash nor
+    stick-slip explains the difference.
     """
     low, high = np.quantile(op, [0.02, 0.98])
     reach, offset = float(high - low), float(np.median(position - op))

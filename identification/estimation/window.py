@@ -1,10 +1,10 @@
-"""A stretch of a record prepared for fitting, PV in blocks, OP as recorded; the stem behind any valve, and a fit.
+"""A stretch of a record prepared for fitting, PV in blocks and OP as recorded; the stem behind any valve; a fit.
 
 The model of a fit is y = c0 + c1 t + c2 decay + K x + noise with A(q) noise = innovation: the stem is a valve
 operator on the recorded OP, x the response of a unit-gain lag with dead time, A(q) = 1 - ar1 q^-1 - ... an
-autoregression that makes the residual white. An integrator is the lag whose time constant outlasts the window; then
-only gain over time constant is known. Gain and the c are solved linearly, time constant and dead time are searched,
-the valve is scanned.
+autoregression that whitens the residual. An integrator is a lag whose time constant exceeds the window; then only
+gain over time constant is known. Gain and the c are solved linearly, time constant and dead time are searched, the
+valve is scanned.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from identification.simulation.valve import RESTS, StemLaw, first_slip, stem_ste
 
 
 class Stems(NamedTuple):
-    """What the stem of any valve follows from [% OP]: paths of OP, shape (m, n * factor), each as likely as the next,
-    their extremes in each block of `factor` samples, shape (m, n), and in means of such blocks and of the paths, less
-    their mean, the stem of an ideal valve and the recorded one (of no length where none is)."""
+    """Data from which the stem of any valve is computed [% OP]: equally probable paths of OP, shape (m, n * factor),
+    their extremes in each block of `factor` samples, shape (m, n), and, as block means over the paths less their
+    mean, the stem of an ideal valve and the recorded one (of length 0 if none)."""
 
     op: Floats
     low: Floats
@@ -38,23 +38,23 @@ class Stems(NamedTuple):
 
 
 def less_mean(x: Floats) -> Floats:
-    """x less its mean; nothing of nothing."""
+    """x less its mean; an empty array for an empty one."""
     return x - x.mean() if x.size else x
 
 
 @dataclass(frozen=True)
 class Window:
-    """A stretch of a record prepared for fitting; what follows from it alone is computed once.
+    """A stretch of a record prepared for fitting; values that depend on it alone are computed once.
 
-    y : PV [% PV] in blocks, shape (n,); op : OP [% OP] at `steps` instants of each row of the record, shape
-    (n * factor * steps,); usable : bool, shape (n,), False at gaps; dt_s : interval of the blocks [s];
-    most_time_constant_s and most_dead_time_s : what is known of such processes [s], inf where nothing is; step_at :
-    block at which the load steps, 0 where it does not; position : stem [% OP], shape of op, where recorded or,
-    `decoded`, told from PV; fine : whether responses are stepped at the record's own interval rather than in blocks.
-    Within a block OP answers PV's noise, which a fine response meets where the dead time is shorter than the block;
-    in blocks it counts from the next one on. first : sample of its record that it begins at. turn : samples of OP in
-    two periods of a cycle, 0 where there is none. paths : shape (m, size of op), several paths of OP, each as likely
-    as the next, where OP between the rows is not recorded (between_samples.py); None where `op` is the only one.
+    y : PV [% PV] in blocks, shape (n,); op : OP [% OP] at `steps` instants of each row of the record, shape (n *
+    factor * steps,); usable : bool, shape (n,), False at gaps; dt_s : interval of the blocks [s];
+    most_time_constant_s and most_dead_time_s : known upper limits of such processes [s], inf if unknown; step_at :
+    block at which the load steps, 0 if it does not; position : stem [% OP], shape of op, if recorded, or estimated
+    from PV if `decoded`; fine : whether responses are computed at the record's own interval rather than in blocks.
+    Within a block OP reacts to PV's noise, and a fine response with a dead time shorter than the block includes this
+    reaction; in blocks it acts from the next block on. first : sample of its record at which it begins. turn :
+    samples of OP in two periods of a cycle, 0 without a cycle. paths : shape (m, size of op), equally probable paths
+    of OP, where OP between the rows is not recorded (between_samples.py); None where `op` is the only one.
     """
 
     y: Floats
@@ -76,7 +76,7 @@ class Window:
 
     @cached_property
     def extra(self) -> Floats:
-        """A further regressor, shape (n,): a step of the load at block `step_at`; zero where that is 0."""
+        """A further regressor, shape (n,): a step of the load at block `step_at`; zero if `step_at` is 0."""
         out = np.zeros(self.y.size)
         if self.step_at > 0:
             out[self.step_at :] = 1.0
@@ -99,7 +99,7 @@ class Window:
 
     @cached_property
     def stems(self) -> Stems:
-        """The same at the interval at which responses are stepped."""
+        """Stems that are known beforehand, at the interval at which responses are computed."""
         return self._stems(self.steps) if self.fine else self.stems_in_blocks
 
     def _stems(self, factor: int) -> Stems:
@@ -124,7 +124,7 @@ class Window:
 
     @property
     def of_rows(self) -> Window:
-        """The same with OP at the rows alone."""
+        """The window with OP at the rows alone."""
         if self.steps == 1:
             return self
         op = np.ascontiguousarray(self.op[:: self.steps])
@@ -142,8 +142,8 @@ class Window:
 
     @property
     def half_block_s(self) -> float:
-        """What is missing from a fitted dead time [s]: the mean of a block of PV stands later than its first sample,
-        from which the search, whose model knows blocks alone, counts."""
+        """Correction of a fitted dead time [s]: the mean of a block of PV is later than its first sample, which is
+        the time origin of the search in blocks."""
         return 0.5 * (self.factor - 1) * self.dt_s / self.factor
 
     @cached_property
@@ -154,7 +154,7 @@ class Window:
 
     @cached_property
     def cycle_range(self) -> float:
-        """Range of OP within two periods where it cycles [% OP], else of all: moves of the set point take OP farther
+        """Range of OP within two periods if it cycles [% OP], else of all samples: set point moves change OP more
         than any cycle."""
         rows = self.op.size // self.turn if self.turn else 0
         if rows < 2:
@@ -164,7 +164,7 @@ class Window:
 
     @cached_property
     def reach(self) -> float:
-        """Range of OP that widths are sought up to [% OP]: of all, unless its cycle is far smaller."""
+        """Range of OP that limits the widths searched [% OP]: of all samples, unless its cycle is far smaller."""
         whole, cycle = self.op_range, self.cycle_range
         return max(cycle if cycle < FIT.far_smaller * whole else whole, 1e-9)
 
@@ -179,9 +179,9 @@ def block_means(x: Floats, factor: int) -> Floats:
 class Fit:
     """A fitted model.
 
-    gain [% PV/% OP], time_constant_s and dead_time_s [s], valve, sigma2 the innovations variance
-    [% PV squared], count the samples judged, ar the noise model of single lags (noise.py), shape (p,), base
-    the coefficients of 1, t, decay and the load's step, shape (4,), window what it is fitted to.
+    gain [% PV/% OP], time_constant_s and dead_time_s [s], valve, sigma2 the innovations variance [% PV squared],
+    count the samples judged, ar the noise model of single lags (noise.py), shape (p,), base the coefficients of 1, t,
+    decay and the load's step, shape (4,), window the data that it is fitted to.
     """
 
     gain: float
@@ -212,7 +212,7 @@ class Fit:
 
 @njit(cache=True)
 def _resting_blocks(op: Floats, low: Floats, high: Floats, law: StemLaw, out: Floats) -> None:
-    """`_add_path` for a stem that rests after each move, where the direction of motion need not be remembered."""
+    """`_add_path` for a stem that rests after each move, which needs no memory of the direction of motion."""
     factor = op.size // low.size
     stem = first_slip(op, law)
     for k in range(low.size):
@@ -250,7 +250,7 @@ def _add_path(op: Floats, low: Floats, high: Floats, law: StemLaw, out: Floats) 
 def stem_blocks(s: Stems, law: StemLaw) -> Floats:
     """Stem behind OP as means of blocks and of OP's paths, shape (n // factor,), of a valve with breakaway > 0.
 
-    A stem at rest within reach of OP's extremes in a block rests on.
+    A stem at rest whose reach includes OP's extremes in a block stays at rest.
     """
     paths, n = s.low.shape
     out = np.zeros(n)
@@ -264,7 +264,7 @@ def stem_blocks(s: Stems, law: StemLaw) -> Floats:
 
 @njit(cache=True)
 def stem_of(s: Stems, law: StemLaw) -> Floats:
-    """Stem less its mean [% OP], shape (m,), behind a valve: the recorded one where there is one."""
+    """Stem less its mean [% OP], shape (m,), behind a valve; the recorded stem if there is one."""
     if law.breakaway <= 0.0:
         return s.ideal
     if s.recorded.size:

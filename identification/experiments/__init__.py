@@ -1,1 +1,1 @@
-"""Experiments in a record: steps, pulses, ramps and set point steps are found, and each is fitted over its answer."""
+"""Detection of experiments in a record (steps, pulses, ramps, set point steps) and a fit of each response."""

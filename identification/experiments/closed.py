@@ -1,8 +1,8 @@
-"""A process from an experiment in automatic: from what a simulation misses, and with the one sign that feedback has.
+"""Process identification from an experiment in automatic, by simulation error and with the known sign of the gain.
 
-In a closed loop the controller's law, turned round, gives PV from OP as well: PV = SP - OP/kp, with no lag and the
-other sign. A simulation over the whole answer, from rest, and the sign that OP's first move shows keep it out
-(Forssell, Ljung 1999, on direct identification and what a wrong noise model does to it).
+In closed loop the inverse of the control law also gives PV from OP: PV = SP - OP/kp, without lag and with the
+opposite sign. A simulation from rest over the whole response, and the sign shown by OP's first move, exclude this
+solution (Forssell, Ljung 1999, on direct identification and the bias from a wrong noise model).
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from identification.limits import EXPERIMENTS
 
 
 def shown_sign(trial: Trial) -> float:
-    """The gain's sign by the balance dPV/dt ~ K (OP - OP at the end): PV rises while OP is above where it comes to
-    rest, where a heater heats; 0 where PV or OP does not move."""
+    """The gain's sign from the balance dPV/dt ~ K (OP - OP at the end): with a positive gain PV rises while OP is
+    above its final value; 0 where PV or OP does not move."""
     blocks = trial.op.reshape(-1, trial.factor).mean(axis=1)
     rest = float(np.median(blocks[-max(blocks.size // 10, 1) :]))
     width = max(blocks.size // 50, 1)
@@ -31,9 +31,9 @@ def shown_sign(trial: Trial) -> float:
 
 
 def closed_candidates(trial: Trial, sign: float, from_rest: bool) -> list[Fitted]:
-    """Candidates of that gain's sign, the one with the least criterion first; none where there is none.
+    """Candidates with that sign of gain, least criterion first; empty if there are none.
 
-    from_rest : whether PV may begin away from the rest that OP's first value means, as in a warm-up.
+    from_rest : whether PV may begin away from the steady state of OP's first value, as in a warm-up.
     """
     found = []
     lags = np.geomspace(max(2.0 * trial.block_s, 0.004 * trial.duration_s), trial.duration_s, 6)
@@ -57,13 +57,13 @@ def _lags(kind: Kind, lag: float) -> tuple[float, ...]:
 
 
 def _is_slow(fit: Fitted) -> bool:
-    """Whether the process answers later than at once, as the controller's law turned round does."""
+    """Whether the process responds with a delay, unlike the inverse control law."""
     most = EXPERIMENTS.ramp_from * fit.trial.duration_s
     return 2.0 * fit.trial.block_s < sum(fit.lags_s) + fit.dead_s and max(fit.lags_s) < most
 
 
 def _on_its_noise(fit: Fitted) -> Fitted:
-    """The fit with the noise that it leaves, for its intervals; its constants stay those of the simulation."""
+    """The fit with a noise model of its residual, for its intervals; its constants stay those of the simulation."""
     noise = wander_of(fit.trial.pv - fit.simulated, fit.trial.usable)
     e = fit.trial.pv - fit.simulated
     if noise.ratio == 0.0:

@@ -1,6 +1,6 @@
-"""What an experiment's PV is made of, as columns: a process's answer to the stem, where it began, drift, neighbours.
+"""Regression columns of an experiment's PV: process response to the stem, initial state, drift, neighbours.
 
-Gains are linear, so that a fit searches for times and play alone (variable projection, Golub, Pereyra 1973).
+Gains are linear, so a fit searches for times and backlash only (variable projection, Golub, Pereyra 1973).
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from identification.simulation.lag import respond, unit_lag, unit_ramp
 from identification.simulation.valve import stem_position
 
 APART = 1.02
-"""Least ratio of two lags: equal ones are the limit of their partial fractions."""
+"""Smallest ratio of two lags: the partial fractions are singular for equal lags."""
 
 
 class Kind(StrEnum):
-    """What a process answers like."""
+    """Type of process response."""
 
     NO_ANSWER = "no answer"
     LAG = "lag"
@@ -31,8 +31,8 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One experiment on a clock of blocks: pv [% PV] as means of blocks and usable, shape (n,); op [% OP] on the
-    record's own clock, shape (n * factor,), and the neighbours' OPs, each of that shape; dt_s of that clock [s]."""
+    """One experiment in blocks: pv [% PV] as means of blocks and usable, shape (n,); op [% OP] on the record's own
+    clock, shape (n * factor,), and the neighbours' OPs, each of that shape; dt_s of that clock [s]."""
 
     pv: Floats
     usable: Mask
@@ -54,12 +54,12 @@ class Trial:
 
     @property
     def duration_s(self) -> float:
-        """Its length [s]."""
+        """Length of the experiment [s]."""
         return self.op.size * self.dt_s
 
 
 def trial_of(record: LoopRecord, factor: int, beside: tuple[Floats, ...] = ()) -> Trial:
-    """A record, in blocks of so many samples, whatever is bad left out; the neighbours' OPs on the record's clock."""
+    """A record in blocks of `factor` samples, without bad samples; the neighbours' OPs on the record's clock."""
     n = len(record) // factor
     good = record.at_work[: n * factor].reshape(n, factor)
     pv = record.pv[: n * factor].reshape(n, factor)
@@ -70,7 +70,7 @@ def trial_of(record: LoopRecord, factor: int, beside: tuple[Floats, ...] = ()) -
 
 
 def stem_of(op: Floats, width: float, slack: float) -> Floats:
-    """The stem behind play of a full width [% OP], of which the first move has to take up `slack` [% OP]."""
+    """The stem behind backlash of full width [% OP], of which the first move must take up `slack` [% OP]."""
     if width <= 0.0:
         return op
     moved = np.flatnonzero(op != op[0])
@@ -79,7 +79,8 @@ def stem_of(op: Floats, width: float, slack: float) -> Floats:
 
 
 def answers(kind: Kind, stem: Floats, trial: Trial, lags_s: tuple[float, ...], dead_s: float) -> list[Floats]:
-    """Columns of a process of unit gain: its answer, and of an inverse response the derivative's; shape (n,) each."""
+    """Columns of a process of unit gain: its response, for an inverse response also the derivative; shape (n,)
+    each."""
     moved, dt, factor = stem - stem[0], trial.dt_s, trial.factor
     if kind is Kind.INTEGRATOR:
         return [respond(moved, unit_ramp(dead_s, dt), factor)]

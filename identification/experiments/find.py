@@ -1,4 +1,4 @@
-"""Where experiments lie in a record: moves of OP by hand, steps of the set point, and warm-ups."""
+"""Location of experiments in a record: manual moves of OP, steps of the set point, and warm-ups."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from identification.record import Floats, LoopRecord, Mask
 from identification.signals.robust import robust_deviation
 
 Places = NDArray[np.intp]
-"""Samples at which something moves."""
+"""Samples at which a signal moves."""
 
 
 class Course(StrEnum):
-    """What an experiment does."""
+    """Type of experiment."""
 
     STEP = "step"
     STEPS = "steps"
@@ -36,8 +36,8 @@ class Course(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
-    """One experiment: its course, the samples it covers, first to last (excluded), its moves, and the range that OP,
-    or SP, goes through [% of span]."""
+    """One experiment: its course, its samples from first to last (excluded), its moves, and the range of OP, or SP,
+    in it [% of span]."""
 
     course: Course
     first: int
@@ -53,15 +53,15 @@ def runs_of(mask: Mask) -> list[tuple[int, int]]:
 
 
 def by_hand(record: LoopRecord, manual: Mask) -> tuple[Experiment, ...]:
-    """Experiments in spans in which nobody but a hand, or a script, moves OP; manual, True there, shape (n,)."""
+    """Experiments in spans in which only an operator or a script moves OP; manual, True there, shape (n,)."""
     found = (_in_span(record, first, last) for first, last in runs_of(manual & record.at_work))
     return tuple(x for x in found if x is not None)
 
 
 def _in_span(record: LoopRecord, first: int, last: int) -> Experiment | None:
-    """The experiment of one span in manual, with as much before and after its moves as they last; None where OP or PV
-    stands still, or a controller moves OP whatever the mode says: it switches wherever PV crosses a level, or moves
-    to and fro at most samples."""
+    """The experiment of one manual span, with margins before and after its moves as long as they last; None where OP
+    or PV is constant, or where a controller moves OP whatever the mode signal: OP switches when PV crosses a level,
+    or moves to and fro at most samples."""
     op, pv = record.op[first:last], record.pv[first:last]
     moves = np.flatnonzero(np.diff(op) != 0.0) + 1
     size = float(np.ptp(op))
@@ -78,13 +78,13 @@ def _in_span(record: LoopRecord, first: int, last: int) -> Experiment | None:
 
 
 def _restless(op: Floats, moves: Places) -> bool:
-    """Whether OP moves up and down at most samples, as neither a hand nor a test does; a ramp moves one way."""
+    """Whether OP moves up and down at most samples, unlike an operator or a test; a ramp moves in one direction."""
     up = float((op[moves] > op[moves - 1]).mean()) if moves.size else 1.0
     return moves.size > EXPERIMENTS.restless * op.size and 0.1 < up < 0.9
 
 
 def switched_by_pv(op: Floats, pv: Floats, moves: Places) -> bool:
-    """Whether OP has two levels and goes up, and down, at one PV each: an on/off controller's switching band."""
+    """Whether OP has two levels and switches up, and down, at one PV each: the hysteresis of an on/off controller."""
     if moves.size < EXPERIMENTS.switches or np.unique(op).size > 2:
         return False
     up = op[moves] > op[moves - 1]
@@ -96,7 +96,7 @@ def switched_by_pv(op: Floats, pv: Floats, moves: Places) -> bool:
 
 
 def _course(op: Floats, moves: Places, large: Places, has_stem: bool) -> Course:
-    """What OP does in an experiment in manual."""
+    """The course of OP in a manual experiment."""
     steps = op[moves] - op[moves - 1]
     if has_stem and float(np.ptp(op)) >= EXPERIMENTS.stroke:
         return Course.STROKE
@@ -112,9 +112,9 @@ def _course(op: Floats, moves: Places, large: Places, has_stem: bool) -> Course:
 
 
 def in_automatic(record: LoopRecord) -> tuple[Experiment, ...]:
-    """Steps of a set point that stands between them, as one experiment, and else a warm-up from the record's start.
+    """Steps of a set point that is constant between them, as one experiment; otherwise a warm-up at the start.
 
-    Neither is found where SP was not recorded.
+    Neither is found if SP was not recorded.
     """
     if record.sp_estimated or not record.usable.any():
         return ()
@@ -130,7 +130,7 @@ def in_automatic(record: LoopRecord) -> tuple[Experiment, ...]:
 
 
 def _setpoint_steps(record: LoopRecord, steps: Places) -> tuple[Experiment, ...]:
-    """All steps of the set point in the run of automatic that has most of them."""
+    """All steps of the set point in the automatic run with the most steps."""
     runs = [(a, b, steps[(steps > a) & (steps < b)]) for a, b in runs_of(record.usable)]
     first, last, inside = max(runs, key=lambda run: run[2].size)
     if last - first < EXPERIMENTS.samples or not inside.size:
@@ -143,7 +143,7 @@ def _setpoint_steps(record: LoopRecord, steps: Places) -> tuple[Experiment, ...]
 
 
 def _warm_up(record: LoopRecord, noise: float) -> tuple[Experiment, ...]:
-    """PV that comes to its set point from far away at the record's start, and stays near it."""
+    """A PV that approaches its set point from far away at the record's start, and stays near it."""
     first, last = max(runs_of(record.usable), key=lambda run: run[1] - run[0])
     error = record.error[first:last]
     if last - first < EXPERIMENTS.samples:

@@ -1,7 +1,7 @@
-"""One experiment fitted over its whole answer: times and play by least squares, gains, bias and drift by projection.
+"""Fit of one experiment over its response: times and backlash by least squares, gains, bias and drift by projection.
 
-Each candidate is judged by its likelihood on noise that wanders (wander.py), and the one with the least Bayesian
-information criterion stands (Schwarz 1978).
+Each candidate is judged by its likelihood under white noise and an autoregressive load (wander.py); the one with the
+least Bayesian information criterion is chosen (Schwarz 1978).
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from identification.simulation.lag import respond, unit_lag
 TIMES = {Kind.NO_ANSWER: 0, Kind.LAG: 1, Kind.TWO_LAGS: 2, Kind.INVERSE: 2, Kind.INTEGRATOR: 0}
 """Lags of each kind."""
 ALIKE = {Kind.LAG: (Kind.TWO_LAGS,), Kind.TWO_LAGS: (Kind.LAG,)}
-"""Kinds that one experiment may not tell apart."""
+"""Kinds that one experiment may not distinguish."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """Which terms a candidate has: its kind, whether PV drifts, begins away from rest, play, and which neighbours
-    (by their places)."""
+    """Terms of a candidate: its kind, whether PV drifts or begins away from rest, backlash, and neighbours (by
+    index)."""
 
     kind: Kind
     drift: bool = False
@@ -37,23 +37,23 @@ class Shape:
 
     @property
     def is_ramp(self) -> bool:
-        """Whether the process integrates; a drift is then OP's balance as well."""
+        """Whether the process integrates; a drift is then also OP's balance."""
         return self.kind is Kind.INTEGRATOR
 
     @property
     def answers(self) -> int:
-        """Columns of the process's answer."""
+        """Columns of the process response."""
         return {Kind.NO_ANSWER: 0, Kind.INVERSE: 2}.get(self.kind, 1)
 
     @property
     def times(self) -> int:
-        """Times that are searched for: lags, dead time, play with its first slack, a neighbour's lag each."""
+        """Number of times searched for: lags, dead time, backlash with its first slack, one lag per neighbour."""
         own = 0 if self.kind is Kind.NO_ANSWER else TIMES[self.kind] + 1
         return own + 2 * self.play + len(self.beside)
 
     @property
     def constants(self) -> int:
-        """All constants, the noise's left out."""
+        """Number of constants without the noise's."""
         return self.times + self.answers + 1 + self.drift + self.start + len(self.beside)
 
 
@@ -61,7 +61,7 @@ class Shape:
 class Fitted:
     """A candidate at its optimum.
 
-    times : logs of lags [s], dead time [s], log of play and slack as a share of it, logs of neighbours' lags;
+    times : logs of lags [s], dead time [s], log backlash width, slack as a share of it, logs of neighbours' lags;
     linear : coefficients of the columns; log_likelihood [nat]; variance of the white noise [% PV squared]; wander of
     the load.
     """
@@ -76,13 +76,13 @@ class Fitted:
 
     @property
     def score(self) -> float:
-        """Log likelihood [nat] less what its constants cost by Akaike, and what its kind is rarer than others."""
+        """Log likelihood [nat] less the Akaike penalty of its constants and the prior penalty of its kind."""
         rare = EXPERIMENTS.rare if self.shape.kind is Kind.INVERSE else 0.0
         return self.log_likelihood - self.shape.constants - rare
 
     @property
     def criterion(self) -> float:
-        """Bayesian information criterion, half of it [nat]: the less the better."""
+        """Half of the Bayesian information criterion [nat]: less is better."""
         return (
             0.5 * self.shape.constants * math.log(max(int(self.trial.usable.sum()), 3)) - self.log_likelihood
         )
@@ -101,17 +101,17 @@ class Fitted:
 
     @property
     def gain(self) -> float:
-        """Gain [% PV/% OP], of an integrator its slope [% PV/(% OP s)]; 0 without an answer."""
+        """Gain [% PV/% OP], of an integrator its slope [% PV/(% OP s)]; 0 without a response."""
         return float(self.linear[0]) if self.shape.answers else 0.0
 
     @property
     def simulated(self) -> Floats:
-        """PV as the model has it [% PV], drift and neighbours included, shape (n,)."""
+        """Simulated PV [% PV], drift and neighbours included, shape (n,)."""
         return columns(self.trial, self.shape, self.times) @ self.linear
 
 
 def columns(trial: Trial, shape: Shape, times: Floats) -> Floats:
-    """The columns that a candidate's PV is made of, shape (n, m)."""
+    """The regression columns of a candidate's PV, shape (n, m)."""
     own = TIMES[shape.kind]
     lags = tuple(np.exp(times[:own]))
     out = []
@@ -129,7 +129,7 @@ def columns(trial: Trial, shape: Shape, times: Floats) -> Floats:
         out.append(one)
     if shape.start:
         begun = np.ones(trial.op.size)
-        begun[0] = 0.0  # OP before the record was another, at which PV was at rest
+        begun[0] = 0.0  # before the record OP had another value, at which PV was at rest
         out.append(answers(shape.kind, begun, trial, ordered, float(times[own]))[0])
     for place, log_lag in zip(shape.beside, times[times.size - len(shape.beside) :], strict=True):
         op = trial.beside[place]
@@ -138,7 +138,7 @@ def columns(trial: Trial, shape: Shape, times: Floats) -> Floats:
 
 
 def projected(trial: Trial, shape: Shape, times: Floats, noise: Wander) -> tuple[Floats, Floats, float]:
-    """What candidates leave of PV made white, shape (n,), the columns' coefficients, and the logs of variances."""
+    """Whitened residuals of PV, shape (n,), the columns' coefficients, and the logs of variances."""
     x = np.column_stack([columns(trial, shape, times), trial.pv])
     white, logs = whitened(np.ascontiguousarray(x), trial.usable, noise.phi, noise.ratio)
     design, y = white[:, :-1], white[:, -1]
@@ -150,7 +150,7 @@ def projected(trial: Trial, shape: Shape, times: Floats, noise: Wander) -> tuple
 
 
 def bounds_of(trial: Trial, shape: Shape) -> tuple[Floats, Floats]:
-    """Least and greatest times, shape (m,) each."""
+    """Lower and upper bounds of the times, shape (m,) each."""
     long, own = trial.duration_s, TIMES[shape.kind]
     short = 0.5 * trial.block_s if own > 1 else 0.1 * trial.dt_s
     low = [math.log(short)] * own
@@ -166,7 +166,7 @@ def bounds_of(trial: Trial, shape: Shape) -> tuple[Floats, Floats]:
 
 
 def descended(trial: Trial, shape: Shape, start: Floats, noise: Wander, late: bool = True) -> Fitted:
-    """A candidate at its optimum from a start, under a noise; late, whether its dead time is searched for too."""
+    """A candidate at its optimum from a start, under a noise model; late: whether its dead time is searched too."""
     low, high = bounds_of(trial, shape)
     times = np.clip(start, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
     free, scale = np.ones(times.size, dtype=bool), np.ones(times.size)
@@ -193,14 +193,14 @@ def descended(trial: Trial, shape: Shape, start: Floats, noise: Wander, late: bo
 
 
 def placed(all_times: Floats, free: Mask, found: Floats) -> Floats:
-    """Times with those that were searched for in their places."""
+    """All times, with the searched ones replaced."""
     out = all_times.copy()
     out[free] = found
     return out
 
 
 def settled(fit: Fitted) -> Fitted:
-    """A fit and its noise brought in line with one another."""
+    """Fit and noise model estimated alternately until they agree."""
     for _ in range(EXPERIMENTS.noise_passes):
         noise = wander_of(fit.trial.pv - fit.simulated, fit.trial.usable)
         again = descended(fit.trial, fit.shape, fit.times, noise)
@@ -211,7 +211,7 @@ def settled(fit: Fitted) -> Fitted:
 
 
 def screened(trial: Trial, noise: Wander) -> list[Floats]:
-    """Times (log lag, dead time) at which a lag with dead time leaves least, each of another scale; best first."""
+    """Times (log lag, dead time) of the lags with dead time of least residual, one per time scale; best first."""
     shape = Shape(Kind.LAG, drift=True)
     lags = np.geomspace(max(trial.block_s, 2e-3 * trial.duration_s), trial.duration_s, EXPERIMENTS.screened)
     found = []
@@ -225,7 +225,7 @@ def screened(trial: Trial, noise: Wander) -> list[Floats]:
 
 
 def starts_of(kind: Kind, lag: Fitted) -> list[Floats]:
-    """Where the search for a kind begins, from the lag with dead time that was found."""
+    """Starts of the search for a kind, from the fitted lag with dead time."""
     log_t, dead = float(lag.times[0]), lag.dead_s
     if kind is Kind.INTEGRATOR:
         return [np.array([dead]), np.array([dead + 0.1 * math.exp(log_t)])]
@@ -235,19 +235,19 @@ def starts_of(kind: Kind, lag: Fitted) -> list[Floats]:
 
 
 def best_of(trial: Trial, shape: Shape, starts: list[Floats], noise: Wander) -> Fitted:
-    """The likeliest of a shape's optima, its noise settled."""
+    """The most likely optimum of a shape, with its noise model."""
     return settled(max((descended(trial, shape, s, noise) for s in starts), key=lambda f: f.log_likelihood))
 
 
 def with_term(fit: Fitted, shape: Shape, more: list[float]) -> Fitted:
-    """A fit of a shape with one term more, from where the fit is."""
+    """A fit of a shape with one more term, started from the given fit."""
     at = fit.times.size - len(fit.shape.beside)
     own = np.insert(fit.times, [at] * len(more), more) if not shape.beside else np.append(fit.times, more)
     return best_of(fit.trial, shape, [own], fit.wander)
 
 
 def candidates(trial: Trial) -> tuple[list[Fitted], Fitted]:
-    """All candidates that answer, the one with the least criterion first, and the best without an answer."""
+    """All candidates with a response, least criterion first, and the best without a response."""
     still = min((_still(trial, drift) for drift in (False, True)), key=lambda f: f.criterion)
     white = Wander()
     tried = (descended(trial, Shape(Kind.LAG, drift=True), s, white) for s in screened(trial, white))
@@ -271,15 +271,15 @@ def _less_drift(fit: Fitted) -> Fitted:
 
 
 def _makes_sense(fit: Fitted) -> bool:
-    """Whether an inverse response begins the other way, for one that leads is none, and no lag is so long that it is
-    an integrator."""
+    """Whether an inverse response really starts in the opposite direction, and no lag is so long that it is an
+    integrator."""
     led = fit.shape.kind is Kind.INVERSE and fit.linear[0] * fit.linear[1] >= 0.0
     return not led and max(fit.lags_s, default=0.0) < EXPERIMENTS.ramp_from * fit.trial.duration_s
 
 
 def _with_more(found: list[Fitted]) -> list[Fitted]:
-    """The best candidates, and the best of each kind that may be taken for theirs, with more: a start away from rest,
-    play where OP reverses, and of neighbours what lowers the criterion."""
+    """The best candidates, and the best of each kind that may be confused with theirs, with more terms: a start away
+    from rest, backlash where OP reverses, and neighbours that lower the criterion."""
     best, more = found[0], []
     alike = {f.shape.kind: f for f in reversed(found) if f.shape.kind in ALIKE.get(best.shape.kind, ())}
     bases = [best, *(f for f in alike.values() if f is not best)]
@@ -303,6 +303,6 @@ def _with_more(found: list[Fitted]) -> list[Fitted]:
 
 
 def tells_play(op: Floats) -> bool:
-    """Whether OP moves both ways and three times at least: one move more than play and gain are unknown."""
+    """Whether OP moves in both directions and at least three times: gain and backlash alone need two moves."""
     moves = np.diff(op)
     return bool((moves > 0).any() and (moves < 0).any() and np.count_nonzero(moves) >= 3)

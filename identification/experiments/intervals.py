@@ -1,4 +1,4 @@
-"""How well an experiment tells its constants: 90 % intervals from the curvature at the optimum."""
+"""Uncertainty of an experiment's constants: 90 % intervals from the curvature at the optimum."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from identification.models import Estimate
 from identification.record import Floats
 
 NUDGE = 1e-4
-"""Step of a numerical derivative, in logs, or in terms of the shortest time."""
+"""Step of a numerical derivative, in logs, or relative to the shortest time."""
 
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """Deviations of log gain, log of the sum of lags, and dead time [s], each of an integrator's too, whose lags are
-    none; covariance, of all constants: times, then coefficients, shape (m, m)."""
+    """Standard deviations of log gain, log of the sum of lags, and dead time [s]; an integrator has no lags.
+    covariance : of all constants, times first, then coefficients, shape (m, m)."""
 
     log_gain: float
     log_lags: float
@@ -59,7 +59,7 @@ def covariance_of(fit: Fitted) -> Floats:
 
 
 def spread_of(fit: Fitted) -> Spread:
-    """How far the constants may be off."""
+    """Standard deviations of the constants."""
     cov = covariance_of(fit)
     own, first = TIMES[fit.shape.kind], fit.times.size
     lags = np.exp(fit.times[:own])
@@ -71,7 +71,7 @@ def spread_of(fit: Fitted) -> Spread:
 
 
 def weights_of(found: Sequence[Fitted]) -> Floats:
-    """What each candidate counts, shape (m,), by Akaike weights (Burnham, Anderson 2002, section 2.9)."""
+    """Weight of each candidate, shape (m,), by Akaike weights (Burnham, Anderson 2002, section 2.9)."""
     score = np.array([f.score for f in found])
     weight = np.exp(score - score.max())
     return np.asarray(weight / weight.sum())
@@ -79,8 +79,8 @@ def weights_of(found: Sequence[Fitted]) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Averaged:
-    """Gain (of an integrator slope), sum of lags [s] and dead time [s] over all candidates of a family, and their
-    deviations: of each candidate, and between candidates. Log gain and log lags are averaged."""
+    """Gain (of an integrator slope), sum of lags [s] and dead time [s] averaged over all candidates of a family, and
+    their deviations, within and between candidates. Log gain and log lags are averaged."""
 
     gain: float
     lags_s: float
@@ -89,15 +89,15 @@ class Averaged:
 
 
 def _counts(f: Fitted, best: Fitted) -> bool:
-    """Whether a candidate counts beside the best: of its family and sign; the zero of an inverse response goes with
-    any dead time where there is none."""
+    """Whether a candidate is averaged with the best: same family and sign, and no inverse response, whose zero can
+    replace dead time."""
     same = f.shape.is_ramp == best.shape.is_ramp and f.gain * best.gain > 0.0
     return same and f.shape.kind is not Kind.INVERSE
 
 
 def along_dead_time(fit: Fitted, step_s: float) -> list[Fitted]:
-    """A candidate with its other constants at their optimum at each of a row of dead times, as far as these are
-    likely: what a second lag, or play, does late goes with dead time, and far beyond the curvature at one optimum."""
+    """A candidate refitted at a series of dead times, as far as these are likely: a second lag, or backlash, can
+    replace dead time far beyond the curvature at one optimum."""
     own, out = TIMES[fit.shape.kind], [fit]
     most = 0.5 * fit.trial.duration_s
     for way in (-1.0, 1.0):
@@ -115,11 +115,11 @@ def along_dead_time(fit: Fitted, step_s: float) -> list[Fitted]:
 
 
 def averaged(found: Sequence[Fitted], closed: bool = False) -> Averaged:
-    """The constants of a best candidate and of all others of its family, best first: a lag cannot always be told from
-    two, nor drift from none, and an interval has to hold whichever it is.
+    """The constants averaged over a best candidate and all others of its family, best first: one lag cannot always be
+    distinguished from two, nor drift from none, and an interval must cover both.
 
-    Each is taken along its dead times; not those of an experiment in automatic (closed), whose constants a fit to the
-    noise that they leave would move.
+    Each is refitted along its dead times, except those of an experiment in automatic (closed): a fit to their
+    residual noise would move the constants.
     """
     best = found[0]
     tried = [(f, spread_of(f)) for f in found if f is best or _counts(f, best)]
@@ -137,7 +137,7 @@ def averaged(found: Sequence[Fitted], closed: bool = False) -> Averaged:
 def _mixture(told: Sequence[tuple[Fitted, Spread]], closed: bool) -> tuple[Floats, Floats, Floats]:
     """Weights, shape (m,), log gains, log sums of lags and dead times [s], shape (m, 3), and their deviations."""
     rows, inner, weight = [], [], []
-    # OP was moved at any time between two samples, and a record shows it at the second
+    # OP moved at an unknown time between two samples, and the record shows the move at the second
     unseen_s = told[0][0].trial.dt_s
     for share, (f, s) in zip(weights_of([f for f, _ in told]), told, strict=True):
         if share < EXPERIMENTS.counts:
@@ -156,9 +156,9 @@ def _mixture(told: Sequence[tuple[Fitted, Spread]], closed: bool) -> tuple[Float
 
 
 def ninety(weight: Floats, at: Floats, wide: Floats) -> Estimate:
-    """Median [s] and 90 % interval, 0 at least, of a mixture of normal densities; shape (m,) each.
+    """Median [s] and 90 % interval, at least 0, of a mixture of normal densities; shape (m,) each.
 
-    Where a lag and two lags are as likely, the mean of their dead times is neither's.
+    If one lag and two lags are equally likely, the mean of their dead times fits neither.
     """
     grid = np.linspace(min(float((at - 3.0 * wide).min()), 0.0), float((at + 3.0 * wide).max()), 1000)
     below = ndtr((grid[:, None] - at) / wide) @ weight
@@ -167,14 +167,14 @@ def ninety(weight: Floats, at: Floats, wide: Floats) -> Estimate:
 
 
 def _factor(value: float, log_deviation: float, unit: str) -> Estimate:
-    """A number with an interval in terms of itself."""
+    """A number with a relative interval."""
     factor = math.exp(min(NINETY * log_deviation, 20.0))
     low, high = sorted((value / factor, value * factor))
     return Estimate(value, low, high, unit)
 
 
 def estimates_of(found: Sequence[Fitted], mean: Averaged) -> dict[str, Estimate]:
-    """The constants with 90 % intervals, by the names of the ranking's columns; of candidates, the best first."""
+    """The constants with 90 % intervals, by the names of the ranking's columns; candidates sorted best first."""
     best, wide = found[0], mean.spread
     ramp = best.shape.is_ramp
     out = {}
@@ -189,7 +189,7 @@ def estimates_of(found: Sequence[Fitted], mean: Averaged) -> dict[str, Estimate]
 
 
 def _lags(fit: Fitted, spread: Spread) -> dict[str, Estimate]:
-    """The lags of a candidate by themselves, the longest first."""
+    """The individual lags of a candidate, the longest first."""
     out = {}
     order = np.argsort(-fit.times[: TIMES[fit.shape.kind]])
     for name, at in zip(("time_constant_s", "second_lag_s"), order, strict=False):
@@ -199,7 +199,7 @@ def _lags(fit: Fitted, spread: Spread) -> dict[str, Estimate]:
 
 
 def _rest(fit: Fitted, spread: Spread) -> dict[str, Estimate]:
-    """Play, inverse response, drift and neighbours' gains, as far as the candidate has them."""
+    """Backlash, inverse response, drift and neighbours' gains, if the candidate has them."""
     out, shape, first = {}, fit.shape, fit.times.size
     deviation = np.sqrt(np.maximum(np.diag(spread.covariance), 0.0))
     at = first + shape.answers + 1
@@ -210,7 +210,7 @@ def _rest(fit: Fitted, spread: Spread) -> dict[str, Estimate]:
     if shape.play:
         place = TIMES[shape.kind] + 1
         out["backlash_pct"] = _factor(math.exp(fit.times[place]), deviation[place], "% of OP")
-    if shape.drift:  # of an integrator it is OP's balance
+    if shape.drift:  # for an integrator it is OP's balance
         per_h = 2.0 * 3600.0 / fit.trial.duration_s
         value, half = per_h * fit.linear[at - first], per_h * NINETY * deviation[at]
         out["drift_pct_per_h"] = Estimate(float(value), float(value - half), float(value + half), "%/h")

@@ -1,4 +1,4 @@
-"""From an experiment to a model, and from several to one: constants with intervals, and what each counts."""
+"""Model of an experiment, and of several combined: constants with intervals, and weights."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from identification.signals.lone import lone_values, without_lone
 
 @dataclass(frozen=True, slots=True)
 class Modelled:
-    """What one experiment tells.
+    """The model of one experiment.
 
-    experiment; kind of answer; estimates, by name with 90 % intervals; mean, the constants over all candidates;
-    nat, what OP brings to the likelihood [nat]; explained, share of PV's motion [-]; time_s, pv, simulated [% PV] and
-    op [% OP] in blocks, shape (n,), from the record's start; lone_pv, lone_op, times of single values left out [s];
-    tells_play, whether OP moved so that play would be seen.
+    experiment; kind of response; estimates, by name with 90 % intervals; mean, the constants averaged over all
+    candidates; nat, gain in log likelihood from OP [nat]; explained, share of PV's motion [-]; time_s, pv, simulated
+    [% PV] and op [% OP] in blocks, shape (n,), from the record's start; lone_pv, lone_op, times of single values left
+    out [s]; tells_play, whether the OP moves make backlash identifiable.
     """
 
     experiment: Experiment
@@ -47,12 +47,12 @@ class Modelled:
 
     @property
     def process(self) -> Process:
-        """The process that settings are sought for; of two lags by the half rule (Skogestad 2003, eq. 10)."""
+        """The process for tuning; two lags are reduced by the half rule (Skogestad 2003, eq. 10)."""
         return process_of(self.kind, self.estimates)
 
 
 def process_of(kind: Kind, e: Mapping[str, Estimate]) -> Process:
-    """A process of one lag with dead time, or an integrator, of an experiment's constants."""
+    """A process of one lag with dead time, or an integrator, from an experiment's constants."""
     dead_s = e["dead_time_s"].value
     if kind is Kind.INTEGRATOR:
         return Integrator(e["slope_pct_per_s"].value, dead_s)
@@ -63,8 +63,7 @@ def process_of(kind: Kind, e: Mapping[str, Estimate]) -> Process:
 
 
 def lone_in(record: LoopRecord) -> tuple[Mask, Mask]:
-    """Where single values of PV stand alone, and single ones of an OP that stands at one value before and after;
-    shape (n,) each."""
+    """Isolated single values of PV, and of an OP that is otherwise constant before and after; shape (n,) each."""
     factor, stands = EXPERIMENTS.lone, EXPERIMENTS.stands
     pv = lone_values(record.pv, record.at_work, factor, EXPERIMENTS.lone_share)
     op = lone_values(record.op, record.at_work, factor, EXPERIMENTS.least_part)
@@ -77,7 +76,7 @@ def lone_in(record: LoopRecord) -> tuple[Mask, Mask]:
 def modelled(record: LoopRecord, x: Experiment, beside: Sequence[Floats] = ()) -> Modelled:
     """The model of one experiment of a record; beside, OPs of neighbours on the record's clock, shape (n,) each.
 
-    Raises NotAssessedError where PV does not answer OP, or the gain may be of either sign.
+    Raises NotAssessedError where PV does not respond to OP, or the sign of the gain is uncertain.
     """
     part = record.span(x.first, x.last)
     lone_pv, lone_op = lone_in(part)
@@ -107,7 +106,7 @@ def modelled(record: LoopRecord, x: Experiment, beside: Sequence[Floats] = ()) -
 
 
 def _candidates(part: LoopRecord, x: Experiment, others: tuple[Floats, ...]) -> tuple[list[Fitted], float]:
-    """Candidates, best first, and what OP brings [nat]; in finer blocks where the answer is fast for the first."""
+    """Candidates, best first, and OP's gain [nat]; with finer blocks if the response is too fast for the first."""
     factor = max(len(part) // EXPERIMENTS.blocks, 1)
     for _ in range(2):
         found, nat = _in_blocks(part, x, factor, others)
@@ -139,7 +138,7 @@ def _in_blocks(
 
 @dataclass(frozen=True, slots=True)
 class Pooled:
-    """Several experiments as one: kind and estimates, the weight of each [-], and those that agree in kind."""
+    """Several experiments combined: kind and estimates, the weight of each [-], and those with the same kind."""
 
     kind: Kind
     estimates: Mapping[str, Estimate]
@@ -148,13 +147,13 @@ class Pooled:
 
     @property
     def process(self) -> Process:
-        """The process that settings are sought for."""
+        """The process for tuning."""
         return process_of(self.kind, self.estimates)
 
 
 def pooled(found: Sequence[Modelled]) -> Pooled:
-    """One model of several experiments, each by what it tells, with what they differ by more than that
-    (DerSimonian, Laird 1986). Found, one at least; those of another family or sign than the surest are left out."""
+    """One model of several experiments, weighted by their precision and the variance between them (DerSimonian, Laird
+    1986). found : at least one; experiments of another family or sign than the most certain one are left out."""
     surest = min(found, key=lambda m: m.mean.spread.log_gain)
     ramp = surest.kind is Kind.INTEGRATOR
     used = [m for m in found if (m.kind is Kind.INTEGRATOR) == ramp and m.mean.gain * surest.mean.gain > 0.0]
@@ -181,7 +180,7 @@ def _around_log(old: Estimate, sign: float, mean: float, deviation: float) -> Es
 
 
 def together(found: Sequence[tuple[float, float]]) -> tuple[float, float, Floats]:
-    """Mean of numbers with their deviations, its deviation, and the weights, shape (m,), which sum to 1."""
+    """Weighted mean of numbers with their deviations, its deviation, and the weights, shape (m,), which sum to 1."""
     value, wide = (np.array(x) for x in zip(*found, strict=True))
     inverse = wide**-2.0
     mean = float(inverse @ value / inverse.sum())

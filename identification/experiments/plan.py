@@ -1,4 +1,4 @@
-"""The step test that settles what is unknown of a loop: how large, how long, and which way."""
+"""Design of the step test that identifies a loop: step size, hold time, and direction."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from identification.record import Floats, LoopRecord
 from identification.signals.robust import robust_deviation
 
 MOVES = (1.0, 1.0, -1.0, -1.0)
-"""Moves of a test, in steps: the second tells the gain without play, the third the play, the fourth the way back."""
+"""Moves of a test, in steps: the second identifies the gain free of backlash, the third backlash; the last
+returns."""
 RAMPS = (1.0, -1.0, -1.0, 1.0)
-"""The same where PV integrates: back to OP's balance after each."""
+"""The same for an integrating PV: back to OP's balance after each."""
 
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """What is known of a loop before a test: gain [% PV/% OP], of an integrator PV's way over the
-    lag, None where it is not; lag and dead time [s]; width of
-    backlash or stickband [% OP], 0 where none is known; integrating, whether PV runs away while OP stands off its
-    balance; source, where that comes from."""
+    """Knowledge of a loop before a test: gain [% PV/% OP], for an integrator PV's move per lag, None if unknown; lag
+    and dead time [s]; width of backlash or stickband [% OP], 0 if unknown; integrating, whether PV ramps while OP is
+    off its balance; source of the values."""
 
     gain: float | None
     lag_s: float
@@ -35,10 +35,10 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A test: the size of a step [% OP], its levels in turn [% OP], how long each is held [s], noise from sample to
-    sample and between the means of two holds [% PV], PV's answer to a step [% PV], None where the gain is not known,
-    half-widths of the 90 % intervals that it should leave of gain and play, each in terms of itself, None likewise,
-    and whether OP's range, not noise, sets the size."""
+    """A test: step size [% OP], successive levels [% OP], hold time of each [s], noise from sample to sample and
+    between the means of two holds [% PV], PV response to a step [% PV], None if the gain is unknown, relative
+    half-widths of the 90 % intervals of gain and backlash expected afterwards, None likewise, and whether OP's range,
+    not noise, determines the size."""
 
     step_pct: float
     levels_pct: tuple[float, ...]
@@ -52,12 +52,12 @@ class Plan:
 
     @property
     def duration_s(self) -> float:
-        """The whole test [s], the hold before its first move included."""
+        """Duration of the test [s], including the hold before its first move."""
         return (len(self.levels_pct)) * self.hold_s
 
 
 def wander_between(pv: Floats, block: int) -> float:
-    """Deviation [% PV] between the means of neighbouring blocks of so many samples, over the square root of two."""
+    """Deviation [% PV] between means of neighbouring blocks of `block` samples, over the square root of two."""
     n = pv.size // block
     if n < 4:
         return robust_deviation(pv - np.median(pv)) if pv.size else 0.0

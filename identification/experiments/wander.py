@@ -1,7 +1,7 @@
-"""Noise of an experiment: white noise of the measurement on a load that wanders.
+"""Noise of an experiment: white measurement noise plus a slowly wandering load.
 
 The load is a first-order autoregression, d[k+1] = phi d[k] + w[k], the measurement adds white noise e[k]. The Kalman
-filter of this scalar model (Harvey 1989, section 3.4) makes any column white; its gain does not depend on the data.
+filter of this scalar model (Harvey 1989, section 3.4) whitens any column; its gain does not depend on the data.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from identification.limits import EXPERIMENTS
 from identification.record import Floats, Mask
 
 RATIOS = tuple(float(x) for x in np.geomspace(1e-6, 30.0, 13))
-"""Variances of w in terms of that of e that are tried [-]."""
+"""Candidate variances of w relative to that of e [-]."""
 MEMORIES = (3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 10000.0)
-"""Memories of the load that are tried [blocks]."""
+"""Candidate memories of the load [blocks]."""
 
 
 class Wander(NamedTuple):
@@ -30,9 +30,9 @@ class Wander(NamedTuple):
 
 @njit(cache=True)
 def whitened(x: Floats, usable: Mask, phi: float, ratio: float) -> tuple[Floats, float]:
-    """Columns made white, shape (n, m), 0 where a sample is not usable; and the sum of innovations' log variances.
+    """Whitened columns, shape (n, m), 0 where a sample is not usable; and the sum of innovations' log variances.
 
-    The variances are in terms of the white noise's. The load begins at its stationary variance.
+    The variances are relative to that of the white noise. The load begins at its stationary variance.
     """
     n, m = x.shape
     out = np.zeros((n, m))
@@ -56,12 +56,12 @@ def whitened(x: Floats, usable: Mask, phi: float, ratio: float) -> tuple[Floats,
 
 
 def log_likelihood(squares: float, logs: float, count: int) -> float:
-    """Log likelihood [nat] with the white noise's variance at its optimum, constants left out."""
+    """Log likelihood [nat] with the white noise's variance at its optimum, without constants."""
     return -0.5 * count * math.log(max(squares, 1e-300) / count) - 0.5 * logs
 
 
 def wander_of(residual: Floats, usable: Mask) -> Wander:
-    """The likeliest wander of residuals, shape (n,): a grid, then a finer one about its best."""
+    """The most likely wander of residuals, shape (n,): a grid, then a finer one about the best point."""
     column, count = residual[:, None], int(usable.sum())
 
     def value(phi: float, ratio: float) -> float:

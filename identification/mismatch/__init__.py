@@ -1,1 +1,1 @@
-"""Where a plain loop and its recording differ: the catalogue of left-out physics, fitted, compared, named."""
+"""Differences between a baseline model and a recording: a catalogue of effects, fitted, compared and named."""

@@ -1,4 +1,4 @@
-"""The answer in numbers: effects with parameters and intervals, where, fit before and after, what moved."""
+"""The answer in numbers: effects with parameters and intervals, location, fit before and after, moved constants."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from identification.record import Floats
 from identification.simulation.parameters import Slot, Variant
 
 INTEGRATING = ("level",)
-"""Loop types that need not settle, of which a short record still tells the slope."""
+"""Loop types that need not settle; a short record still determines their slope."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +40,10 @@ class EffectFound:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What `triage explain` says of one loop, in numbers.
+    """The result of `triage explain` for one loop, in numbers.
 
-    note : why there is no name; caution : what the recording lacks although there is one; shown : what shows the
-    first effect beside the fit; outside : what explains it best and has no name that could be the verdict.
+    note : why there is no name; caution : what the recording does not determine although there is a name; shown :
+    what supports the first effect besides the fit; outside : the best explanation whose name cannot be the verdict.
     """
 
     verdict: str
@@ -92,7 +92,7 @@ def answer(found: Explanation, s: Recording) -> Answer:
 def verdict_of(
     found: Explanation, effects: tuple[EffectFound, ...], lacking: str, insensitive: bool, at: Located
 ) -> tuple[str, str]:
-    """The verdict and its block; what is left over, and what a record cannot tell, has no name."""
+    """The verdict and its block; a residual, or what the record cannot determine, has no name."""
     if found.refuted and not found.accepted and is_by_fit(found):
         return "unexplained", "none"
     if (found.left > 0 or is_stack(found)) and is_by_fit(found):
@@ -106,31 +106,31 @@ def verdict_of(
 
 
 def is_by_fit(found: Explanation) -> bool:
-    """Whether the answer rests on fits alone: recorder, controller and the loop's cycles have answers of their own,
-    which nothing left over takes away."""
+    """Whether the answer depends on fits alone. Recorder, controller and the loop's cycles give answers of their own,
+    which a residual does not cancel."""
     return found.recorder is None and found.controller is None and not by_cycles(found)
 
 
 def brings(p: Problem, fit: Fitted) -> float:
-    """Log likelihood [nat] that OP brings to a fit: over the same with no gain, its mean and start as recorded."""
+    """Log likelihood [nat] that OP adds to a fit, over the same with zero gain, its mean and start as recorded."""
     c = fit.model.c.copy()
     c[Slot.K], c[Slot.BIAS], c[Slot.START] = 0.0, float(np.mean(p.y)), float(p.y[0])
     return nats(fit.count, residual_fit(p, replace(fit.model, c=c)).loss, fit.loss)
 
 
 def unanswered(found: Explanation) -> str:
-    """What is needed where PV does not answer OP; empty where it does.
+    """Requirement where PV does not respond to OP; empty where it does.
 
-    Innovations tell, in an experiment too: a load that wanders leaves few errors that count by themselves.
+    Innovations decide, in an experiment too: a wandering load leaves few independent simulation errors.
     """
     found = found.by_innovations or found
-    loaded = any(row.block == Block.LOAD for row in found.best.model.added)  # counted in terms of the gain
+    loaded = any(row.block == Block.LOAD for row in found.best.model.added)  # counted relative to the gain
     moves = brings(found.p, found.plain if loaded else found.best)
     return "" if moves >= found.p.limits.proof.answers else words.TOLD["insensitive"]
 
 
 def too_short(found: Explanation, s: Recording) -> str:
-    """What is needed where the record is short against the time constant; empty where it is not."""
+    """Requirement where the record is short compared with the time constant; empty where it is not."""
     enough = found.p.limits.proof.time_constants
     lag, length = float(found.plain.model.c[Slot.T]), s.pv.size * s.dt_s
     if s.kind in INTEGRATING or any(v.replaces for v in found.best.model.added):
@@ -139,17 +139,17 @@ def too_short(found: Explanation, s: Recording) -> str:
 
 
 def open_gain_note(found: Explanation, effects: tuple[EffectFound, ...]) -> str:
-    """What an experiment does not tell of a supply whose flow at rest may be anything; empty of any other."""
+    """What an experiment cannot determine of a supply whose flow at rest is free; empty for others."""
     at_rest = next((e.parameters[AT_REST.name] for e in effects if AT_REST.name in e.parameters), None)
     open_ended = at_rest is not None and at_rest.low < 0.0 < at_rest.high
     return words.TOLD["wanders"] if open_ended and found.p.by_simulation else ""
 
 
 def effects_of(found: Explanation, s: Recording) -> tuple[EffectFound, ...]:
-    """Every effect found, the likeliest first: what is larger than a grid before the grid.
+    """All effects found, most likely first; those larger than the grid precede the grid.
 
-    A valve that the loop's cycles show has its figures from them, as the night tells them: one estimate and one
-    interval. A simulation with one friction over hours knows them less well, and takes them for surer.
+    A valve identified from the loop's cycles keeps the figures of the cycle analysis in the batch run: one estimate
+    and one interval. A simulation with constant friction over hours is less accurate, with too small intervals.
     """
     gates = [
         EffectFound(f.name, own.block, own.numbers(f, s), None)
@@ -188,29 +188,30 @@ SIZES = (
     *("coupling_gain", "gain_drift", "gain_slope", "curve", "opposing_share", "flow_share", "slow_share"),
     *("amplitude_pct", "size_1_pct"),
 )
-"""Parameters that are the size of an effect: at zero there is none."""
+"""Parameters that give the size of an effect: at zero there is no effect."""
 
 
 def holds_zero(p: Problem, fit: Fitted, row: Variant) -> bool:
-    """Whether the interval of an effect's size holds zero, so that nothing shows that there is one."""
+    """Whether the interval of an effect's size includes zero, so that there is no evidence of the effect."""
     found = parameters_of(p, fit, row)
     return any(found[name].low < 0.0 < found[name].high for name in SIZES if name in found)
 
 
 def alternatives(found: Explanation) -> tuple[str, ...]:
-    """Names that the data cannot tell from the first effect: as good, or of the same mark by their nature."""
+    """Names that the data cannot distinguish from the first effect: as likely, or indistinguishable in principle."""
     if not found.accepted:
         return ()
     winner = found.accepted[0]
     least = max(winner.penalised - found.p.limits.search.tie, 0.0)
-    beside_none = len(winner.fit.names) == 1  # else its gain is not over the plain loop, as theirs are
+    beside_none = len(winner.fit.names) == 1  # else its gain is not over the baseline model
     close = [c.name for c in found.first if beside_none and c.penalised > least]
     names = dict.fromkeys((*close, *EFFECTS[winner.name].indistinguishable))
     return tuple(n for n in names if n not in found.best.names)
 
 
 def plain_loops(found: Explanation) -> dict[str, dict[str, float]]:
-    """The plain loop that simulates best and the one that foretells best one step ahead, where they differ widely."""
+    """The baseline models with the best simulation and with the best one-step-ahead prediction, if they differ
+    widely."""
     drawn, ahead, most = found.proven.drawn[0], found.plain.model.c, found.p.limits.proof.optima_apart
     ratios = [abs(drawn[slot]) / max(abs(ahead[slot]), 1e-12) for slot in (Slot.K, Slot.T)]
     if drawn[Slot.K] * ahead[Slot.K] > 0.0 and all(1.0 / most <= ratio <= most for ratio in ratios):
@@ -219,10 +220,10 @@ def plain_loops(found: Explanation) -> dict[str, dict[str, float]]:
 
 
 def fit_of(found: Explanation, dt_s: float) -> dict[str, Any]:
-    """Misfit before and after, fitted and held out, and held out in the loop's own band, None where none is known.
+    """Misfit before and after, fitted and held out, and held out in the loop's band, None where no band is known.
 
-    horizon_s, over which simulations run, None: all; ahead_nat, what effects gain on held-out data that innovations
-    show and no smaller misfit, None of any other.
+    horizon_s : length of the simulations, None: all; ahead_nat : gain of the effects on held-out data if innovations
+    show it and the simulation misfit does not fall, otherwise None.
     """
     proof = found.proven
     ahead = found.accepted and proof.share_in_band <= 0.0 and proof.seen_ahead
@@ -239,7 +240,7 @@ def fit_of(found: Explanation, dt_s: float) -> dict[str, Any]:
 
 
 def in_band_of(proof: HeldOut) -> dict[str, Any] | None:
-    """Misfits on held-out data in the loop's own band, and its shortest and longest period [s]."""
+    """Misfits on held-out data in the loop's band, and its shortest and longest period [s]."""
     if proof.band is None or proof.banded is None:
         return None
     shortest, longest = proof.band
@@ -248,7 +249,7 @@ def in_band_of(proof: HeldOut) -> dict[str, Any] | None:
 
 
 def constants_moved(found: Explanation) -> dict[str, tuple[float, float]]:
-    """The plain loop's constants before and after, where effects were added."""
+    """Constants of the baseline model before and after, where effects were added."""
     if not found.accepted:
         return {}
     before, after = restored(found.plain.model.c), restored(found.best.model.c)
@@ -256,5 +257,5 @@ def constants_moved(found: Explanation) -> dict[str, tuple[float, float]]:
 
 
 def restored(c: Floats) -> dict[str, float]:
-    """The plain loop's constants of a model, shape (SIZE,): gain, time constant [s], dead time [s]."""
+    """Baseline constants of a model, shape (SIZE,): gain, time constant [s], dead time [s]."""
     return {"gain": float(c[Slot.K]), "time_constant_s": float(c[Slot.T]), "dead_time_s": float(c[Slot.L])}

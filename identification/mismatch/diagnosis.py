@@ -1,8 +1,9 @@
-"""From one recording to its explanation: recorder, controller, plain loop, then effects one by one until none passes.
+"""Explanation of one recording: recorder, controller, baseline model, then effects added one by one until none
+passes.
 
-Effects are then looked at again as a set, and what explains the recording beyond them is owned up to.
+The effects are then tested again as a set; an unexplained residual is reported.
 
-Read on in the order of the walk: recording, the faults of catalogue/, plain_loop, selection (with starts and
+Read on in the order of the analysis: recording, the faults of catalogue/, plain_loop, selection (with starts and
 friction), proof, explanation; then answer, with where and location, and words.
 """
 
@@ -50,10 +51,10 @@ from identification.simulation.parameters import Slot
 
 
 def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None) -> Explanation:
-    """Explain where a plain loop and a recording differ.
+    """Explain the difference between a baseline model and a recording.
 
-    tell : is told what is tried, for progress; brought : constants of the user's own model, shape (SIZE,), with which
-    the plain loop's search begins beside its own starts.
+    tell : called with each step, to show progress; brought : constants of the user's own model, shape (SIZE,), an
+    additional start for the baseline fit.
     """
     held = unlogged(s.stamp_s, s.pv.size, s.dt_s, s.limits.recorder)
     s = replace(s, usable=s.usable & ~held)
@@ -88,7 +89,7 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
 
 
 def shown(found: Explanation) -> Explanation:
-    """The explanation without effects of whose size the interval holds zero: nothing shows that there is one."""
+    """The explanation without effects whose size interval includes zero: there is no evidence of them."""
     kept = int(by_cycles(found))
     rows = zip(found.accepted[kept:], found.best.model.added[kept:], strict=True)
     void = [c for c, row in rows if holds_zero(found.p, found.best, row)]
@@ -96,14 +97,14 @@ def shown(found: Explanation) -> Explanation:
 
 
 def recorder_finding_of(s: Recording) -> Finding | None:
-    """The first thing that the recorder did to the trends."""
+    """The first recorder finding in the trends."""
     found = ((effect.name, effect.find(s)) for effect in RECORDER_FAULTS if effect.find is not None)
     return next((replace(finding, name=name) for name, finding in found if finding is not None), None)
 
 
 def controller_finding_of(s: Recording, recorder: Finding | None) -> tuple[Finding | None, ControlLaw | None]:
-    """What clock and controller did, where there is a controller to judge and a recording fit for it, and the law
-    that gives OP, stated or not."""
+    """Findings about clock and controller, if there is a controller and the recording allows a check, and the control
+    law that reproduces OP, stated or not."""
     if s.sp is None or ends(recorder) is Ends.ALL:
         return None, None
     recorder_limits, limits = s.limits.recorder, s.limits.controller
@@ -117,7 +118,7 @@ def controller_finding_of(s: Recording, recorder: Finding | None) -> tuple[Findi
 
 
 def transmitter_end(recorder: Finding | None, pv: Floats) -> Clip | None:
-    """Where a transmitter's range ends, if it does."""
+    """End of the transmitter's range, if it clips."""
     if recorder is None or not fault(recorder.name).censors:
         return None
     (value,) = recorder.values.values()
@@ -126,7 +127,7 @@ def transmitter_end(recorder: Finding | None, pv: Floats) -> Clip | None:
 
 
 def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
-    """The explanation with the effects of the catalogue that pass, and the gain [nat] of what is left beyond them."""
+    """Add the effects of the catalogue that pass, and the gain [nat] of what remains beyond them."""
     p, best = integrating_or_first_order(found.p, found.plain, s)
     found, last = one_by_one(replace(found, p=p, plain=best, best=best), tell, s)
     if len(found.accepted) > 1:
@@ -136,11 +137,11 @@ def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
 
 
 def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explanation, list[Candidate]]:
-    """Effects added as long as one passes, first a valve that the cycles show, and the last round's candidates.
+    """Effects added while one passes, first a valve identified from the cycles, and the candidates of the last round.
 
-    Physics of no name, which goes with PV as recorded, competes neither in a loop that cycles, where PV of any while
-    ago tells PV, whatever makes it cycle, nor in an experiment, which is judged by its simulation: what is fed with
-    recorded PV is none.
+    An effect without a name, which uses recorded PV, is excluded in a loop that cycles, because delayed PV predicts
+    PV whatever causes the cycle, and in an experiment, because it is judged by simulation, and a model with recorded
+    PV as input is no simulation.
     """
     limits, candidates = found.p.limits.search, list[Candidate]()
     has_rivals = s.cycles is None and not s.free_valve and not is_experiment(s)
@@ -162,8 +163,8 @@ def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explan
 
 
 def chosen(x: Round, found: Explanation, candidates: list[Candidate]) -> Candidate | None:
-    """What is taken of a round's candidates; physics of no name, which is handed PV as recorded, only where it does
-    far better than what is taken so far, and than what has a name."""
+    """The accepted candidate of a round. An effect without a name, which uses recorded PV, is accepted only if it is
+    far better than the effects so far and than every named effect."""
     winner = None if found.accepted else shown_by_cycles(x.s, candidates)
     winner = winner or proven(x, candidates)
     if winner is None or winner.name not in OUTSIDE:
@@ -176,7 +177,7 @@ def chosen(x: Round, found: Explanation, candidates: list[Candidate]) -> Candida
 
 
 def with_cycles(x: Round, seen: SeenInCycles, candidates: list[Candidate]) -> list[Candidate]:
-    """The candidates and those begun where the cycles show a valve, best first; of each name the better."""
+    """The candidates, and those started from the valve that the cycles show, best first; of each name the better."""
     begun = [penalised(x, fit) for fit in from_cycles(x, seen, CANDIDATES)]
     best: dict[tuple[str, str], Candidate] = {}
     for c in sorted([*candidates, *begun], key=lambda c: -c.penalised):
@@ -185,10 +186,10 @@ def with_cycles(x: Round, seen: SeenInCycles, candidates: list[Candidate]) -> li
 
 
 def shown_by_cycles(s: Recording, candidates: Sequence[Candidate]) -> Candidate | None:
-    """The best play or stick-slip, where the loop's cycles show a faulty valve; None where they do not.
+    """The best backlash or stick-slip if the loop's cycles show a faulty valve; otherwise None.
 
-    The kind that the night tells is kept, and its figures where there are some of that form: it asks each stretch by
-    itself, and weighs what one friction over hours does not, as a slip now and then late.
+    Its kind is that of the batch run, and so are its figures where they exist. The batch run tests each stretch
+    separately and allows for slip-to-slip scatter, which constant friction over hours does not.
     """
     if s.cycles is None:
         return None
@@ -200,10 +201,10 @@ def shown_by_cycles(s: Recording, candidates: Sequence[Candidate]) -> Candidate 
 
 
 def proven(x: Round, candidates: list[Candidate]) -> Candidate | None:
-    """The best candidate with a gain left after its penalty that passes the proof.
+    """The best candidate that has a positive penalised gain and passes the proof.
 
-    In an experiment one that is bound to a time is taken where none that lasts does anything: a course of the load
-    can be drawn through whatever the model lacks, and no data can be held out from it.
+    In an experiment a time-bound effect is accepted only if no lasting effect gains anything: a load course can
+    absorb any model error, and no data can be held out from it.
     """
     gains = [c for c in candidates if c.penalised > 0]
     if x.p.by_simulation:
@@ -215,8 +216,8 @@ def proven(x: Round, candidates: list[Candidate]) -> Candidate | None:
 
 
 def as_a_set(found: Explanation, tell: Progress, s: Recording) -> Explanation:
-    """Several effects looked at again: one in another's place, one that the others have made idle; a valve that the
-    cycles show stays."""
+    """Test several effects again as a set: replace one by another, remove those made redundant. A valve that the
+    cycles show is kept."""
     told = shown_by_cycles(s, found.accepted[:1]) is not None
     if not told:
         tell("other sets of effects")
@@ -225,15 +226,13 @@ def as_a_set(found: Explanation, tell: Progress, s: Recording) -> Explanation:
 
 
 def replacement_step(found: Explanation, tell: Progress, s: Recording) -> Explanation:
-    """The explanation with each effect given up once for whatever does better beside the others: another, or another
-    way of the same.
+    """Replace each effect once by whatever gains more together with the others: another effect or another variant.
 
-    Effects are added one at a time, so the first may have been taken in the place of two that act together. In an
-    experiment none bound to a time takes the place of one that lasts, for through whatever a model lacks a course can
-    be drawn.
+    Effects are added one at a time, so the first may have been accepted instead of two that act together. In an
+    experiment no time-bound effect replaces a lasting one, because a load course can absorb any model error.
     """
     x, limits = round_of(found.p, found.best, s), found.p.limits.search
-    # a load step taken here is at the places of this round
+    # an accepted load step is at this round's positions
     found = replace(found, p=x.p)
     for old in found.accepted:
         lasts = x.p.by_simulation and not EFFECTS[old.name].timed
@@ -253,9 +252,9 @@ def replacement_step(found: Explanation, tell: Progress, s: Recording) -> Explan
 
 
 def without_the_idle(found: Explanation, kept: int) -> Explanation:
-    """The explanation less effects that the others have made idle, the first `kept` of them left alone.
+    """Remove effects that the others have made redundant, except the first `kept`.
 
-    An effect may have been taken in the place of one that came after it.
+    An effect may have been accepted instead of one that was added later.
     """
     for old in found.accepted[kept:]:
         rest = found.less([old])
@@ -265,11 +264,11 @@ def without_the_idle(found: Explanation, kept: int) -> Explanation:
 
 
 def left_over(found: Explanation, candidates: list[Candidate]) -> Prediction:
-    """What explains the recording beyond the effects taken and has no name among them; nothing where nothing does.
+    """The part of the residual that is predictable but has no name among the effects; zero if there is none.
 
-    What a reference without a name foretells of the innovations is left; so is what it foretells of the plain loop's
-    on data held out, where effects bound to a time gain hardly more with all of the data: such a course can be drawn
-    through whatever the model lacks, and what time does not bind is not bound to time.
+    The residual is what an unnamed reference predicts of the innovations. If time-bound effects gain hardly more on
+    all data, what it predicts of the baseline model's innovations on held-out data counts too: a load course can
+    absorb any model error, and what can be predicted without time is not bound to time.
     """
     limits, won = found.p.limits.search, gain(found.best, found.plain)
     left = best_prediction(found.p, found.best)

@@ -1,6 +1,6 @@
-"""An effect of the catalogue, whole: what it frees in the model, how it is proven, drawn and said.
+"""One effect of the catalogue, complete: what it frees in the model, its proof, its picture and its texts.
 
-A file of the catalogue takes all that it declares an effect with from here.
+A file of the catalogue imports from here all that it needs to declare an effect.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Parameters = Mapping[str, Estimate]
 
 
 class Block(StrEnum):
-    """Where in the loop an effect sits."""
+    """Location of an effect in the loop."""
 
     RECORDER = "recorder"
     SENSOR = "sensor"
@@ -35,40 +35,40 @@ class Block(StrEnum):
 
 
 class Friction(StrEnum):
-    """What an effect has to do with the search for a sticking valve."""
+    """Role of an effect in the search for a sticking valve."""
 
     PLAY = "play"
-    """Its best fit is where the fine scan of stick-slip begins."""
+    """The fine scan of stick-slip starts at its best fit."""
     STICKS = "sticks"
     """It is scanned finely where a hint is found."""
     HINT = "hint"
-    """A gain of it is a hint that a valve sticks."""
+    """A gain of it is a hint of a sticking valve."""
 
 
 class Ends(StrEnum):
-    """What a finding about the recorder leaves to be asked."""
+    """Which further tests a recorder finding allows."""
 
     ALL = "all"
-    """Neither controller nor physics is judged after it."""
+    """Neither controller nor physics is tested after it."""
     SMALLER = "smaller"
-    """Both are judged; an effect smaller than what the finding leaves is not told."""
+    """Both are tested; an effect smaller than the finding's resolution is not reported."""
     NOTHING = "nothing"
-    """Both are judged."""
+    """Both are tested."""
 
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """One effect that a plain loop lacks.
+    """One effect that a baseline model does not include.
 
-    name, block : as answered, contract; sentence : what a shift supervisor reads, with the parameters in braces;
-    check : what to look at; caption : what its picture shows, where the picture's kind does not say it; tests : for
-    each name that it can be taken for, the experiment or signal that tells the two apart; indistinguishable : names
-    that the same data would bear as well; types : loop types that can have it, any where empty or the type is not
-    known; needs : see Variant; variants : how it may act; timed : bound to a time, so that nothing follows for data
-    held out; local : its gain may lie in one part of the recording; friction : see Friction; derived : further
-    numbers from its parameters; spoken : names in the sentence that stand for the first of several parameters; titles
-    : what pages call numbers that no Param has; acts : what it does to a signal of the loop in its own file, where
-    the simulator has no lines for it; curve : its picture.
+    name, block : as in the answer, contract; sentence : text for a shift supervisor, with the parameters in braces;
+    check : what to inspect; caption : meaning of its picture, if the picture's kind does not show it; tests : for
+    each name that can be confused with it, the experiment or signal that distinguishes the two; indistinguishable :
+    names that fit the same data equally well; types : loop types that can have it, any if empty or if the type is
+    unknown; needs : see Variant; variants : forms of the effect; timed : bound to a time, so that it predicts nothing
+    for held-out data; local : its gain may be in one part of the recording; friction : see Friction; derived :
+    further numbers from its parameters; spoken : names in the sentence that refer to the first of several parameters;
+    titles : page titles of numbers without a Param; acts : its effect on a signal of the loop, in its own file, if
+    the simulator has no code for it; curve : its picture.
     """
 
     name: str
@@ -98,19 +98,19 @@ class Effect:
 
     @property
     def called(self) -> dict[str, str]:
-        """What pages call each of its numbers; nothing for those that another number stands for."""
+        """Page titles of its numbers, except those represented by another number."""
         params = [p for v in self.variants for p in v.params if p.title or p.hidden]
         return {p.name: "" if p.hidden else p.title for p in params} | dict(self.titles)
 
 
 @dataclass(frozen=True, slots=True)
 class Fault(Effect):
-    """An effect of recorder or controller: it is found in the trends themselves, before any physics is fitted.
+    """An effect of recorder or controller, found in the trends before any physics is fitted.
 
-    order : place among the questions; find : the finding in a recording, None of what the controller's check finds
-    (check.py); ends : what is asked after it; censors : whether samples where it is tell no more than that PV is
-    beyond; numbers : what is answered of a finding in a recording; drawn : its picture, from the finding, the
-    recording and the plain model's PV.
+    order : position in the sequence of tests; find : the finding in a recording, None for findings of the controller
+    check (check.py); ends : which tests follow; censors : whether affected samples only show that PV is beyond a
+    limit; numbers : numbers reported for a finding; drawn : its picture, from the finding, the recording and the PV
+    of the baseline model.
     """
 
     order: int = 0
@@ -127,5 +127,5 @@ def exact(value: float, unit: str, half: float = 0.0) -> Estimate:
 
 
 def within(share: float, value: float, unit: str) -> Estimate:
-    """An estimate that is known within a share of itself."""
+    """An estimate with an interval of plus or minus a share of its value."""
     return exact(value, unit, share * abs(value))

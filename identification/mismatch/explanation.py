@@ -1,11 +1,11 @@
-"""What was found in one recording: fits without and with effects, in which order, and which of them stand: those
-larger than the recorder's grid that carry over to held-out data, and to other recordings of the loop on which nothing
-was fitted but a bias.
+"""The findings in one recording: fits without and with effects, their order, and the accepted effects. Accepted
+effects are larger than the recorder's grid and carry over to held-out data, and to other recordings of the loop, in
+which only a bias is fitted.
 
-Of an experiment in open loop there are two explanations. Where a controller answers PV, a load moves OP too, and only
-innovations tell effect and load apart (noise.py). Where OP is moved by hand or by a script, no load hides in OP, and
-what a simulation misses is the model's lack; the innovations then see little of what is slow, for a noise model takes
-it up.
+An experiment in open loop has two explanations. Where a controller responds to PV, a load moves OP too, and only
+innovations distinguish effect and load (noise.py). Where OP is moved by hand or by a script, OP contains no load, and
+the simulation error is the model error; innovations then show little of slow errors, because a noise model absorbs
+them.
 """
 
 from __future__ import annotations
@@ -42,17 +42,17 @@ from identification.simulation.parameters import Slot
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """What was found.
+    """The findings in one recording.
 
-    recorder, controller : what was found about them; p : the problem that the fits solve; plain, best : fits without
-    and with the effects; accepted : the candidates taken, in the order of the best fit's; first : the candidates of
-    the first round; law : the control law recovered; late_s : PV's lateness that was taken out [s]; left : gain of
-    what is left and has no name, 0 where nothing is, and left_by : the way of the reference that foretells it
-    (reference.py); proof : plain and best on held-out data; refuted : names of effects that explain the fitted part
-    and not the rest; unproven : whether OP moved once, so that nothing is left to prove the effects on; cycles : the
-    faulty valve that the loop's cycles show; band : the loop's own, as in Recording; others : misfits on other
-    recordings, where some were held out whole; by_innovations : in an experiment, what innovations alone explain;
-    outside : physics of no name that explains it better than any that has one.
+    recorder, controller : their findings; p : the problem that the fits solve; plain, best : fits without and with
+    the effects; accepted : the accepted candidates, in the order of the best fit; first : the candidates of the first
+    round; law : the identified control law; late_s : lateness of PV that was removed [s]; left : gain of the unnamed
+    residual, 0 where there is none, and left_by : the class of the reference that predicts it (reference.py); proof :
+    plain and best on held-out data; refuted : names of effects that fit the first part but not the rest; unproven :
+    whether OP moved only once, so that no data remain for a proof; cycles : the faulty valve that the loop's cycles
+    show; band : the loop's band, as in Recording; others : misfits on other recordings, if some were held out whole;
+    by_innovations : in an experiment, the explanation by innovations alone; outside : an effect outside the catalogue
+    that explains it better than any named one.
     """
 
     p: Problem = field(repr=False)
@@ -76,19 +76,19 @@ class Explanation:
     by_innovations: Explanation | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        """Refuse effects taken that are not those of the best fit, in its order: the first is the one told."""
+        """Check that the accepted effects are those of the best fit, in its order; the first one is reported."""
         if tuple(c.name for c in self.accepted) != self.best.names:
             raise ValueError(f"taken {[c.name for c in self.accepted]}, fitted {list(self.best.names)}")
 
     @property
     def proven(self) -> HeldOut:
-        """The proof, which every explanation that is told of has."""
+        """The proof; every reported explanation has one."""
         if self.proof is None:
             raise ValueError("an explanation that was not put to the proof")
         return self.proof
 
     def less(self, given_up: Sequence[Candidate]) -> Explanation:
-        """The explanation without some of its effects, the others fitted anew."""
+        """The explanation without some of its effects, the others refitted."""
         model = without(self.best.model, (c.row for c in given_up))
         best = descended(self.p, model, self.p.limits.search.full_steps)
         gone = {c.name for c in given_up}
@@ -96,8 +96,8 @@ class Explanation:
 
     @property
     def finding(self) -> Finding | None:
-        """The finding about recorder or controller that is named first; None where an effect stands before it, as one
-        of valve or process does that is larger than the steps of PV's grid. A load says nothing against the grid."""
+        """The finding about recorder or controller that is named first; None if an effect precedes it: one of valve
+        or process that is larger than the steps of PV's grid. A load does not contradict the grid."""
         lasting = bool(self.accepted) and not EFFECTS[self.accepted[0].name].timed
         if lasting and self.controller is None and ends(self.recorder) is Ends.SMALLER:
             return None
@@ -105,13 +105,13 @@ class Explanation:
 
 
 def ends(finding: Finding | None) -> Ends:
-    """What a finding leaves to be asked. After one about the controller the physics is still asked, for whatever made
-    OP, PV answers it."""
+    """Which further tests a finding allows. After a controller finding the physics is still tested, because PV
+    responds to OP whatever moved OP."""
     return Ends.NOTHING if finding is None else fault(finding.name).ends
 
 
 def beyond_the_grid(found: Explanation) -> Explanation:
-    """The explanation without effects that move PV by less than the steps in which a recorder left it."""
+    """The explanation without effects on PV smaller than the steps of the recorder's grid."""
     step = 0.0 if found.recorder is None else found.recorder.values.get(STEP, 0.0)
     if step <= 0.0:
         return found
@@ -123,26 +123,26 @@ def beyond_the_grid(found: Explanation) -> Explanation:
 
 
 def by_cycles(found: Explanation) -> bool:
-    """Whether the first effect is a faulty valve that the loop's cycles show."""
+    """Whether the first effect is a faulty valve identified from the loop's cycles."""
     return found.cycles is not None and bool(found.accepted) and is_friction(found.accepted[0].name)
 
 
 def is_stack(found: Explanation) -> bool:
-    """Whether a loop is given as many effects as are looked for: one that the catalogue lacks comes out as a stack of
-    those it has. Rigs in open loop do have several."""
+    """Whether a loop has as many effects as the search allows: an effect outside the catalogue is fitted by a stack
+    of others. Rigs in open loop can have several effects."""
     return len(found.accepted) >= found.p.limits.search.rounds and not found.p.by_simulation
 
 
 def mark(found: Explanation) -> float:
-    """Standard deviation of what the effects together change in the simulated PV [% PV]."""
+    """Standard deviation of the joint change that the effects make in the simulated PV [% PV]."""
     plain, best = (simulate(found.p.inputs, fit.model.c) for fit in (found.plain, found.best))
     return float(np.std(best - plain))
 
 
 def carried_over(found: Explanation) -> Explanation:
-    """The explanation with its proof: as many effects, in the order taken, as carry over to held-out data.
+    """The explanation with its proof: the longest sequence of effects, in order, that carries over to held-out data.
 
-    A valve that the loop's cycles show is proven by them.
+    A valve identified from the loop's cycles is proven by them.
     """
     names = tuple(r.name for r in found.accepted)
     cycle_s = 0.0 if found.cycles is None else found.cycles.cycle_s
@@ -162,16 +162,16 @@ def carried_over(found: Explanation) -> Explanation:
 
 
 def first_effects(found: Explanation, count: int) -> Explanation:
-    """The explanation with its first effects alone; the others, and what was found beside all, are given up."""
+    """The explanation with its first `count` effects only; the others, and findings made with them, are removed."""
     return replace(found.less(found.accepted[count:]), outside=None)
 
 
 def agreed(told: Explanation, by_misfit: Explanation) -> Explanation:
-    """Of an experiment's explanations by innovations, fitted anew to what its simulation misses, and by the
-    simulation's misfit the nearer one.
+    """Combine an experiment's explanation by innovations, refitted to simulation error, with that by simulation
+    misfit.
 
-    What the misfit tells, innovations have to second: by a gain of what one constant costs, two signs. What is left
-    is what both miss: a load that wanders is no lack of the model, and innovations see none in it.
+    The nearer one is chosen. Innovations must confirm an explanation by misfit with a gain of one constant's penalty.
+    The residual is what both miss: a wandering load is no model error, and innovations show none.
     """
     limits, left = told.p.limits.search, min(told.left, by_misfit.left)
     p = replace(by_misfit.p, inputs=replace(by_misfit.p.inputs, step_at=told.p.inputs.step_at))
@@ -185,7 +185,7 @@ def agreed(told: Explanation, by_misfit: Explanation) -> Explanation:
 
 
 def most_telling_first(found: Explanation) -> Explanation:
-    """The explanation with its effects in the order of what the simulation would miss without each."""
+    """Sort the effects by the increase of the simulation misfit without each."""
     if len(found.accepted) < 2:
         return found
     missed, model = {c.name: found.less([c]).best.loss for c in found.accepted}, found.best.model
@@ -195,8 +195,8 @@ def most_telling_first(found: Explanation) -> Explanation:
 
 
 def nearer(one: Explanation, other: Explanation) -> Explanation:
-    """Of two explanations the one whose simulation is nearer to PV: on held-out data, or over all where none could be
-    held out, for OP moved once or an effect is bound to a time."""
+    """The explanation whose simulation is nearer to PV: on held-out data, or over all data if none could be held out,
+    because OP moved once or an effect is time-bound."""
     timed = any(EFFECTS[c.name].timed for c in (*one.accepted, *other.accepted))
     over_all = timed or is_one_move(one.p)
 
@@ -207,8 +207,8 @@ def nearer(one: Explanation, other: Explanation) -> Explanation:
 
 
 def on_other(found: Explanation, s: Recording, window: int) -> OnOther:
-    """Both models on another recording, anchored in windows, the plain one by either criterion, and the better one
-    without its effects."""
+    """Misfit on another recording, anchored in windows, of the baseline model by either criterion, the better model,
+    and the better model without its effects."""
     best = found.best.model
 
     def left(c: Floats) -> Misfit:
@@ -226,7 +226,7 @@ def on_other(found: Explanation, s: Recording, window: int) -> OnOther:
 
 
 def together(parts: Sequence[Misfit], samples: Sequence[int]) -> Misfit:
-    """Misfits of several recordings as one, each sample counting alike."""
+    """Misfits of several recordings combined, with equal weight per sample."""
     n = np.array(samples, dtype=np.float64)
     rmse = np.array([m.rmse for m in parts])
     moves = np.array([m.rmse / max(1.0 - (m.fit_pct or 0.0) / 100.0, 1e-9) for m in parts])
@@ -235,7 +235,7 @@ def together(parts: Sequence[Misfit], samples: Sequence[int]) -> Misfit:
 
 
 def window_of(found: Explanation, s: Recording) -> int:
-    """Samples there over which models are compared where the whole shows the load alone, as own proof or loop ask."""
+    """Window [samples] for comparing models where the whole shows the load alone, from the proof or the loop."""
     if found.proven.window:
         return max(round(found.proven.window * found.p.inputs.dt_s / s.dt_s), 1)
     c, limits = found.plain.model.c, found.p.limits.proof
@@ -244,7 +244,7 @@ def window_of(found: Explanation, s: Recording) -> int:
 
 
 def compared(found: Explanation, others: Sequence[Recording]) -> tuple[HeldOut, tuple[OnOther, ...]]:
-    """The proof on other recordings: over the whole of each, or over windows where the whole shows the load alone."""
+    """The proof on other recordings: over each whole, or over windows where the whole shows the load alone."""
     p, drawn, over_all = found.p, found.proven.drawn, [0] * len(others)
     own = [window_of(found, s) for s in others]
     for windows, placed in ((over_all, False), (own, found.proven.placed)):
@@ -261,10 +261,10 @@ def compared(found: Explanation, others: Sequence[Recording]) -> tuple[HeldOut, 
 
 
 def proven_on(found: Explanation, others: Sequence[Recording]) -> Explanation:
-    """The explanation, kept where it carries over to other recordings, given up where it does not.
+    """Keep the explanation if it carries over to other recordings, otherwise remove its effects.
 
-    An effect bound to a time says nothing of another recording; a valve that the cycles there show too keeps its
-    name. The others are of the same loop, in the percent of the recording that was fitted.
+    A time-bound effect has no meaning in another recording; a valve that the cycles there also show keeps its name.
+    The others are of the same loop, in the percent of the fitted recording.
     """
     if not others or not found.accepted:
         return found

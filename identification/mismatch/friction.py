@@ -1,10 +1,10 @@
-"""Valves with friction, which a descent from a guess does not find: where their search begins, and how far one holds.
+"""Valves with friction, which a descent from a guess does not find: starts of the search, and the valid horizon.
 
-True friction differs from slip to slip. Run open over hours, a model of one constant friction loses the stem's place
-at the first slip that comes early or late, and the likelihood with it: its innovations fall into narrow pits. So
-stickband and jump are scanned, or begun where the loop's cycles show them, stretch by stretch. Judged over a cycle,
-from where the stem stood, such a model shows what the valve does to PV: the place is the state at a window's start,
-estimated from the window itself; constants are not touched.
+Real friction differs from slip to slip. In open simulation over hours, a model of constant friction loses the stem
+position, and the likelihood, at the first early or late slip: the innovations have narrow optima. So stickband and
+jump are scanned, or started from the loop's cycles, stretch by stretch. Over one cycle, from the true stem position,
+such a model shows what the valve does to PV: the position is the state at a window's start, estimated from the window
+itself; the constants do not change.
 """
 
 from __future__ import annotations
@@ -34,26 +34,26 @@ from identification.simulation.valve import StemLaw, moved_stem, sticking
 from identification.simulation.valve_chain import before_stem, behind_stem, friction_of
 
 WEARS = (Friction.PLAY, Friction.STICKS)
-"""What a worn valve has."""
+"""Roles of the effects of a worn valve."""
 OF_CYCLES = (Slot.T, Slot.L, Slot.K, Slot.STICKBAND, Slot.JUMP, Slot.COAST)
-"""Parameters that the cycles tell."""
+"""Parameters that the cycles determine."""
 PLACES, CARRIED_ON = FRICTION.places, FRICTION.carried_on
-"""What limits.toml says of a stem's place, as kernels take it."""
+"""Settings of limits.toml for the stem position, in the kernels' type."""
 MOVES = (
     *((1, 0, 0, 0), (-1, 0, 0, 0), (0, 1, 0, 0), (0, -1, 0, 0)),
     *((0, 0, 1, 0), (0, 0, -1, 0), (0, 0, 0, 1), (0, 0, 0, -1), (1, 1, 0, 0), (-1, -1, 0, 0)),
 )
-"""Moves of stickband, jump, natural time and dead time that are tried."""
+"""Compass moves in stickband, jump, natural time and dead time."""
 
 
 def is_friction(name: str) -> bool:
-    """Whether an effect is play or stick-slip, which cycles can show."""
+    """Whether an effect is backlash or stick-slip, which cycles can show."""
     return about(name).friction in WEARS
 
 
 def fit_sticking(p: Problem, play: Fitted, row: Variant, rows: tuple[Variant, ...]) -> Fitted:
-    """The best valve that sticks as `row` says, beside `rows`, about a fit whose last row is a play: its stem is
-    sought as a night seeks it, or with its mass, and followed to the end beside all that the fit holds."""
+    """The best sticking valve of the form `row`, with `rows`, near a fit whose last row is backlash: its stem is
+    searched as in the batch run, or with its mass, and followed to the end with all other effects."""
     model = Model((*rows, row), row.set_in(play.model.c))
     has_mass = any(q.slot == Slot.STEM_T for q in row.params)
     begun = _with_mass(p, model) if has_mass else _as_a_night(p, play, model)
@@ -61,7 +61,7 @@ def fit_sticking(p: Problem, play: Fitted, row: Variant, rows: tuple[Variant, ..
 
 
 def _as_a_night(p: Problem, play: Fitted, model: Model) -> list[Model]:
-    """Starts in the pits that the stickbands and jumps of a night's scan find."""
+    """Starts at the local optima of stickband and jump from a batch-run scan."""
     window, c = _window_behind(p, play.model.c), model.c
     near = Fit(
         float(c[Slot.K]),
@@ -84,8 +84,8 @@ def _as_a_night(p: Problem, play: Fitted, model: Model) -> list[Model]:
 
 
 def _with_mass(p: Problem, model: Model) -> list[Model]:
-    """The best starts of stems with mass: stickbands about the play's width, jumps and natural times scanned, the
-    best moved by ever smaller steps, for slips make pits that a descent does not see from afar."""
+    """The best starts of stems with mass: a scan of stickbands near the backlash width, jumps and natural times,
+    refined by decreasing steps, because slips make narrow optima that a descent misses."""
     scanned, limits = [], p.limits.search
     widths = np.geomspace(*FRICTION.widths)
     for width, share, samples in product(widths, FRICTION.jumps, FRICTION.times):
@@ -115,7 +115,7 @@ def _heavier(p: Problem, model: Model, move: tuple[int, ...], step: float) -> tu
 
 
 def _window_behind(p: Problem, c: Floats) -> Window:
-    """What a night fits a lag behind a valve to: OP as the stem meets it, PV less what a model has beside both."""
+    """The window for a lag behind a valve: OP at the stem's input, PV without the model's other effects."""
     inputs, plain = p.inputs, alone(c, (*OF_CYCLES, Slot.BIAS, Slot.START, Slot.LEAK))
     op = before_stem(np.ascontiguousarray(acted(Signal.OP, inputs.op, c, inputs.dt_s)), c, inputs.dt_s)
     y = p.y - simulate(inputs, c) + simulate(inputs, plain)
@@ -123,7 +123,7 @@ def _window_behind(p: Problem, c: Floats) -> Window:
 
 
 def from_cycles(x: Round, seen: SeenInCycles, rows: tuple[Variant, ...]) -> list[Fitted]:
-    """Those of some rows that are of friction added to a fit, each followed to the end from what the cycles told."""
+    """Friction rows added to a fit, each followed to the end from the valve identified in the cycles."""
     out, p, near = [], x.p, x.near
     for row in rows:
         valve = _valve_for(row, seen.valve) if is_friction(row.name) else None
@@ -134,14 +134,14 @@ def from_cycles(x: Round, seen: SeenInCycles, rows: tuple[Variant, ...]) -> list
 
 
 def _valve_for(row: Variant, valve: Backlash | Stiction) -> Valve:
-    """The valve seen as a row of the catalogue can hold it; None where the row is of another motion."""
+    """The identified valve in the form of a catalogue row; None if the row has another motion."""
     if about(row.name).friction is Friction.PLAY:
         return Backlash(valve.width if isinstance(valve, Backlash) else valve.stickband)
     return valve if isinstance(valve, Stiction) and row.label == valve.motion else None
 
 
 def _begun(p: Problem, near: Fitted, seen: SeenInCycles, valve: Valve) -> Floats:
-    """Constants of a fit with process and valve as the cycles told them, shape (SIZE + own,)."""
+    """Constants of a fit with process and valve from the cycles, shape (SIZE + own,)."""
     c, told = near.model.c.copy(), as_parameters(seen.process, valve)
     for slot in OF_CYCLES:
         c[slot] = told[slot]
@@ -151,7 +151,7 @@ def _begun(p: Problem, near: Fitted, seen: SeenInCycles, valve: Valve) -> Floats
 
 
 def simulated_anew(p: Problem, c: Floats, window: int) -> Floats:
-    """PV's deviation [% PV], shape (n,), of constants, shape (SIZE + own,), the stem placed anew every `window`
+    """PV's deviation [% PV], shape (n,), for constants, shape (SIZE + own,), the stem re-estimated every `window`
     samples; as simulate() without friction."""
     inputs, friction = p.inputs, friction_of(c)
     if friction.breakaway <= 0.0:
@@ -180,9 +180,10 @@ def _left(
     x: float,
     out: Floats,
 ) -> tuple[float, float, float]:
-    """Squares about a line that a stem begun at a place leaves of PV; where stem and lag end; `out` is its path.
+    """Squares of the PV residual about a line for a stem with a given start; final stem and lag; `out` is its path.
 
-    mass : natural time of the stem, 0 without mass, and of a sample [s]."""
+    mass : natural time of the stem, 0 without mass, and of a sample [s].
+    """
     state = (stem, 0.0, op[first])
     n = t1 = t2 = r0 = r1 = r2 = 0.0
     for k in range(first, last):
@@ -211,7 +212,7 @@ def stem_placed(
     friction: StemLaw,
     mass: tuple[float, float],
 ) -> Floats:
-    """Stem [% OP], shape (n,), placed in each window where it leaves least of PV, or carried on from the last one."""
+    """Stem [% OP], shape (n,), estimated in each window by least residual of PV, or carried on."""
     out, trial = np.empty_like(op), np.empty_like(op)
     stem, x = op[0], op[0]
     for i in range(ends.size - 1):

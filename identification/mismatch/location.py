@@ -1,8 +1,8 @@
-"""Where a misfit lives: one joint regression of innovations on what the loop was doing at each sample.
+"""Location of a misfit: one joint regression of innovations on the state of the loop at each sample.
 
-Bins one by one confound what goes together (PV with OP, level with time), so all features stand in one regression
-and each is judged by what it adds to the others. The null is empirical: blocks of the innovations are put in
-another order against the features, so that nothing is left of any link while colour and outliers stay.
+Separate bins confound correlated features (PV with OP, level with time), so all features enter one regression and
+each is judged by what it adds to the others. The null is empirical: blocks of the innovations are permuted against
+the features, which removes every dependence and keeps colour and outliers.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from identification.signals.robust import robust_deviation
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Columns that stand for one question, shape (n, k), and the signal they are of, shape (n,), for its profile.
+    """Columns of one feature, shape (n, k), and its signal, shape (n,), for the profile.
 
-    sense : OP's direction where a bias is counted along it, shape (n,), else None.
+    sense : direction of OP where a bias is accumulated along it, shape (n,), else None.
     """
 
     name: str
@@ -36,10 +36,10 @@ class Group:
 
 @njit(cache=True)
 def turns(op: Floats, least: float) -> tuple[Floats, Floats]:
-    """Direction of OP (-1, 0, 1) and samples since it last turned, shape (n,) each.
+    """Direction of OP (-1, 0, 1) and samples since its last reversal, shape (n,) each.
 
-    A turn counts once OP has gone back from its extreme by `least` [% OP], and from then on: what OP does later must
-    not be known, for under feedback it answers the very innovation that is to be located.
+    A reversal counts once OP has moved back from its extreme by `least` [% OP], and from then on. Later OP must not
+    be used: under feedback it depends on the very innovation that is to be located.
     """
     n = op.size
     way, since = np.zeros(n), np.zeros(n)
@@ -59,7 +59,7 @@ def turns(op: Floats, least: float) -> tuple[Floats, Floats]:
 
 
 def least_turn(op: Floats) -> float:
-    """Travel back that counts as a turn of OP [% OP]."""
+    """Travel back that counts as an OP reversal [% OP]."""
     change = np.diff(op)
     noise = robust_deviation(change - np.median(change)) if change.size else 0.0
     low, high = np.quantile(op, [0.01, 0.99])
@@ -67,7 +67,7 @@ def least_turn(op: Floats) -> float:
 
 
 def piecewise_linear_basis(x: Floats) -> Floats:
-    """Straight pieces between even quantiles of a signal, shape (n, k), none where it stands still."""
+    """Piecewise linear basis between even quantiles of a signal, shape (n, k), none if it is constant."""
     knots = np.unique(np.quantile(x, np.linspace(0.02, 0.98, LOCATION.pieces + 1)))
     if knots.size < 2:
         return np.zeros((x.size, 0))
@@ -75,13 +75,13 @@ def piecewise_linear_basis(x: Floats) -> Floats:
 
 
 def ranked(x: Floats) -> Floats:
-    """Ranks from 0 to 1, shape (n,), equal values alike."""
+    """Ranks from 0 to 1, shape (n,), equal for equal values."""
     levels, at = np.unique(x, return_inverse=True)
     return at / max(levels.size - 1, 1)
 
 
 def at_limits(op: Floats) -> Mask:
-    """True where OP is at 0 or 100 %, or stands at an end of its own range for three samples, shape (n,)."""
+    """True where OP is at 0 or 100 %, or at an end of its own range for three samples, shape (n,)."""
     least = LIMITS.controller.at_limit
     out = (op <= least) | (op >= 100.0 - least)
     ends = (op.max(), op.min()) if np.unique(op).size > LOCATION.op_levels else ()
@@ -91,16 +91,16 @@ def at_limits(op: Floats) -> Mask:
 
 
 def delayed(x: Floats, late: int) -> Floats:
-    """A signal that many samples later, its first value held, shape (n,)."""
+    """A signal delayed by `late` samples, its first value held, shape (n,)."""
     return x if late <= 0 else np.concatenate((np.full(late, x[0]), x[:-late]))
 
 
 def groups(pv: Floats, op: Floats, dt_s: float, late: int, memory: int) -> tuple[Group, ...]:
-    """The features of a record, each group as far as there is anything in it.
+    """The features of a record, without groups that are constant.
 
-    OP's features are taken `late` samples later, when PV begins to answer it; rates and turns count within the
-    `memory` [samples] of the loop. All features are of the past: an innovation is part of its own PV, and feedback
-    makes it part of every later OP.
+    OP features are delayed by `late` samples, when PV begins to respond; rates and reversals count within the
+    `memory` [samples] of the loop. All features are of the past: an innovation is part of its own PV, and through
+    feedback of every later OP.
     """
     o, before = delayed(op, late + LOCATION.past), delayed(pv, LOCATION.past)
     way, since = turns(o, least_turn(o))
@@ -124,7 +124,7 @@ def groups(pv: Floats, op: Floats, dt_s: float, late: int, memory: int) -> tuple
 
 
 class Profile(NamedTuple):
-    """Misfit along one feature: ends of each part, samples, mean and mean square of innovations, shape (b,) each."""
+    """Misfit along one feature: ends of each bin, samples, mean and mean square of innovations, shape (b,) each."""
 
     low: Floats
     high: Floats
@@ -135,11 +135,11 @@ class Profile(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Feature:
-    """What one feature says of the misfit.
+    """Relation of one feature to the misfit.
 
-    p : chance, over all features, of as much on an untied residual; share : part of the variance of the misfit's
-    power or sign that it alone gives; by : "power" or "sign", by which it shows more; range : ends of the part of the
-    feature's range in which the misfit is above its mean, none where it has no order.
+    p : p-value, corrected for all features; share : share of the variance of the misfit's power or sign explained by
+    it alone; by : "power" or "sign", whichever is stronger; range : ends of the part of the feature's range in which
+    the misfit is above its mean, none if it has no order.
     """
 
     name: str
@@ -150,14 +150,14 @@ class Feature:
 
     @property
     def carries(self) -> bool:
-        """Whether the misfit is tied to this feature beside all others."""
+        """Whether the misfit depends on this feature in addition to all others."""
         return self.p <= LOCATION.chance
 
 
 @dataclass(frozen=True, slots=True)
 class Located:
-    """The features, the likeliest first; local : power of the misfit that they give at each sample, in mean squares,
-    shape (n,), 0 where not judged; groups : the features as asked, also where they were not tested."""
+    """The features, most significant first; local : power of the misfit explained by them at each sample, in mean
+    squares, shape (n,), 0 where not judged; groups : the features as given, also where they were not tested."""
 
     features: tuple[Feature, ...]
     local: Floats = field(repr=False)
@@ -165,7 +165,7 @@ class Located:
 
     @property
     def carrying(self) -> tuple[Feature, ...]:
-        """Features that carry the misfit."""
+        """Features with a significant relation to the misfit."""
         return tuple(f for f in self.features if f.carries)
 
 
@@ -180,7 +180,7 @@ def standardized(e: Floats) -> Floats:
 
 
 def directions(columns: list[Floats]) -> list[Floats]:
-    """What each group's columns hold beside all others: orthonormal, shape (n, k) each; k = 0 where nothing."""
+    """Part of each group's columns not explained by the others: orthonormal, shape (n, k) each; k = 0 if empty."""
     centred = [c - c.mean(axis=0) for c in columns]
     out = []
     for i, own in enumerate(centred):
@@ -195,7 +195,7 @@ def _along(basis: Floats, x: Floats) -> Floats:
 
 
 def _basis(x: Floats, scale: float | None = None) -> Floats:
-    """Orthonormal directions of some columns, those of under a hundredth of their size left out."""
+    """Orthonormal directions of some columns, without those below a hundredth of their size."""
     if x.shape[1] == 0:
         return x
     u, s, _ = np.linalg.svd(x, full_matrices=False)
@@ -203,9 +203,9 @@ def _basis(x: Floats, scale: float | None = None) -> Floats:
 
 
 def chances(bases: list[Floats], y: Floats, blocks: int) -> tuple[Floats, Floats]:
-    """Chance of each group over all groups, (groups,), and each response's excess, (groups, 2).
+    """p-value of each group, corrected for all groups, (groups,), and each response's excess, (groups, 2).
 
-    The largest excess over groups and responses is compared with that of every other order of the blocks (Westfall
+    The largest excess over groups and responses is compared with that of every permutation of the blocks (Westfall
     and Young 1993, single step).
     """
     rng = np.random.default_rng(0)
@@ -229,7 +229,8 @@ def block_products(flat: Floats, y: Floats, blocks: int) -> Floats:
 
 
 def _scores(products: Floats, ends: np.ndarray) -> Floats:
-    """What stacked bases give of each response, nearly standard normal under independence, shape (groups, 2).
+    """Excess explained by the stacked bases for each response, nearly standard normal if independent, shape (groups,
+    2).
 
     The cube root of a mean square is nearly normal (Wilson and Hilferty 1931).
     """
@@ -240,7 +241,7 @@ def _scores(products: Floats, ends: np.ndarray) -> Floats:
 
 
 def profile(x: Floats, y: Floats) -> Profile:
-    """Innovations y, in standard deviations, along a feature x, shape (n,) each, in parts of as many samples."""
+    """Innovations y, in standard deviations, along a feature x, shape (n,) each, in bins of equal count."""
     parts, order = LOCATION.profile_parts, np.argsort(x, kind="stable")
     x, y = x[order], y[order]
     levels = np.flatnonzero(np.diff(x, prepend=x[0] - 1.0))
@@ -253,7 +254,7 @@ def profile(x: Floats, y: Floats) -> Profile:
 
 
 def part_of_range(height: Floats) -> tuple[int, int] | None:
-    """First and last (included) place of the longest run of a profile well above its middle; None without one."""
+    """First and last (inclusive) bin of the longest run of a profile well above its median; None without one."""
     line = 0.5 * float(height.max() + np.median(height))
     high = runs(height > line) if height.size >= 4 else []
     if not high:
@@ -263,7 +264,7 @@ def part_of_range(height: Floats) -> tuple[int, int] | None:
 
 
 def located(e: Floats, pv: Floats, op: Floats, judged: Mask, dt_s: float, late: int, memory: int) -> Located:
-    """Where innovations e [% PV], shape (n,), are large or keep one sign; a record too short is located nowhere.
+    """Where innovations e [% PV], shape (n,), are large or keep one sign; no location if the record is too short.
 
     late, memory : samples of dead time, and of dead time and time constant together.
     """
@@ -287,7 +288,7 @@ def located(e: Floats, pv: Floats, op: Floats, judged: Mask, dt_s: float, late: 
 
 
 def _carrying_part(g: Group, scaled: Floats, judged: Mask, by: int) -> tuple[float, ...]:
-    """Ends of the part of a feature's range in which innovations are large (by 0) or keep one sign; none without."""
+    """Ends of the part of a feature's range in which innovations are large (by 0) or keep one sign; or none."""
     drawn = profile(g.signal[judged], scaled if g.sense is None else scaled * g.sense[judged])
     run = part_of_range(drawn.power if by == 0 else np.abs(drawn.mean))
     return () if run is None else (float(drawn.low[run[0]]), float(drawn.high[run[1]]))

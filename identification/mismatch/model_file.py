@@ -1,4 +1,4 @@
-"""A model as plain data, and plain data as a model that runs over another recording."""
+"""Conversion of a model to plain data, and simulation of a saved model on another recording."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from identification.simulation.parameters import KNOTS, STEPS, Slot, neutral, pl
 
 VERSION = 1
 BIAS_PASSES = 4
-"""Passes in which the bias and the start that it moves settle; ours: each leaves a time constant over the record."""
+"""Passes in which the bias and the start converge; ours: each leaves a share of time constant over record length."""
 TIMED = (
     Slot.SINE,
     Slot.COSINE,
@@ -28,13 +28,13 @@ TIMED = (
     *(Slot.STEP + i for i in range(STEPS)),
     *(Slot.HEAD + i for i in range(KNOTS)),
 )
-"""Constants that belong to the recording that was fitted, not to the loop."""
+"""Constants that belong to the fitted recording, not to the loop."""
 
 
 def to_data(
     loop: str, inputs: ModelInputs, c: Floats, names: tuple[str, ...], late_s: float, pv_scale: Any
 ) -> dict[str, Any]:
-    """The model as a mapping that JSON can hold; constants at their neutral value are left out."""
+    """The model as a JSON-compatible mapping; constants at their neutral value are omitted."""
     rest = neutral()
     own = {name: float(c[i]) for name, i in places().items() if c[i] != rest[i] and i not in TIMED}
     return {
@@ -55,7 +55,7 @@ def constants(data: dict[str, Any]) -> Floats:
     Raises
     ------
     InputError
-        The mapping is no model of this kind.
+        The mapping is not a model of this kind.
     """
     try:
         c, place = neutral(), places()
@@ -75,14 +75,14 @@ def constants(data: dict[str, Any]) -> Floats:
 
 
 def inputs_for(data: dict[str, Any], op: Floats, pv: Floats, dt_s: float) -> ModelInputs:
-    """Another recording as what drives a saved model."""
+    """Inputs of a saved model from another recording."""
     level = float(data.get("level_pv_pct", np.mean(pv)))
     middle = float(data.get("middle_op_pct", np.mean(op)))
     return ModelInputs(op, dt_s, middle, level, (float(pv.min()), float(pv.max())))
 
 
 def carried(data: dict[str, Any], op: Floats, pv: Floats, dt_s: float) -> Floats:
-    """PV [% PV], shape (n,), that a saved model gives for another recording's OP, with a constant bias freed."""
+    """PV [% PV], shape (n,), of a saved model for another recording's OP, with a free constant bias."""
     c, inputs = constants(data), inputs_for(data, op, pv, dt_s)
     inside = (pv < c[Slot.CLIP_HI] - 1e-6) & (pv > c[Slot.CLIP_LO] + 1e-6)
     bias, out = 0.0, pv
@@ -101,12 +101,12 @@ def carried(data: dict[str, Any], op: Floats, pv: Floats, dt_s: float) -> Floats
 def carried_closed(
     data: dict[str, Any], sp: Floats, op: Floats, pv: Floats, dt_s: float, stated: StatedSettings
 ) -> tuple[Floats, Floats]:
-    """PV and OP, each shape (n,), of a saved model under its PI controller, load and noise left out.
+    """PV and OP, each shape (n,), of a saved model under its PI controller, without load and noise.
 
     Raises
     ------
     NotAssessedError
-        The model cannot be stepped sample by sample (closed_model).
+        The model cannot be simulated sample by sample (closed_model).
     """
     c, inputs = constants(data), inputs_for(data, op, pv, dt_s)
     c[Slot.START] = float(pv[0]) - inputs.level

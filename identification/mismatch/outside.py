@@ -1,5 +1,5 @@
-"""Physics that is known and has no name in the catalogue: where it explains a recording best, it is told in words
-beside `unexplained`, so that no name of the catalogue is stretched over it."""
+"""Known physics without a name in the catalogue. Where it explains a recording best, a text reports it with
+`unexplained`, so that no name of the catalogue is used for it."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from identification.simulation.parameters import bring
 
 HURRY, HURRY_T = own_slot("HURRY"), own_slot("HURRY_T", 1.0)
 CHANGES, MEMORIES = (-0.1, 0.1), (8.0, 25.0)
-"""Relative changes of gain per 10 % of PV with which its search begins, and memories, in time constants; ours: what a
-vessel forgets within five is its own dynamics."""
+"""Relative changes of gain per 10 % of PV at which its search begins, and memories, in time constants; ours: a
+shorter memory than five is the vessel's own dynamics."""
 HURRIED = (0.2, 0.6)
-"""How long a move counts as fast, where the search begins, in time constants; ours."""
+"""Duration below which a move counts as fast, at the start of the search, in time constants; ours."""
 HURRY_DRAWN = 5.0
-"""Length of its picture, in that time."""
+"""Length of its picture, in the same unit."""
 WAYS = tuple(0.8 * 1.12**i for i in range(25))
-"""How long a way back is, where the search begins, in time constants; ours: what comes back is as wide as one."""
+"""Recycle delays at which the search begins, in time constants; ours: a returning change is as wide as one."""
 PLACES, BANDS = tuple(0.05 * i for i in range(2, 19)), (0.5, 3.0)
-"""Where a switch is looked for, in the span of PV, and with which bands [% PV]; ours: a start finds its place from a
-twentieth of the span off."""
+"""Positions at which a switch is searched, in the span of PV, and bands [% PV]; ours: a start converges from a
+twentieth of the span away."""
 
 
 def hurried(flow: Floats, c: Floats, dt_s: float) -> Floats:
-    """Flow, shape (n,) [% OP], with the square of what it is ahead of its own lag, of the move's sign."""
+    """Flow, shape (n,) [% OP], with the signed square of its difference to its own lag added."""
     ahead = flow - lagged(flow, float(c[HURRY_T]), dt_s)
     return flow + c[HURRY] * np.abs(ahead) * ahead / 10.0  # type: ignore[no-any-return]
 
@@ -115,12 +115,12 @@ SWITCH = Effect(
     ),
 )
 OUTSIDE: Mapping[str, Effect] = {e.name: e for e in (HISTORY, RATE, RECYCLE, SWITCH)}
-"""All of it by what it is called here."""
+"""All of it by its internal name."""
 bring(tuple(act for e in OUTSIDE.values() for act in e.acts))
 RIVALS: tuple[Variant, ...] = tuple(v for e in OUTSIDE.values() for v in e.candidates)
-"""What competes with the catalogue and gives no name."""
+"""Candidates that compete with the catalogue and give no name."""
 
 
 def about(name: str) -> Effect:
-    """The effect of that name, in the catalogue or outside."""
+    """The effect with that name, in the catalogue or outside."""
     return EFFECTS[name] if name in EFFECTS else OUTSIDE[name]

@@ -1,8 +1,8 @@
-"""What an effect does, as arrays to draw: of valve and process and over the recording, beside the plain loop, and of
-recorder and controller as they are in the recording.
+"""Data of the pictures of an effect: of valve and process and over the recording, with the baseline model, and of
+recorder and controller as recorded.
 
 A picture of the physics is a function of the model's parameters; its band is that function at the ends of their
-intervals, one parameter at a time, the deviations added as squares.
+intervals, one parameter at a time, with the deviations added as squares.
 """
 
 from __future__ import annotations
@@ -24,33 +24,33 @@ from identification.simulation.valve_chain import flow
 POINTS = 241
 """Points of a static curve."""
 COURSE_POINTS = 600
-"""Points of a course over time."""
+"""Points of a time course."""
 SWEEP = 2.5
-"""Half height of the sweep that draws a valve's loop, in widths of its stickband; ours: both flanks show."""
+"""Half height of the sweep for a valve's loop, in widths of its stickband; ours: both flanks are visible."""
 STEP_PCT, MOST_STEP_PCT = 10.0, 50.0
-"""Size of the step whose response is drawn and, of a stem's, half of OP's range where that is more, at most that
-[% OP]."""
+"""Size of the step whose response is drawn; for a stem, half of OP's range if that is larger, and at most the second
+value [% OP]."""
 STEM_LENGTH, FEWEST_SAMPLES = 1.6, 4
-"""Length of a stem's response, in the time that the stem takes; at least so many samples."""
+"""Length of a stem's response, relative to its duration; minimum number of samples."""
 PV_LENGTH = 5.0
-"""Length of PV's response, in dead time and all time constants together."""
+"""Length of PV's response, relative to the sum of dead time and all time constants."""
 WINDOW, MOST_WINDOW = 240, 1500
-"""Samples of a stretch that is drawn, and at most; ours: single samples can still be seen."""
+"""Samples of a drawn stretch, and the maximum; ours: single samples are still visible."""
 LAW_WINDOW = 8.0
-"""Length of a stretch with a law, in integral times; ours: a law that is off has drifted away by then."""
+"""Length of a stretch with a law, in integral times; ours: a wrong law has drifted away by then."""
 EARLY = 0.25
-"""It is drawn to ten of its shortest lags where that is less than this part of the whole."""
+"""It is drawn to ten of its shortest lags if that is less than this part of the whole."""
 FRICTION = (Slot.STICKBAND, Slot.JUMP, Slot.COAST, Slot.STEM_T)
 AT_REST = (Slot.STOP_LO, Slot.STOP_HI, Slot.SPLIT, Slot.RATIO, Slot.SPLIT_DEAD, Slot.BEND)
 DYNAMICS = (Slot.T, Slot.L, Slot.K, Slot.T2, Slot.T3, Slot.SHARE, Slot.MODE_T, Slot.ASYMMETRY, Slot.LEAK)
-"""Parameters of the valve's friction, of its flow once all has come to rest, and of the process's own dynamics."""
+"""Parameters of the valve's friction, of its flow at rest, and of the process dynamics."""
 
 Read = Callable[[Floats], Floats]
 
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """One curve: its name, shape (m,) each; low and high bound it where an interval is known."""
+    """One curve: its name, shape (m,) each; low and high bound it if an interval is known."""
 
     name: str
     x: Floats
@@ -61,7 +61,7 @@ class Drawn:
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """What an axis counts and in which unit."""
+    """Quantity and unit of an axis."""
 
     what: str
     unit: str
@@ -73,7 +73,7 @@ GAIN, LOAD, PV = Axis("gain", "% PV/% OP"), Axis("load at the inlet", "% OP"), A
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """What was found, drawn: its kind, both axes, curves (the found one first), places on the horizontal axis.
+    """A finding, drawn: its kind, both axes, curves (the finding first), marks on the horizontal axis.
 
     kind : loop (the band is two more loops, least and most), curve, response, course or comb.
     """
@@ -87,10 +87,10 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """What a picture is drawn from.
+    """Data for a picture.
 
-    inputs : what drove the model; variant : what was added; known : its parameters with intervals, by their answered
-    names; best, plain : parameters of the improved and of the plain model, shape (SIZE,) each.
+    inputs : inputs of the model; variant : the added effect; known : its parameters with intervals, by their reported
+    names; best, plain : parameters of the improved and of the baseline model, shape (SIZE,) each.
     """
 
     inputs: ModelInputs
@@ -101,13 +101,13 @@ class Drawing:
 
     @property
     def ends(self) -> tuple[tuple[int, float, float], ...]:
-        """Place, low and high end of each parameter whose interval is known."""
+        """Slot, low and high end of each parameter with a known interval."""
         found = ((int(p.slot), self.known.get(p.name)) for p in self.variant.params)
         return tuple((slot, e.low, e.high) for slot, e in found if e is not None)
 
 
 def banded(read: Read, d: Drawing) -> tuple[Floats, Floats, Floats]:
-    """What `read` gives of the best parameters, with its least and greatest value, shape (m,) each."""
+    """Values of `read` for the best parameters, with lower and upper bound, shape (m,) each."""
     here = read(d.best)
     below, above = np.zeros_like(here), np.zeros_like(here)
     for slot, *both in d.ends:
@@ -130,26 +130,26 @@ def beside_plain(
     plain: Floats | float,
     places: tuple[float, ...] = (),
 ) -> Picture:
-    """What parameters make of x, with its band, beside what the plain loop has there, shape (m,) each."""
+    """Values over x for the parameters, with their band, and for the baseline model, shape (m,) each."""
     y, low, high = banded(read, d)
     still = np.broadcast_to(np.asarray(plain, dtype=np.float64), x.shape)
     return Picture(kind, *axes, (Drawn("found", x, y, low, high), Drawn("plain", x, still)), places)
 
 
 def op_range(inputs: ModelInputs) -> Floats:
-    """OP from its least to its greatest value, shape (POINTS,)."""
+    """OP from its lowest to its highest value, shape (POINTS,)."""
     return np.linspace(float(inputs.op.min()), float(inputs.op.max()), POINTS)
 
 
 def drawn_step(size: float, n: int, dt_s: float, back: bool = False) -> tuple[Floats, Floats]:
-    """Time [s] and a step (and, if wanted, the step back), shape (m,)."""
+    """Time [s] and a step (and optionally the step back), shape (m,)."""
     time = dt_s * np.arange(-n // 10, (2 if back else 1) * n, dtype=np.float64)
     on = (time >= 0) & (time < n * dt_s) if back else time >= 0
     return time, np.where(on, size, 0.0)
 
 
 def stem_over_op(d: Drawing) -> Picture:
-    """Stem over OP of a valve with play or stick-slip, with the loops of the narrowest and the widest band."""
+    """Stem over OP of a valve with backlash or stick-slip, with the loops of the narrowest and the widest band."""
     reach = SWEEP * max(float(d.best[Slot.STICKBAND]), 1e-3)
     one, half = np.concatenate((np.linspace(-1, 1, POINTS), np.linspace(1, -1, POINTS))), 2 * POINTS
     op = d.inputs.middle + reach * np.concatenate((one, one))
@@ -182,7 +182,7 @@ def step_size(d: Drawing) -> float:
 
 
 def stem_response(d: Drawing, length_s: float, keep: tuple[int, ...]) -> Picture:
-    """Stem after a step of OP, which takes about `length_s`, with the parameters that are at work."""
+    """Stem after a step of OP, over about `length_s`, with the parameters in `keep` active."""
     fine = max(length_s * STEM_LENGTH, FEWEST_SAMPLES * d.inputs.dt_s) / POINTS
     time, op = drawn_step(step_size(d), POINTS, fine)
     middle = d.inputs.middle
@@ -202,8 +202,8 @@ def _pv_length_s(d: Drawing, fast_s: float | None) -> float:
 
 
 def pv_response(d: Drawing, faster: int | None = None, back: bool = False) -> Picture:
-    """PV after a step of OP (and back down again), of the plain and the improved process; cut where the lag of the
-    slot `faster`, or the process's own, is over early."""
+    """PV after a step of OP (and back), of the baseline and the improved process; cut short if the lag of the slot
+    `faster`, or the process's own, ends early."""
     inputs = d.inputs
     length = _pv_length_s(d, None if faster is None else float(min(d.best[faster], d.best[Slot.T])))
     dt = min(length / POINTS, inputs.dt_s) if length < POINTS * inputs.dt_s else length / POINTS
@@ -212,13 +212,13 @@ def pv_response(d: Drawing, faster: int | None = None, back: bool = False) -> Pi
     drawn = ModelInputs(op, dt, 0.0, inputs.level, (0.0, 100.0))
 
     def read(c: Floats) -> Floats:
-        return simulate(drawn, alone(c, DYNAMICS))  # valve, load, clip and the record's start taken out
+        return simulate(drawn, alone(c, DYNAMICS))  # without valve, load, clip and the record's start
 
     return beside_plain(d, "response", (TIME, Axis("PV", "% PV")), time, read, read(d.plain))
 
 
 def gain_over_pv(d: Drawing) -> Picture:
-    """Gain of the process over PV: by slope, by its speed, or as a vessel with a rooted outflow."""
+    """Gain of the process over PV: by slope, by its speed, or as a vessel with a square-root outflow."""
     inputs = d.inputs
     pv = np.linspace(*inputs.pv_range, POINTS)
     x = pv - inputs.level
@@ -241,15 +241,15 @@ def course_picture(
     last: float = np.inf,
     places: tuple[float, ...] = (),
 ) -> Picture:
-    """What acts over the recording, shape (n,), as `values` gives it of inputs and parameters, beside what the plain
-    loop has in its place; up to the sample `last`, with some times [s] marked."""
+    """A quantity over the recording, shape (n,), from `values` of inputs and parameters, with its value in the
+    baseline model; up to the sample `last`, with some times [s] marked."""
     at = np.unique(np.linspace(0, min(last, d.inputs.op.size - 1), COURSE_POINTS).astype(int))
     time = at * d.inputs.dt_s
     return beside_plain(d, "course", (TIME, axis), time, lambda c: values(d.inputs, c)[at], rest, places)
 
 
 def gain_course(d: Drawing, change: Callable[[ModelInputs, Floats], Floats]) -> Picture:
-    """The process gain over the recording, which goes as `change` says."""
+    """The process gain over the recording, with the given change."""
     return course_picture(d, GAIN, lambda x, c: c[Slot.K] * change(x, c), float(d.plain[Slot.K]))
 
 
@@ -259,7 +259,7 @@ def load_over_time(d: Drawing) -> Picture:
 
 
 def busiest(x: Floats, length: int, usable: Mask | None = None) -> slice:
-    """The stretch of that many samples in which a signal travels most, samples not usable left out of account."""
+    """The stretch of that many samples in which a signal moves most, without unusable samples."""
     length = min(length, x.size)
     travel = np.abs(np.diff(x, prepend=x[0]))
     if usable is not None:
@@ -270,7 +270,7 @@ def busiest(x: Floats, length: int, usable: Mask | None = None) -> slice:
 
 
 def biggest_move(x: Floats, length: int, usable: Mask) -> slice:
-    """A stretch of that many samples about a signal's biggest move, a third of it before."""
+    """A stretch of that many samples about a signal's biggest move, one third of it before."""
     size = np.where(usable, np.abs(np.diff(x, prepend=x[0])), 0.0)
     length = min(length, x.size)
     first = min(max(int(np.argmax(size)) - length // 3, 0), x.size - length)
@@ -289,21 +289,21 @@ def around(where: Mask, length: int) -> slice:
 
 
 def comb(axis: Axis, at: Floats, count: np.ndarray) -> Picture:
-    """How often each of some values occurs."""
+    """Number of occurrences of each value."""
     x, none = np.repeat(at, 3), np.zeros(at.size)
     y = np.stack([none, count, none], axis=1).ravel().astype(float)
     return Picture("comb", axis, Axis("samples", ""), (Drawn("recorded", x, y),))
 
 
 def rebuilt(e: Floats, op: Floats, kp: float, ti: float) -> Floats:
-    """OP that a PI of gain [% OP/% PV] and integral time [samples] gives for an error, shape (n,), with the mean of
-    the recorded OP."""
+    """OP of a PI controller with gain [% OP/% PV] and integral time [samples] for an error, shape (n,), with the mean
+    of the recorded OP."""
     free = free_path(e, kp, ti)
     return np.asarray(free - free.mean() + op.mean())
 
 
 def rebuilt_course(s: Recording, part: slice, laws: dict[str, tuple[Floats, StatedSettings]]) -> Picture:
-    """A stretch of recorded OP, and OP rebuilt from errors, shape (n,), by some laws."""
+    """A stretch of recorded OP, and OP recomputed from errors, shape (n,), by some laws."""
     time, own = np.arange(part.start, part.stop) * s.dt_s, s.op[part]
     curves = [Drawn(k, time, rebuilt(e[part], own, law.kp, law.ti)) for k, (e, law) in laws.items()]
     return Picture("course", TIME, OP, (*curves, Drawn("recorded", time, own)))
@@ -315,7 +315,7 @@ def law_window(s: Recording, ti: float) -> int:
 
 
 def by_stated_law(s: Recording, where: Mask | None = None) -> Picture | None:
-    """OP about a mask's longest stretch (the busiest where None) and as the stated settings would have moved it.
+    """OP about a mask's longest stretch (the busiest if None) and as the stated settings would have moved it.
 
     None without SP or settings.
     """

@@ -1,4 +1,4 @@
-"""The plain loop of a recording: what drives its model, which samples count, and its fit from several starts."""
+"""The baseline model of a recording: its inputs, the samples judged, and its fit from several starts."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from identification.simulation.parameters import Slot
 
 @dataclass(frozen=True, slots=True)
 class Clip:
-    """A transmitter's end: its value [% PV], the model's constant for it, and where PV stands at it, shape (n,)."""
+    """A transmitter's range end: its value [% PV], the model's constant, and the samples of PV at it, shape (n,)."""
 
     value: float
     slot: Slot
@@ -35,7 +35,7 @@ class Clip:
 
 
 def inputs_of(s: Recording) -> ModelInputs:
-    """What drives the model of a recording."""
+    """Model inputs of a recording."""
     level = float(np.mean(s.pv))
     neighbour = s.neighbours[0] - s.neighbours[0].mean() if s.neighbours else None
     span = (float(s.pv.min()), float(s.pv.max()))
@@ -43,7 +43,7 @@ def inputs_of(s: Recording) -> ModelInputs:
 
 
 def without_spikes(pv: Floats, usable: Mask, limits: RecorderLimits = LIMITS.recorder) -> Mask:
-    """Usable samples less single values that stand far off both neighbours."""
+    """Usable samples without single values far from both neighbours."""
     rise = np.diff(pv)
     alone = np.zeros(pv.size, dtype=bool)
     size = np.median(np.abs(rise)) + 1e-9
@@ -61,11 +61,11 @@ def prepared(
     limits: ExplainLimits = LIMITS,
     experiment: bool = False,
 ) -> tuple[Problem, Fitted]:
-    """A problem whose outliers count less, and its plain fit; an experiment's is judged by simulation, with the
-    memory of what the most flexible model leaves: the nearest to its noise.
+    """A problem with robustly weighted outliers, and its baseline fit. An experiment is judged by simulation, with
+    the memory of the most flexible model's residual, which is nearest to the noise.
 
-    Samples at a clip are left out; those after them still count, and the model is clipped too. `brought` are the
-    constants of the user's own model, shape (SIZE,), one start more.
+    Samples at a clip are left out; those after them count, and the model is clipped too. `brought` are the constants
+    of the user's own model, shape (SIZE,), an additional start.
     """
     p = problem(inputs, y, usable, limits, NO_NOISE if experiment else None)
     if clip is not None:
@@ -80,7 +80,7 @@ def prepared(
 
 
 def plain(p: Problem, brought: Floats | None = None, clip: Clip | None = None) -> Fitted:
-    """The plain loop at its optimum, from several starts."""
+    """The baseline model at its optimum, from several starts."""
     starts = [] if brought is None else [brought.copy()]
     for process in plain_processes(p.y, p.inputs.op, p.usable, p.inputs.dt_s):
         c = as_parameters(process)

@@ -1,9 +1,9 @@
-"""Does a model with an effect do better on data it was not fitted to than without: asked of each candidate as it is
-taken, by what it foretells one step ahead, and of the explanation as it is told, by what its simulation misses.
+"""Proof on held-out data that a model with an effect is better than without: of each candidate by one-step-ahead
+prediction, and of the reported explanation by simulation error.
 
-A model has two optima: of what it foretells one step ahead, which a load in a closed loop does not bias, and of what
-its simulation misses of PV, which pictures and tables show. Names are found by the first. What is told as gained is
-measured by the second, against the plain loop that leaves least of PV by either.
+A model has two optima: of one-step-ahead prediction, which a load in closed loop does not bias, and of the simulation
+error of PV, which pictures and tables show. Names are found by the first. The reported gain is measured by the
+second, against the baseline model with the least residual of PV by either.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
 
 ENDS_OF_SIGNAL = ("opspan", "pvspan")
-"""Scales of constants that are places in a signal's range."""
+"""Scales of constants that are positions in a signal's range."""
 
 
 def passes(x: Round, better: Fitted, effect: Effect) -> bool:
-    """Whether the effect that a candidate adds to a round's fit stands: its constants within their range, no valve in
-    good order, spread over the record and, where it is bound to no time, on held-out spans.
+    """Whether a round's candidate passes: its constants are inside their range, its valve is not fault-free, and its
+    gain is spread over the record and, unless it is time-bound, present on held-out spans.
 
-    What an effect that is bound to a time will do later does not follow from what it did, so no span is held out.
+    The past of a time-bound effect does not predict its future, so no span is held out.
     """
     p, worse, limits = x.p, x.near, x.p.limits.proof
     sound = effect.friction in WEARS and better.model.c[Slot.STICKBAND] < limits.sound_valve
@@ -50,9 +50,9 @@ def passes(x: Round, better: Fitted, effect: Effect) -> bool:
 
 
 def runs_out(p: Problem, fit: Fitted) -> bool:
-    """Whether a constant of the effect added last ran to the far end of what it may be: the data want another name.
+    """Whether a constant of the last added effect is at the far end of its range: the data need another name.
 
-    A bound at zero, and one that is an end of a signal's range, is where an effect begins, and no far end.
+    A bound at zero, or at an end of a signal's range, is where an effect begins, not a far end.
     """
     edge = p.limits.proof.bound_share
     for q in fit.model.added[-1].params:
@@ -68,7 +68,7 @@ def runs_out(p: Problem, fit: Fitted) -> bool:
 
 
 def is_one_move(p: Problem) -> bool:
-    """Whether OP moves in two parts of the record alone: one experiment, of which no part is left to prove it on."""
+    """Whether OP moves in only two parts of the record: one experiment, with no part left for a proof."""
     limits = p.limits.proof
     parts = np.array_split(p.inputs.op, limits.parts)
     travel = np.sort([float(np.abs(np.diff(part)).sum()) for part in parts])
@@ -76,7 +76,7 @@ def is_one_move(p: Problem) -> bool:
 
 
 def is_spread(p: Problem, better: Fitted, worse: Fitted) -> bool:
-    """Whether a share of the gain remains without the two parts that pay most; True where OP moves in two."""
+    """Whether a share of the gain remains without the two parts that gain most; True where OP moves in two."""
     if is_one_move(p):
         return True
     won = 0.5 * p.weight * (worse.e**2 - better.e**2) / max(better.loss, 1e-30)
@@ -85,7 +85,7 @@ def is_spread(p: Problem, better: Fitted, worse: Fitted) -> bool:
 
 
 def held_out_gain(p: Problem, fits: tuple[Fitted, Fitted]) -> float:
-    """Gain in log likelihood [nat] on the part held out, of two models fitted to the first part, worse and better."""
+    """Gain in log likelihood [nat] on the held-out part, of two models fitted to the first part, worse and better."""
     early, cut = early_part(p)
     late = p.weight[cut:]
     whitenings = [whitened(p.y - simulate(p.inputs, fit.model.c), fit.ar, p.edges)[cut:] for fit in fits]
@@ -96,8 +96,8 @@ def held_out_gain(p: Problem, fits: tuple[Fitted, Fitted]) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Misfit:
-    """Root mean square [% PV] of PV less a simulation with its mean freed, and the share of PV's motion it fits, None
-    where PV does not move by more than it leaves anyway: such a span judges no model."""
+    """Root mean square [% PV] of PV less a simulation with a free mean, and the share of PV's motion that it fits,
+    None where PV does not move by more than the residual: such a span cannot judge a model."""
 
     rmse: float
     fit_pct: float | None
@@ -107,8 +107,8 @@ class Misfit:
 class OnOther:
     """Misfit of models on one other recording, over the same windows, and its samples.
 
-    baseline, explained : of the plain and the better model; without : of the better one with its effects taken out
-    and the rest as it is, which tells whether the effects are there too, or only the better constants beside them.
+    baseline, explained : of the baseline and the better model; without : of the better one without its effects and
+    otherwise unchanged. It shows whether the effects are present there, or only better constants.
     """
 
     baseline: Misfit
@@ -118,15 +118,15 @@ class OnOther:
 
     @property
     def share(self) -> float:
-        """Part of the misfit (mean square) that the effects remove there."""
+        """Share of the misfit (mean square) that the effects remove there."""
         return 1.0 - self.explained.rmse**2 / max(self.baseline.rmse**2, 1e-30)
 
 
 def anchored(y: Floats, simulated: Floats, window: int) -> Floats:
-    """A simulation begun anew in each window of so many samples: a straight line of load is added there, shape (n,).
+    """A simulation restarted in each window of `window` samples, with a linear load added there, shape (n,).
 
-    With 0 the whole is one window with a free bias. A level that integrates drifts in open loop under its load, and
-    then shows the load and not the model; over a window of some time constants it shows the model.
+    With 0 the whole is one window with a free bias. An integrating level drifts in open loop under its load, and then
+    shows the load instead of the model; over a window of some time constants it shows the model.
     """
     left = y - simulated
     if window <= 0 or window >= y.size:
@@ -135,8 +135,8 @@ def anchored(y: Floats, simulated: Floats, window: int) -> Floats:
 
 
 def misfit(y: Floats, simulated: Floats, window: int = 0, part: slice = slice(None)) -> Misfit:
-    """Misfit of a simulation anchored in windows, in a part of it; fit_pct is 100 (1 - rms error / rms of PV so
-    anchored itself)."""
+    """Misfit of a simulation anchored in windows, in a part of it; fit_pct is 100 (1 - rms error / rms of PV with the
+    same anchoring)."""
     left, still = y - anchored(y, simulated, window), without_lines(y, window)
     rmse, moves = float(np.std(left[part])), float(np.std(still[part]))
     if moves <= LIMITS.proof.spreads * float(np.std(still)):
@@ -148,11 +148,11 @@ def misfit(y: Floats, simulated: Floats, window: int = 0, part: slice = slice(No
 class HeldOut:
     """Before and after on the held-out part: gain of the innovations, and misfit of the simulations.
 
-    overall : misfit over the whole record of the models fitted to all of it, which is what pages draw, and drawn :
-    their constants, shape (SIZE,) each; window : samples after which the simulations begin anew, 0 for one run over
-    all; placed : whether the stem of a valve with friction is then placed anew too (friction.py); least_plain : least
-    held-out misfit of a plain loop by either criterion [% PV]; band : shortest and longest period [s] of the loop's
-    own band, and banded : held-out misfits there, None where no band is known.
+    overall : misfit over the whole record of the models fitted to all of it, as drawn on pages, and drawn : their
+    constants, shape (SIZE,) each; window : samples after which the simulations restart, 0 for one run over all;
+    placed : whether the stem of a valve with friction is then re-estimated (friction.py); least_plain : least
+    held-out misfit of a baseline model by either criterion [% PV]; band : shortest and longest period [s] of the
+    loop's band, and banded : held-out misfits there, None where no band is known.
     """
 
     gain: float
@@ -169,55 +169,55 @@ class HeldOut:
 
     @property
     def falls(self) -> bool:
-        """Whether the misfit falls over the whole."""
+        """Whether the misfit over the whole falls."""
         return self.overall[1].rmse < self.overall[0].rmse
 
     @property
     def is_blind(self) -> bool:
-        """Whether PV stands still in what was held out, which then judges no model."""
+        """Whether PV is constant in the held-out part, which then cannot judge a model."""
         return self.held[1].fit_pct is None
 
     @property
     def follows(self) -> bool:
-        """Whether the better model goes with PV at all on held-out data, and not merely less far astray."""
+        """Whether the better model follows PV at all on held-out data, not merely with a smaller error."""
         fit_pct = self.held[1].fit_pct
         return fit_pct is not None and fit_pct >= self.limits.proof.least_fit
 
     @property
     def carries(self) -> bool:
-        """Whether the misfit falls, over the whole and on held-out data against any plain loop, to less than PV's own
-        motion; what is seen plainly one step ahead has only to simulate nearly as well as any."""
+        """Whether the misfit falls, over the whole and on held-out data against any baseline model, below PV's own
+        motion. With clear one-step-ahead evidence the simulation need only be nearly as good as any."""
         before, after = min(self.held[0].rmse, self.least_plain), self.held[1].rmse
         return self.follows and ((after < before and self.falls) or self.seen_ahead)
 
     @property
     def seen_ahead(self) -> bool:
-        """Whether innovations of held-out data show the effect, and no plain loop simulates far better."""
+        """Whether innovations of held-out data show the effect, and no baseline model simulates far better."""
         most, (plain, better) = self.limits.proof.astray, self.overall
         near = self.held[1].rmse <= most * min(self.held[0].rmse, self.least_plain)
         return self.gain > self.limits.search.one_constant and near and better.rmse <= most * plain.rmse
 
     @property
     def share(self) -> float:
-        """Part of the held-out misfit (mean square) that the effect removes."""
+        """Share of the held-out misfit (mean square) that the effect removes."""
         before, after = (m.rmse**2 for m in self.held)
         return 1.0 - after / max(before, 1e-30)
 
     @property
     def share_in_band(self) -> float:
-        """The same in the loop's own band where one is known: beyond it the load drowns what a model says."""
+        """The same share in the loop's band if known: outside it the load dominates the model error."""
         before, after = (m.rmse**2 for m in self.banded or self.held)
         return 1.0 - after / max(before, 1e-30)
 
 
 def course(p: Problem, c: Floats, window: int, placed: bool) -> Floats:
-    """PV's deviation [% PV], shape (n,), as drawn and judged: anchored in windows, the stem placed anew or not."""
+    """PV's deviation [% PV], shape (n,), as drawn and judged: anchored in windows, the stem re-estimated or not."""
     return anchored(p.y, simulated_anew(p, c, window) if placed else simulate(p.inputs, c), window)
 
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """The plain and the better model as fitted to what is judged, bool, shape (n,), and least squares' plain loop."""
+    """The baseline and the better model fitted to judged samples, bool, shape (n,), and a least-squares baseline."""
 
     plain: Model
     better: Model
@@ -234,8 +234,8 @@ def pair_of(p: Problem, fits: tuple[Fitted, Fitted], judged: Mask) -> Pair:
 
 @dataclass(frozen=True, slots=True)
 class Criterion:
-    """How simulations are drawn and judged: begun anew after `window` samples, 0 for never, the stem `placed` anew or
-    not; band : shortest and longest period [samples] of the loop's own band, None where none is known."""
+    """How simulations are drawn and judged: restarted after `window` samples, 0 for never, with the stem re-estimated
+    if `placed`; band : shortest and longest period [samples] of the loop's band, None where unknown."""
 
     p: Problem
     window: int = 0
@@ -243,34 +243,34 @@ class Criterion:
     band: tuple[float, float] | None = None
 
     def free(self, c: Floats) -> Floats:
-        """PV as constants, shape (SIZE,), simulate it."""
+        """PV simulated by constants, shape (SIZE,)."""
         return simulated_anew(self.p, c, self.window) if self.placed else simulate(self.p.inputs, c)
 
     def misfit(self, c: Floats, part: slice = slice(None)) -> Misfit:
-        """What constants, shape (SIZE,), leave of a part of PV."""
+        """Misfit of constants, shape (SIZE,), in a part of PV."""
         return misfit(self.p.y, self.free(c), self.window, part)
 
     def banded(
         self, models: Iterable[Floats], band: tuple[float, float], first: slice, rest: slice
     ) -> Misfit:
-        """What models' constants, those that leave least of the first part in a band, leave of the rest there."""
+        """Misfit in a band on the rest, of the models' constants with the least misfit on the first part."""
         y = self.p.y
         left = min((in_band(y - self.free(c), *band) for c in models), key=lambda x: float(np.std(x[first])))
         rmse, moves = (float(np.std(x[rest])) for x in (left, in_band(y, *band)))
         return Misfit(rmse, 100.0 * (1.0 - rmse / max(moves, 1e-12)))
 
     def least(self, models: Iterable[Floats], part: slice = slice(None)) -> Floats:
-        """Of models' constants those that leave least of a part."""
+        """Of the models' constants, those with the least misfit in a part."""
         return min(models, key=lambda c: self.misfit(c, part).rmse)
 
     def nearer(self, model: Model, judged: Mask) -> Floats:
-        """Constants of a model, its plain loop's moved to where they leave least; an effect's stay as told."""
+        """Constants of a model with the baseline part refitted to the least misfit; those of effects are kept."""
         told = tuple(replace(row, params=()) for row in model.added)
         q = replace(self.p, edges=NO_NOISE, window=self.window, weight=judged.astype(float))
         return descended(q, Model(told, model.c), q.limits.search.full_steps).model.c
 
     def candidates(self, pair: Pair) -> tuple[list[Floats], list[Floats]]:
-        """Constants of the plain and of the better model by both criteria, each from several starts."""
+        """Constants of the baseline and of the better model by both criteria, each from several starts."""
         better = pair.better
         plains = [pair.plain.c, *(self.nearer(model, pair.judged) for model in (pair.plain, pair.simulated))]
         if not better.added:
@@ -282,7 +282,7 @@ class Criterion:
         return plains, [better.c, *(self.nearer(replace(better, c=c), pair.judged) for c in starts)]
 
     def compared(self, early: Pair, final: Pair, won: float) -> HeldOut:
-        """Both models as fitted to the first part, on the rest; `won` is what innovations gain there [nat]."""
+        """Both models, fitted to the first part, on the rest; `won` is the gain of the innovations there [nat]."""
         _, cut = early_part(self.p)
         first, rest = slice(cut), slice(cut, None)
         plains, betters = self.candidates(early)
@@ -307,12 +307,12 @@ class Criterion:
 def held_out(
     p: Problem, worse: Fitted, better: Fitted, cycle: int = 0, band: tuple[float, float] | None = None
 ) -> HeldOut:
-    """Both models fitted anew to the first part of the record and compared on the rest: over the whole of it, and
-    where load drowns the difference there, over windows of some time constants of the plain loop; a plain loop beside
-    itself over the whole alone.
+    """Fit both models again to the first part of the record and compare them on the rest: over the whole of it and,
+    where the load dominates the difference, over windows of some time constants of the baseline model. A baseline
+    model compared with itself is compared over the whole only.
 
-    cycle : samples of a cycle of a loop whose cycles show a valve with friction, 0 for any other; they are compared
-    over such windows too, the stem placed anew in each; band : as in Criterion.
+    cycle : samples of a cycle if the loop's cycles show a valve with friction, otherwise 0; the models are then also
+    compared over such windows, with the stem re-estimated in each; band : as in Criterion.
     """
     first = fitted_early(p, worse)
     fits = first, first if better is worse else fitted_early(p, better)

@@ -1,4 +1,4 @@
-"""One recording to be explained, what is found in it before any physics is fitted, and how its trends look."""
+"""One recording to be explained, the findings before any physics is fitted, and properties of its trends."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from identification.record import Floats, Mask
 
 @dataclass(frozen=True, slots=True)
 class SeenInCycles:
-    """A faulty valve that the loop's own cycles, or slips, show, with the process behind it.
+    """A faulty valve shown by the loop's own cycles or slips, with the process behind it.
 
-    stretches : between two turns of OP, or in a loop that does not cycle between moves of the stem, each a trial by
-    itself; agreeing : share of them in which PV goes as behind this valve and not as behind a free one [-]; cycle_s :
-    mean length of two of them [s]; cycling : whether they lie between turns of OP; told : the valve's figures by
-    name, with 90 % intervals, as the night tells them.
+    stretches : number of independent trials, each between two OP reversals, or without a cycle between stem moves;
+    agreeing : share of them in which PV fits this valve better than a free one [-]; cycle_s : mean length of two of
+    them [s]; cycling : whether they are between OP reversals; told : the valve's figures by name, with 90 %
+    intervals, as in the batch run.
     """
 
     process: Fopdt
@@ -38,12 +38,11 @@ class SeenInCycles:
 class Recording:
     """One recording to be explained.
 
-    sp : shape (n,) [% PV], None where not recorded; pv, op : shape (n,) [% of span]; usable : bool, shape (n,);
-    dt_s [s]; stamp_s : stamps as logged [s]; stated : the controller as the plant states it; ranged : whether PV's
-    range is stated; neighbours : OPs of other loops on the same clock, each shape (n,);
-    kind : the loop's type as stated, lower case; cycles : the faulty valve that its cycles show, None where they show
-    none; free_valve : whether it cycles and its cycles convict no valve; period_s : of its cycle [s], 0 where it has
-    none; limits : what decides about it.
+    sp : shape (n,) [% PV], None where not recorded; pv, op : shape (n,) [% of span]; usable : bool, shape (n,); dt_s
+    [s]; stamp_s : stamps as logged [s]; stated : the controller as stated by the plant; ranged : whether PV's range
+    is stated; neighbours : OPs of other loops on the same clock, each shape (n,); kind : the loop's type as stated,
+    lower case; cycles : the faulty valve that its cycles show, None if none; free_valve : whether it cycles and its
+    cycles show no faulty valve; period_s : of its cycle [s], 0 without one; limits : its thresholds.
     """
 
     sp: Floats | None
@@ -63,15 +62,15 @@ class Recording:
 
     @property
     def every_scan(self) -> bool:
-        """Whether every scan of the controller is recorded; one that is not stated has the usual scan."""
+        """Whether every scan of the controller is recorded; without a stated scan the usual one is assumed."""
         limits = self.limits.controller
         scans = self.dt_s / limits.typical_scan_s if self.stated is None else self.stated.scans
         return scans < limits.thinned
 
     @property
     def band(self) -> tuple[float, float] | None:
-        """Shortest and longest period [samples] in which a model of the loop speaks and not its slow load: an eighth
-        of its cycle and two of them, without a cycle all up to four integral times; None where neither is known."""
+        """Shortest and longest period [samples] at which the model, not the slow load, determines PV: an eighth of
+        its cycle and two of them; without a cycle all up to four integral times; None where neither is known."""
         if self.period_s > 0.0:
             cycle = self.period_s / self.dt_s
             return cycle / FINEST, CYCLES * cycle
@@ -81,14 +80,14 @@ class Recording:
 
 
 FINEST, CYCLES, INTEGRALS = 8.0, 2.0, 4.0
-"""The loop's band: harmonics of a cycle up to the eighth, its second subharmonic, integral times; ours: play and
-stick-slip show in the first seven harmonics, a load below half of the cycle's frequency."""
+"""The loop's band: harmonics of a cycle up to the eighth, its second subharmonic, integral times; ours: backlash and
+stick-slip appear in the first seven harmonics, a load below half of the cycle's frequency."""
 STEP = "step_pct"
-"""Name of the number that says in which steps a finding leaves PV [% PV]."""
+"""Name of the number that gives the resolution of PV after a finding [% PV]."""
 
 
 def straight(pv: Floats) -> Mask:
-    """True where a moving trend is straight through three samples, shape (n,)."""
+    """True where a moving trend is linear through three samples, shape (n,)."""
     out = np.zeros(pv.size, dtype=bool)
     rise = np.diff(pv)
     tiny = 2e-7 * max(float(np.abs(pv).max()), 1e-3)
@@ -97,14 +96,14 @@ def straight(pv: Floats) -> Mask:
 
 
 def level_gaps(pv: Floats) -> Floats:
-    """Differences of neighbouring values that occur, in the middle nine tenths of the range; shape (levels - 1,)."""
+    """Differences between neighbouring values of PV, in the middle nine tenths of the range; shape (levels - 1,)."""
     low, high = np.quantile(pv, [0.05, 0.95])
     return np.diff(np.unique(pv[(pv >= low) & (pv <= high)]))
 
 
 def straightened(x: Floats, share: float, limits: RecorderLimits) -> bool:
-    """Whether at least that share of a trend lies on straight lines that no grid makes; on one, differences of values
-    are multiples of the smallest that is common."""
+    """Whether at least that share of a trend lies on straight lines not caused by a grid; on a grid, differences of
+    values are multiples of the smallest common one."""
     gaps = level_gaps(x)
     if gaps.size < 5 or float(straight(x).mean()) < share:
         return False
@@ -113,9 +112,9 @@ def straightened(x: Floats, share: float, limits: RecorderLimits) -> bool:
 
 
 def least_jump(pv: Floats, limits: RecorderLimits = LIMITS.recorder) -> float:
-    """The least move [% PV] of a trend that stands and then jumps, far over its own resolution; 0 of any other.
+    """The smallest move [% PV] of a trend that stays constant and then jumps, far above its resolution; otherwise 0.
 
-    A sensor that sticks makes such a trend, or a historian that keeps changes of some size alone.
+    A sticking sensor makes such a trend, or a historian that records only changes of some size.
     """
     moves, gaps = np.abs(np.diff(pv)), np.diff(np.unique(pv))
     moves = moves[moves > 0.0]
@@ -128,9 +127,9 @@ def least_jump(pv: Floats, limits: RecorderLimits = LIMITS.recorder) -> float:
 
 
 def unlogged(stamp_s: Floats, n: int, dt_s: float, limits: RecorderLimits = LIMITS.recorder) -> Mask:
-    """True where a record of n samples holds a value over from before because none was logged, shape (n,).
+    """True where a record of n samples holds an earlier value because none was logged, shape (n,).
 
-    Nothing is marked where the record does not begin with the first stamp and end with the last.
+    Nothing is marked unless the record begins with the first stamp and ends with the last.
     """
     out = np.zeros(n, dtype=bool)
     at = (stamp_s - stamp_s[0]) / dt_s if stamp_s.size else stamp_s
@@ -142,9 +141,9 @@ def unlogged(stamp_s: Floats, n: int, dt_s: float, limits: RecorderLimits = LIMI
 
 
 def is_experiment(s: Recording) -> bool:
-    """Whether OP was moved by hand or by a script: nothing is known of a controller, and OP does not answer PV.
+    """Whether OP was moved by hand or by a script: no controller is known, and OP does not respond to PV.
 
-    In a loop that cycles, so that PV tells OP's moves and is told by them, OP must stand still nearly always.
+    In a cycling loop, in which OP and PV predict each other, OP must be constant nearly always.
     """
     if s.sp is not None or s.stated is not None or fed_back(s.op, s.pv) >= s.limits.controller.feedback:
         return False
@@ -153,7 +152,7 @@ def is_experiment(s: Recording) -> bool:
 
 
 def coarser_by(s: Recording) -> int:
-    """Of how many samples of an experiment one tells all there is to tell of its process; 1 where each is needed."""
+    """Downsampling factor of an experiment that keeps the information on its process; 1 if every sample is needed."""
     limits = s.limits.search
     most = s.pv.size // limits.experiment_samples
     if most < 2:

@@ -1,9 +1,9 @@
-"""What a flexible reference foretells, on data held out, of the innovations that an explanation leaves.
+"""How well a flexible reference predicts, on held-out data, the innovations of an explanation.
 
-A list of strange physics ends where the next plant begins. The reference names none: it has the ways in which
-anything may act on a loop (by what OP did, by size, level, direction and switching, by where the loop has been, by
-sensor or clock), each a ridge regression of the innovations on what was known before them. Noise cannot be foretold
-on data that no weight was fitted to, so what a way foretells there is physics that the explanation has not.
+No list of possible physics is complete. The reference names no effect: it has classes of influences on a loop (by
+past OP, by size, level, direction and switching, by past PV, by sensor or clock), each a ridge regression of the
+innovations on earlier signals. Noise is not predictable on data that no weight was fitted to, so what a class
+predicts there is physics that the explanation does not include.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from identification.simulation.vessel import plain_vessel
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """The way that foretells most, and how much [nat]."""
+    """The class with the best prediction, and its gain [nat]."""
 
     way: str = ""
     gain: float = 0.0
@@ -40,11 +40,11 @@ def response(x: Floats, c: Floats, dt_s: float) -> Floats:
 
 
 class LoopSignals:
-    """What a way may act by, as a model of constants c, shape (SIZE,), has it: what is `through` the valve [% OP],
-    the same and PV as known before [% PV] about their means, shape (n,) each, and the time constant [s].
+    """Signals of the influence classes, for a model of constants c, shape (SIZE,): flow `through` the valve [% OP],
+    the same and earlier PV [% PV] about their means, shape (n,) each, and the time constant [s].
 
-    An experiment's errors are those of its simulation and go on from sample to sample, so that recorded PV tells them
-    whatever makes them: there PV is the simulation's.
+    Errors of an experiment are simulation errors and are correlated in time, so recorded PV predicts them whatever
+    their cause: there PV is the simulated one.
     """
 
     def __init__(self, p: Problem, c: Floats) -> None:
@@ -56,16 +56,16 @@ class LoopSignals:
         self.lagging[Slot.T] = self.lag_s
 
     def response(self, x: Floats) -> Floats:
-        """The response of PV to a load, shape (n,), its time constant kept within the record."""
+        """The response of PV to a load, shape (n,), with the time constant limited by the record."""
         return response(x, self.lagging, self.dt_s)
 
     def ahead(self, x: Floats) -> Floats:
-        """What a signal, shape (n,), is ahead of its own lag."""
+        """A signal, shape (n,), less its own lag."""
         return x - lagged(x, REFERENCE.fast * self.lag_s, self.dt_s)
 
 
 def on_above(x: Floats, at: float, band: float) -> Floats:
-    """1 where x, shape (n,), was last above `at` plus half a band, 0 where it was last below it less half a band."""
+    """1 where x, shape (n,), was last above `at` + half a band, 0 where it was last below `at` - half a band."""
     told = np.where(x > at + band / 2.0, 1.0, np.where(x < at - band / 2.0, 0.0, np.nan))
     told[0] = float(x[0] > at)
     last = np.maximum.accumulate(np.where(np.isnan(told), 0, np.arange(x.size)))
@@ -73,14 +73,14 @@ def on_above(x: Floats, at: float, band: float) -> Floats:
 
 
 def by_level(o: LoopSignals) -> list[Floats]:
-    """Gain and load that go with PV's level, and what PV switches."""
+    """Gain and load that depend on PV's level, and loads switched by PV."""
     out = [o.response(o.flow * o.pv), o.response(o.flow * o.pv**2), o.pv**2, o.pv**3]
     edges, span = np.quantile(o.pv, REFERENCE.levels[:3]), float(np.ptp(o.pv))
     return out + [o.response(on_above(o.pv, at, band * span)) for at in edges for band in REFERENCE.bands[:2]]
 
 
 def by_switch(o: LoopSignals) -> list[Floats]:
-    """Load and gain that another regime of the flow has, which ends elsewhere than it began."""
+    """Load and gain of another flow regime, which ends at another level than it begins."""
     span = float(np.subtract(*np.quantile(o.flow, (0.99, 0.01))))
     out = []
     for at in np.quantile(o.flow, REFERENCE.levels):
@@ -91,7 +91,7 @@ def by_switch(o: LoopSignals) -> list[Floats]:
 
 
 def by_history(o: LoopSignals) -> list[Floats]:
-    """Load and gain that go with where PV has been, and with what the valve has travelled."""
+    """Load and gain that depend on past PV and on past travel of the valve."""
     travel = np.abs(np.diff(o.flow, prepend=o.flow[0]))
     longest_s = REFERENCE.of_record * o.flow.size * o.dt_s
     out = []
@@ -103,7 +103,7 @@ def by_history(o: LoopSignals) -> list[Floats]:
 
 
 def by_direction(o: LoopSignals) -> list[Floats]:
-    """Gain, load and reading that go with the direction and the speed of flow and of PV."""
+    """Gain, load and reading that depend on the direction and the speed of flow and of PV."""
     flow, pv = o.ahead(o.flow), o.ahead(o.pv)
     way, rise = (np.tanh(3.0 * x / (float(np.std(x)) + 1e-9)) for x in (flow, pv))
     loads = [o.response(x) for x in (way, way * o.flow, rise, rise * o.flow)]
@@ -111,7 +111,7 @@ def by_direction(o: LoopSignals) -> list[Floats]:
 
 
 def by_sensor(p: Problem, fit: Fitted) -> list[Floats]:
-    """Of innovations as they are: where PV stands, and the move of PV that is foretold, by its size and way."""
+    """For the innovations directly: whether PV is constant, and its predicted move by size and direction."""
     one, two = (np.concatenate((np.full(k, p.y[0]), p.y[:-k])) for k in (1, 2))
     move = _bounded(p.y - fit.e - one)
     stands = (one == two).astype(float)
@@ -145,11 +145,11 @@ WAYS: Mapping[str, Callable[[LoopSignals], list[Floats]]] = {
     "history": by_history,
     "direction": by_direction,
 }
-"""The ways in which anything may act on PV, each with its signals, shape (n,) each."""
+"""The classes of influences on PV, each with its signals, shape (n,) each."""
 
 
 def ways(p: Problem, fit: Fitted) -> Iterator[tuple[str, list[Floats]]]:
-    """All ways with their signals in the innovations' place, shape (n,) each."""
+    """All classes with their whitened signals, shape (n,) each."""
     o = LoopSignals(p, fit.model.c)
     for name, way in WAYS.items():
         yield name, [whitened(x, fit.ar, p.edges) for x in way(o)]
@@ -158,8 +158,8 @@ def ways(p: Problem, fit: Fitted) -> Iterator[tuple[str, list[Floats]]]:
 
 
 def unfollowed(p: Problem, fit: Fitted) -> Callable[[Floats], Floats]:
-    """Takes from signals, shape (n,) or (n, m), weighted as innovations are, what a fit's own constants and its noise
-    model can follow linearly."""
+    """A function that removes from signals, shape (n,) or (n, m), weighted as innovations are, the part that a fit's
+    own constants and its noise model can follow linearly."""
     r = p.y - simulate(p.inputs, fit.model.c)
     own = np.concatenate((sensitivities(p, fit.model, fit.ar), lag_means(r, p.edges))) * np.sqrt(p.weight)
     span = np.linalg.qr(np.nan_to_num(own).T)[0]
@@ -167,7 +167,7 @@ def unfollowed(p: Problem, fit: Fitted) -> Callable[[Floats], Floats]:
 
 
 def left_freely(p: Problem, fit: Fitted) -> Floats:
-    """What the flexible model leaves of a fit's weighted innovations, shape (n,)."""
+    """Residual of a fit's weighted innovations under the flexible model, shape (n,)."""
     root, rest, o = np.sqrt(p.weight), unfollowed(p, fit), LoopSignals(p, fit.model.c)
     free = past_moves(o) + bent_moves(o)
     e = rest(fit.e * root)
@@ -178,8 +178,8 @@ def left_freely(p: Problem, fit: Fitted) -> Floats:
 
 
 def best_prediction(p: Problem, fit: Fitted, clock: bool = True) -> Prediction:
-    """The way that foretells most of a fit's innovations on data held out, a clock among them or not; what the fit's
-    constants and its noise model could take up is no way's."""
+    """The class with the best prediction of a fit's innovations on held-out data, optionally with a clock; the part
+    that the fit's constants and its noise model could follow is excluded."""
     root, rest = np.sqrt(p.weight), unfollowed(p, fit)
     e = rest(fit.e * root)
     best = Prediction("clock", _gained(fit, e, _by_clock(e, root))) if clock else Prediction()
@@ -193,7 +193,7 @@ def best_prediction(p: Problem, fit: Fitted, clock: bool = True) -> Prediction:
 
 
 def _bounded(x: Floats) -> Floats:
-    """A signal, shape (n,), with its widest moves cut."""
+    """A signal, shape (n,), with its largest moves clipped."""
     most = REFERENCE.widest * np.std(x)
     return np.clip(x, -most, most)
 
@@ -205,7 +205,7 @@ def _folds(n: int) -> Iterator[slice]:
 
 
 def _by_ridge(e: Floats, x: Floats, prior: float) -> Floats:
-    """What is left of e, shape (n,), in each part when x, shape (n, m), foretells it as the other parts tell."""
+    """Residual of e, shape (n,), in each part when the other parts train its prediction from x, shape (n, m)."""
     gram, slope, out = x.T @ x, x.T @ e, np.empty(e.size)
     ridge = prior * e.size * np.eye(x.shape[1])
     for part in _folds(e.size):
@@ -216,7 +216,7 @@ def _by_ridge(e: Floats, x: Floats, prior: float) -> Floats:
 
 
 def _by_clock(e: Floats, root: Floats) -> Floats:
-    """The same where a wave foretells it, of the period that has most in all its harmonics in the other parts."""
+    """The same with a periodic prediction, of the period with the most power in all harmonics in the other parts."""
     n, out, each = e.size, np.empty(e.size), np.arange(1, REFERENCE.harmonics + 1)
     bounded = _bounded(e)
     for part in _folds(n):
@@ -237,6 +237,6 @@ def _by_clock(e: Floats, root: Floats) -> Floats:
 
 
 def _gained(fit: Fitted, e: Floats, left: Floats) -> float:
-    """Log likelihood [nat] that is gained where `left` is left of e, shape (n,) each."""
+    """Gain in log likelihood [nat] from e to `left`, shape (n,) each."""
     won = 0.5 * fit.count * np.log(float(e @ e) / max(float(left @ left), 1e-30))
     return float(won) if np.isfinite(won) else 0.0

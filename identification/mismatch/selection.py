@@ -1,5 +1,5 @@
-"""One round of effects added to a fit: every variant of the catalogue started, screened, followed, and ranked by what
-it gains."""
+"""One round of candidates added to a fit: every variant of the catalogue is started, screened, refined and ranked by
+its penalised gain."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from identification.simulation.parameters import Slot, Variant, neutral
 
 Progress = Callable[[str], None]
 KNOWN_TYPES = ("flow", "pressure", "temperature", "level")
-"""Loop types under which a row may be left out; any other text says nothing."""
+"""Loop types for which a row may be excluded; any other text is ignored."""
 NEEDS: Mapping[str, Callable[[Round], bool]] = {
     "every scan": lambda x: x.s.every_scan,
     "experiment": lambda x: x.p.by_simulation,
     "moves": lambda x: not is_one_move(x.p),
     "neighbour": lambda x: x.p.inputs.neighbour is not None,
 }
-"""Whether what a row needs is in the recording; what is not here always is."""
+"""Tests of whether the recording has what a row needs; needs not listed here are always met."""
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A fitted candidate: what it gains over the fit before, and what is left of that after its penalty."""
+    """A fitted candidate: its gain over the previous fit, and its penalised gain."""
 
     fit: Fitted
     gain: float
@@ -39,26 +39,25 @@ class Candidate:
 
     @property
     def name(self) -> str:
-        """The name of the row that it adds."""
+        """The name of the added row."""
         return self.fit.names[-1]
 
     @property
     def row(self) -> Variant:
-        """The row that it adds."""
+        """The added row."""
         return self.fit.model.added[-1]
 
 
 def silent(_: str) -> None:
-    """Progress that nobody watches."""
+    """Progress without output."""
 
 
 def compete(
     x: Round, rows: tuple[Variant, ...] = CANDIDATES, tell: Progress = silent, least: float = 0.0
 ) -> list[Candidate]:
-    """All rows as candidates of a fit to which each is added, best first; the better half followed to the end.
+    """All rows as candidates, each added to the fit, best first; the better half is followed to the end.
 
-    tell : is told each row's name before it is tried; least : what a candidate has to come to, penalty taken off, to
-    be of any use [nat].
+    tell : called with each row's name before it is tried; least : smallest useful penalised gain [nat].
     """
     begun = [first_try(x, row, least, tell) for row in rows if applies(x, row)]
     firsts = counted_alike(x, [first for first, _ in begun])
@@ -71,7 +70,7 @@ def compete(
 
 
 def applies(x: Round, row: Variant) -> bool:
-    """Whether a row may be added: what it needs is there, and it is not in the model yet."""
+    """Whether a row may be added: its needs are met, and it is not in the model yet."""
     effect, near = about(row.name), x.near
     taken = {p.slot for r in near.model.added for p in r.params}
     if row.name in near.names or taken & {p.slot for p in row.params}:
@@ -81,14 +80,14 @@ def applies(x: Round, row: Variant) -> bool:
     if row.needs in NEEDS and not NEEDS[row.needs](x):
         return False
     if x.p.by_simulation and effect.timed and row.opponent is None:
-        return False  # a load that is added is told by innovations
-    # behind one friction a second of the same stem cannot be told without the stem's position
+        return False  # an added load is judged by innovations
+    # behind one friction, a second of the same stem is not identifiable without the stem's position
     told = x.s.free_valve or any(about(name).friction is not None for name in near.names)
     return effect.friction is None or not told
 
 
 def penalty(p: Problem, row: Variant) -> float:
-    """Log likelihood [nat] that a variant costs."""
+    """Penalty of a variant [nat]."""
     limits = p.limits.search
     hidden = limits.hidden_penalty if p.by_simulation else limits.parameter_penalty
     free = sum(hidden if q.hidden else limits.parameter_penalty for q in row.params)
@@ -96,26 +95,26 @@ def penalty(p: Problem, row: Variant) -> float:
 
 
 def penalised(x: Round, fit: Fitted) -> Candidate:
-    """A fit as a candidate beside the fit before."""
+    """A fit as a candidate, with its gain over the previous fit."""
     won = gain(fit, x.near)
     return Candidate(fit, won, won - penalty(x.p, fit.model.added[-1]))
 
 
 def best_of(x: Round, models: list[Model], steps: int, aim: float = math.inf) -> Candidate:
-    """The best of some starts, followed for some steps, as far as they come under `aim`."""
+    """The best of some starts after some steps, of those that can reach `aim`."""
     return penalised(x, min((descended(x.p, m, steps, aim) for m in models), key=lambda f: f.loss))
 
 
 def worth_following(p: Problem, least: float) -> float:
-    """What a candidate of the first round has to come to, to be followed [nat], its penalty taken off: so far below
-    what it is of use from as any may lie, or at a share of that where that is less."""
+    """Smallest penalised gain of the first round for which a candidate is followed [nat]: below the useful gain by
+    the possible improvement, or a share of the useful gain if that is less."""
     limits = p.limits.search
     return min(limits.may_come_to * least, least + limits.worth_following)
 
 
 def first_try(x: Round, row: Variant, least: float, tell: Progress) -> tuple[Candidate, list[Model]]:
-    """The candidate that a few steps make of a row's best start, and all its starts, the best first; a start that
-    will not come to anything worth following is left."""
+    """The candidate after a few steps from a row's best start, and all its starts, the best first; a hopeless start
+    is stopped."""
     tell(row.name)
     p, near, limits = x.p, x.near, x.p.limits.search
     first = models = start_models(x, row)
@@ -130,7 +129,7 @@ def first_try(x: Round, row: Variant, least: float, tell: Progress) -> tuple[Can
 
 
 def followed(x: Round, first: Candidate, models: list[Model], least: float) -> Candidate:
-    """A candidate of the first round followed to the end, from there and from its next starts."""
+    """A candidate of the first round followed to the end, from its result and from its next starts."""
     if first.penalised < worth_following(x.p, least) and (least > 0.0 or not x.p.by_simulation):
         return first
     limits = x.p.limits.search
@@ -139,9 +138,9 @@ def followed(x: Round, first: Candidate, models: list[Model], least: float) -> C
 
 
 def counted_alike(x: Round, found: list[Candidate]) -> list[Candidate]:
-    """An experiment's candidates with errors that count as many as those of the one that leaves the whitest: what
-    another leaves is correlated by what it lacks, and not by the noise. A course takes the noise itself up, and is
-    counted by itself."""
+    """Count an experiment's candidates with the number of independent errors of the whitest one. The correlation of
+    another comes from its model error, not from the noise. A load course absorbs the noise itself and keeps its own
+    number."""
     most = max((c.fit.count for c in found if c.row.opponent is None), default=0)
     if not x.p.by_simulation:
         return found
@@ -149,9 +148,9 @@ def counted_alike(x: Round, found: list[Candidate]) -> list[Candidate]:
 
 
 def gain_over_opponent(x: Round, first: Candidate) -> Candidate:
-    """A candidate of an experiment that has an opponent, by what it gains over that: the same course of a load that
-    is added, which is no effect but the plain loop's own. One that moves PV as much as OP does needs no such proof:
-    whether it changes the gain too, the record may not tell."""
+    """A candidate of an experiment, by its gain over its opponent if any: the same course of an added load, which
+    belongs to the baseline model. A course that moves PV as much as OP does needs no such proof: the record may not
+    show whether it also changes the gain."""
     p, near, row = x.p, x.near, first.row.opponent
     if row is None or not p.by_simulation:
         return first
@@ -167,7 +166,7 @@ def gain_over_opponent(x: Round, first: Candidate) -> Candidate:
 def sticking_candidates(
     x: Round, tried: list[Candidate], rows: tuple[Variant, ...], tell: Progress
 ) -> list[Candidate]:
-    """Sticking valves scanned about the best play, where a play or the like gains anything at all."""
+    """Sticking valves scanned near the best backlash, if backlash or a similar effect gains anything."""
     plays = [c for c in tried if about(c.name).friction is Friction.PLAY]
     hints = [c.gain for c in tried if about(c.name).friction is not None]
     if not plays or max(hints) < x.p.limits.search.sticking_hint:
@@ -182,7 +181,7 @@ def sticking_candidates(
 
 
 def without(model: Model, rows: Iterable[Variant]) -> Model:
-    """A model less some of what is added to it, the constants of those at rest."""
+    """A model without some of its additions, their constants neutral."""
     c, rest, gone = model.c.copy(), neutral(), list(rows)
     for row in gone:
         for slot in [p.slot for p in row.params] + list(row.fixed):
@@ -192,10 +191,10 @@ def without(model: Model, rows: Iterable[Variant]) -> Model:
 
 
 def integrating_or_first_order(p: Problem, free: Fitted, s: Recording) -> tuple[Problem, Fitted]:
-    """Problem and plain fit, the time constant kept within the record where it might as well have no end.
+    """Problem and baseline fit, with the time constant limited by the record if an integrator fits as well.
 
-    A plain loop whose time constant outlasts the record is an integrator under another name. Where an integrator
-    does as well with one constant fewer, the plain loop is one that settles within the record.
+    A baseline model with a time constant longer than the record is an integrator. Where an integrator with one
+    constant fewer fits as well, the baseline model is one that settles within the record.
     """
     row, x = next(v for v in CANDIDATES if v.replaces), Round(p, free, s)
     longest = p.limits.search.settles * p.inputs.dt_s * p.y.size

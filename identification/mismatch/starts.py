@@ -1,4 +1,4 @@
-"""Where the search for an effect begins: steps and lines located in what a fit leaves, each variant's starts put in
+"""Starts of the search for an effect: steps and lines located in a fit's residual, the starts of each variant in
 order, and two-mode processes solved on a grid."""
 
 from __future__ import annotations
@@ -31,20 +31,20 @@ from identification.simulation.vessel import plain_vessel
 
 
 def early_part(p: Problem) -> tuple[Problem, int]:
-    """The problem with the first part of the record alone to be fitted, and the first sample held out."""
+    """The problem with only the first part of the record to be fitted, and the first sample held out."""
     cut = int((1.0 - p.limits.proof.held_out) * p.y.size)
     return replace(p, weight=np.where(np.arange(p.y.size) < cut, p.weight, 0.0)), cut
 
 
 def fitted_early(p: Problem, fit: Fitted) -> Fitted:
-    """A fit's model fitted anew to the first part of the record; a model's START is of its first sample."""
+    """A fit's model refitted to the first part of the record; a model's START is of its first sample."""
     return descended(early_part(p)[0], fit.model, p.limits.search.screen_steps)
 
 
 @dataclass(frozen=True)
 class Round:
-    """One round of the search: a problem with the places at which a load may step in, a fit to which effects are
-    added, the recording, which says what is asked, and the frequencies at which a load may act [rad/s]."""
+    """One round of the search: a problem with the possible times of load steps, a fit to which effects are added, the
+    recording, which selects the candidates, and the frequencies of possible loads [rad/s]."""
 
     p: Problem
     near: Fitted
@@ -59,21 +59,21 @@ class Round:
 
     @cached_property
     def early(self) -> Fitted:
-        """The fit anew to the first part of the record, which every candidate has to outdo on the rest."""
+        """The fit refitted to the first part of the record; every candidate must be better on the rest."""
         return fitted_early(self.p, self.near)
 
     def free(self, x: Floats) -> Floats:
-        """Weighted innovations of what is left, shape (n,), that the fit's own constants cannot lessen, linearly."""
+        """Part of the weighted innovations, shape (n,), that the fit's own constants cannot reduce linearly."""
         e = whitened(x, self.near.ar, self.p.edges) * np.sqrt(self.p.weight)
         return e - self.directions @ (self.directions.T @ e)  # type: ignore[no-any-return]
 
     def left(self, model: Model) -> float:
-        """Sum of squares that a model leaves so."""
+        """Sum of squares of this part under a model."""
         e = self.free(self.p.y - simulate(self.p.inputs, model.c))
         return float(e @ e)
 
     def on_line(self, model: Model) -> Model:
-        """A start with the parameter that PV goes with in a straight line where it leaves least."""
+        """A start with its linear parameter at the least residual."""
         slot = model.added[-1].linear
         if slot is None:
             return model
@@ -86,14 +86,14 @@ class Round:
 
 
 def round_of(p: Problem, near: Fitted, s: Recording) -> Round:
-    """A round of which steps and lines are located in what a fit leaves."""
+    """A round with steps and lines located in a fit's residual."""
     held = p.inputs.step_at if any(r.needs == "steps" for r in near.model.added) else step_places(p, near)
     located = replace(p, inputs=replace(p.inputs, step_at=held))
     return Round(located, near, s, line_frequencies(p, near))
 
 
 def step_places(p: Problem, fit: Fitted) -> tuple[int, ...]:
-    """Samples at which a step of the load explains the innovations best, greedily, shape (STEPS,)."""
+    """Samples at which a load step explains the innovations best, chosen greedily, shape (STEPS,)."""
     e = fit.e * (p.weight > 0)
     shut, pulse = after_gaps(p, fit), step_pulse(p, fit)
     places: list[int] = []
@@ -115,7 +115,7 @@ def step_pulse(p: Problem, fit: Fitted) -> Floats:
 
 
 def _pulse(answer: Floats, p: Problem, fit: Fitted) -> Floats:
-    """An answer whitened after a lead of rest, shape (n - lead,)."""
+    """A response whitened after a lead of rest, shape (n - lead,)."""
     led = np.concatenate((np.zeros(STARTS.lead), answer))[: p.y.size]
     return whitened(led, fit.ar, p.edges)[STARTS.lead :]
 
@@ -134,7 +134,7 @@ def _best_place(e: Floats, pulse: Floats, shut: Mask) -> int:
 
 
 def after_gaps(p: Problem, fit: Fitted) -> Mask:
-    """True in gaps and until what OP did in them has died away in PV, shape (n,): no step can be told there."""
+    """True in gaps and until their OP moves have decayed in PV, shape (n,): no step can be identified there."""
     limits = p.limits.search
     held = round(float(fit.model.c[Slot.L] + limits.forgotten * fit.model.c[Slot.T]) / p.inputs.dt_s)
     out = np.zeros(p.y.size, dtype=bool)
@@ -144,7 +144,7 @@ def after_gaps(p: Problem, fit: Fitted) -> Mask:
 
 
 def at_inlet(p: Problem, fit: Fitted) -> bool:
-    """Whether the steps found by step_places came through the process, or PV jumped by itself, as a sensor does."""
+    """Whether the steps found by step_places came through the process; otherwise PV jumped, as with a sensor."""
     e = fit.e * (p.weight > 0)
     through, jump = step_pulse(p, fit), _pulse(np.ones(p.y.size), p, fit)
     near, came, jumped = p.limits.search.step_near, 0.0, 0.0
@@ -155,14 +155,14 @@ def at_inlet(p: Problem, fit: Fitted) -> bool:
 
 
 def _share(e: Floats, pulse: Floats, at: int) -> float:
-    """Sum of squares of innovations that a pulse at a sample takes away."""
+    """Reduction of the sum of squares of innovations by a pulse at a sample."""
     at = min(max(at, 0), e.size - 2)
     part = pulse[: e.size - at]
     return float(part @ e[at : at + part.size]) ** 2 / max(float(part @ part), 1e-300)
 
 
 def line_frequencies(p: Problem, fit: Fitted) -> tuple[float, ...]:
-    """Angular frequencies [rad/s] of the lines that stand out most from their surroundings in the innovations."""
+    """Angular frequencies [rad/s] of the innovations' lines with the highest power over their surroundings."""
     e = fit.e * (p.weight > 0)
     power = np.abs(np.fft.rfft(e, 2 * e.size)) ** 2
     limits = p.limits.search
@@ -178,7 +178,7 @@ def line_frequencies(p: Problem, fit: Fitted) -> tuple[float, ...]:
 
 
 def start_models(x: Round, row: Variant) -> list[Model]:
-    """Starts of a row added to a fit; of an oscillating load one a frequency."""
+    """Starts of a row added to a fit; for an oscillating load one per frequency."""
     on_lines = tuple({int(Slot.OMEGA): w} for w in x.omegas)
     begun, out = x.near.model, []
     for start in on_lines if row.needs == "line" else row.starts:
@@ -197,12 +197,12 @@ def start_models(x: Round, row: Variant) -> list[Model]:
 
 
 def screened(x: Round, models: list[Model]) -> list[Model]:
-    """Starts ordered by the innovations that they leave once the fit's own constants have followed, linearly."""
+    """Starts ordered by their residual innovations after a linear adjustment of the fit's own constants."""
     return models if len(models) == 1 else sorted(map(x.on_line, models), key=x.left)
 
 
 def mode_starts(p: Problem, near: Fitted, row: Variant) -> list[Model]:
-    """Starts of a two-mode row whose second mode has the share of the gain that the row is about."""
+    """Starts of a two-mode row whose second mode has the share of gain that defines the row."""
     blind = np.zeros_like(near.ar)
     blind[:1] = STARTS.leading
     out = []
@@ -214,7 +214,7 @@ def mode_starts(p: Problem, near: Fitted, row: Variant) -> list[Model]:
 
 
 def grid_of_modes(p: Problem, near: Fitted, row: Variant, ar: Floats) -> Iterator[tuple[float, Model]]:
-    """What each point of the grid leaves under one noise model, and its model; both gains are solved linearly."""
+    """Residual of each grid point under one noise model, and its model; both gains are solved linearly."""
     dt_s, t0, dead0 = p.inputs.dt_s, float(near.model.c[Slot.T]), float(near.model.c[Slot.L])
     y, level = whitened(p.y, ar, p.edges), whitened(np.ones(p.y.size), ar, p.edges)
     firsts, others = [t0 * f for f in STARTS.longer], [t0 * f for f in row.modes]

@@ -1,4 +1,4 @@
-"""Where simulation and recording differ, as told: signals, spans, ranges, direction, period, features."""
+"""Where simulation and recording differ, as reported: signals, spans, ranges, direction, period, features."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
 
 TOLD = ("name", "p", "carries", "share", "by", "range")
-"""What is told of a feature."""
+"""Reported fields of a feature."""
 
 
 def carrying(won: Floats, dt_s: float) -> list[list[float]]:
-    """Parts that together carry a share of a gain, neighbours joined: first and last (excluded) time of each [s]."""
+    """Parts that together have a share of a gain, neighbours joined: first and last (excluded) time of each [s]."""
     edges = np.linspace(0, won.size, LOCATION.span_parts + 1).astype(int)
     parts = np.maximum([won[a:b].sum() for a, b in pairwise(edges)], 0.0)
     order = np.argsort(-parts)
@@ -35,7 +35,7 @@ def carrying(won: Floats, dt_s: float) -> list[list[float]]:
 
 
 def ranges(x: Floats, weight: Floats) -> list[float]:
-    """Range of a signal that carries nine tenths of a weight."""
+    """Range of a signal with nine tenths of a weight."""
     order = np.argsort(x)
     total = np.cumsum(np.maximum(weight[order], 0.0))
     if total[-1] <= 0:
@@ -45,7 +45,7 @@ def ranges(x: Floats, weight: Floats) -> list[float]:
 
 
 def direction(op: Floats, won: Floats) -> str:
-    """Whether the gain lives in OP's moves up, down, or both."""
+    """Whether the gain comes from OP moves up, down, or both."""
     way = np.sign(np.diff(op, prepend=op[0]))
     up, down = float(won[way > 0].sum()), float(won[way < 0].sum())
     if up > LOCATION.one_way * max(down, 0.0):
@@ -54,7 +54,7 @@ def direction(op: Floats, won: Floats) -> str:
 
 
 def half_power_periods(difference: Floats, dt_s: float) -> list[float]:
-    """Periods [s] between which half of a difference's power lies."""
+    """Periods [s] that bound half of a difference's power."""
     power = np.abs(np.fft.rfft(difference - difference.mean())) ** 2
     total = np.cumsum(power)
     if total[-1] <= 0:
@@ -73,19 +73,19 @@ def located_in(p: Problem, fit: Fitted, s: Recording) -> Located:
 
 
 def won_over(p: Problem, plain: Fitted, best: Fitted) -> tuple[Floats, Floats]:
-    """Squared innovations that the better model saves at each sample, and both simulations' difference, (n,)."""
+    """Reduction of squared innovations by the better model at each sample, and both simulations' difference, (n,)."""
     before, after = simulate(p.inputs, plain.model.c), simulate(p.inputs, best.model.c)
     e0, e1 = (whitened(p.y - x, best.ar, p.edges) for x in (before, after))
     return p.weight * (e0**2 - e1**2), after - before
 
 
 def where_of(found: Explanation, s: Recording, block: str, at: Located) -> dict[str, Any]:
-    """Where the misfit is: signals, spans [s], ranges, direction of OP, periods [s] and the features that carry it.
+    """Location of the misfit: signals, spans [s], ranges, direction of OP, periods [s] and the significant features.
 
-    Of an effect of the physics it is where the plain model loses to the better one; of recorder and controller,
-    where the finding is; of what has no name, where the innovations are large.
+    For a physical effect: where the baseline model is worse than the better one; for recorder and controller: the
+    place of the finding; for an unnamed residual: where the innovations are large.
 
-    block : of the verdict; at : of the plain loop's innovations, of the last model's where something is left over.
+    block : of the verdict; at : of the baseline model's innovations, of the last model's if a residual remains.
     """
     p, marked, signals = found.p, found.finding, words.TOLD["signals"][block]
     features = [{key: getattr(f, key) for key in TOLD} for f in at.features]

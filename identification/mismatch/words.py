@@ -1,6 +1,6 @@
-"""What an explanation says, chosen: a sentence per name that a shift supervisor reads, and what tells names apart.
+"""Texts of an explanation: a sentence per name for a shift supervisor, and the tests that distinguish names.
 
-The texts stand in words.toml, those of an effect in its own file.
+The texts are in words.toml, those of an effect in its own file.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 TOLD: Mapping[str, Any] = tomllib.loads((files(__package__) / "words.toml").read_text("utf-8"))
 MINUTES_S, MINUTES_OF_RECORD_S, HOURS_S = 600.0, 120.0, 7200.0
-"""Times from which minutes are spoken of, of a parameter and of a record, and hours [s]; ours."""
+"""Times above which minutes are used, for a parameter and for a record, and hours [s]; ours."""
 
 
 def check(data: Mapping[str, Any]) -> str:
-    """What to look at, by an answer as data: its verdict, and what of no name explains the loop; nothing where the
-    recording cannot be explained at all, for the reason says then what it needs."""
+    """What to inspect, from an answer as data: by its verdict, and by an explanation outside the catalogue; empty
+    where the recording cannot be explained at all, because the reason then gives its needs."""
     verdict = data["verdict"]
     if not data.get("fit", True):
         return ""
@@ -37,14 +37,14 @@ def check(data: Mapping[str, Any]) -> str:
 
 
 def discriminating_test(one: str, other: str) -> str:
-    """Which experiment or signal would tell two names of the catalogue apart."""
+    """The experiment or signal that distinguishes two names of the catalogue."""
     tests = [EFFECTS[a].tests.get(b) for a, b in ((one, other), (other, one)) if a in EFFECTS]
     return next(filter(None, tests), TOLD["longer"])
 
 
 def remarks(fit: Mapping[str, Any]) -> list[str]:
-    """What is to be said of a fit: that what was found shows one step ahead and in no simulation, and that the plain
-    loop which simulates best is another than the one that foretells best."""
+    """Remarks on a fit: that the finding appears in one-step-ahead prediction but in no simulation, and that the
+    baseline models with the best simulation and the best prediction differ."""
     ahead = [] if fit.get("ahead_nat") is None else [TOLD["seen_ahead"]]
     loops = {
         name: f"gain {x['gain']:.3g}, time constant {_number(x['time_constant_s'], 's')}"
@@ -54,7 +54,7 @@ def remarks(fit: Mapping[str, Any]) -> list[str]:
 
 
 def note(found: Explanation) -> str:
-    """Why there is no name, or no name alone; empty where there is nothing to say."""
+    """Why there is no name, or no single name; empty if there is nothing to add."""
     if found.refuted and not found.accepted:
         over = TOLD["over_others" if found.others else "over_rest"]
         return TOLD["refuted"].format(names=" and ".join(found.refuted), **over)
@@ -69,7 +69,7 @@ def note(found: Explanation) -> str:
 
 
 def cycles_told(found: Explanation) -> str:
-    """What the cycles show of a faulty valve, in a sentence."""
+    """A sentence on the faulty valve that the cycles show."""
     seen = found.cycles
     assert seen is not None
     between = "turns of OP" if seen.cycling else "moves of the stem"
@@ -78,14 +78,14 @@ def cycles_told(found: Explanation) -> str:
 
 
 def too_short_told(enough: float, length_s: float, lag_s: float) -> str:
-    """What is needed where the record is short against the time constant."""
+    """Requirement where the record is short compared with the time constant."""
     length, lag = (_time(x, MINUTES_OF_RECORD_S) for x in (length_s, lag_s))
     return TOLD["too_short"].format(enough=enough, held=length_s / lag_s, length=length, lag=lag)
 
 
 def reason(said: Answer) -> str:
-    """The verdict in words: with the numbers that it needs and what the recording lacks; of what has no name what is
-    left, where it lives, and why it has none."""
+    """The verdict in words: with its numbers and what the recording does not determine; for an unnamed residual its
+    size, its location, and why it has no name."""
     if said.verdict == "unexplained":
         outside = "" if said.outside is None else f"{TOLD['better']}: {_filled(said.outside)}."
         return f"{said.note or outside or TOLD['no_name']} {located_sentence(said.where)}".strip()
@@ -96,7 +96,7 @@ def reason(said: Answer) -> str:
 
 
 def _filled(found: EffectFound) -> str:
-    """An effect's sentence with its numbers; one that is not known is a question mark."""
+    """An effect's sentence with its numbers; an unknown one is a question mark."""
     effect = about(found.name)
     shown = {k: _number(v.value, v.unit) for k, v in found.parameters.items()}
     for name, parameters in effect.spoken.items():
@@ -105,12 +105,12 @@ def _filled(found: EffectFound) -> str:
 
 
 def is_along(feature: Mapping[str, Any]) -> bool:
-    """Whether errors are of one sign along a feature, so that there is no one place of them."""
+    """Whether errors keep one sign along a feature, so that they have no single place."""
     return feature["by"] == "sign" and "along" in TOLD["features"][feature["name"]]
 
 
 def place(feature: Mapping[str, Any]) -> str:
-    """Where one feature of the answer's `where` puts the misfit."""
+    """Location of the misfit along one feature of the answer's `where`."""
     told, ends = TOLD["features"][feature["name"]], feature["range"]
     if is_along(feature):
         return told["along"]
@@ -119,7 +119,7 @@ def place(feature: Mapping[str, Any]) -> str:
 
 
 def located_sentence(where: Mapping[str, Any]) -> str:
-    """Where the misfit lives, in one sentence; empty where nothing is known of it."""
+    """Location of the misfit in one sentence; empty if unknown."""
     features = where.get("features", [])
     carrying = [place(f) for f in features if f["carries"]]
     if carrying:

@@ -1,1 +1,1 @@
-"""Spectra, responses to set point moves, and variance against its minimum: what trends say without a model."""
+"""Model-free signal analysis: spectra, responses to set point moves, and variance relative to its minimum."""

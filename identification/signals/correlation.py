@@ -1,4 +1,4 @@
-"""A signal beside its own past: rhythm, memory, and the least variance that a controller can leave."""
+"""Autocorrelation of a signal: periodicity, correlation time, and the minimum variance of a controller."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from identification.limits import SIGNALS
 from identification.record import Floats, Mask
 
 CONSTANT = 1e-12
-"""Share of its mean square under which an error's variance is a rounding."""
+"""Share of its mean square below which an error's variance is rounding."""
 
 
 def lag_sums(x: Floats, most: int) -> Floats:
@@ -23,14 +23,14 @@ def lag_sums(x: Floats, most: int) -> Floats:
 
 
 def autocorrelation(x: Floats, most: int) -> Floats:
-    """Unbiased autocorrelation at lags 0 to most, shape (most + 1,); zero of a signal that is."""
+    """Unbiased autocorrelation at lags 0 to most, shape (most + 1,); zero for a zero signal."""
     r = lag_sums(x, most)
     return r / r[0] * x.size / (x.size - np.arange(most + 1)) if r[0] > 0 else np.zeros(most + 1)
 
 
 def correlated(e: Floats) -> float:
-    """Samples that tell as much as one independent one: one and twice the autocorrelation's sum, taken until it first
-    falls below zero (Geyer 1992's initial positive sequence); 1 for white noise, all of them for a constant."""
+    """Number of samples per independent one: one plus twice the sum of the autocorrelation up to its first negative
+    value (Geyer 1992's initial positive sequence); 1 for white noise, all samples for a constant."""
     auto = lag_sums(e - e.mean(), e.size - 1)
     if not auto[0] > CONSTANT * float(e @ e):
         return float(e.size)
@@ -41,11 +41,11 @@ def correlated(e: Floats) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Rhythm:
-    """What an autocorrelation says about one period.
+    """Autocorrelation of one period.
 
-    period_s : lag of the first peak [s]; first, third : heights of these peaks [-]; trough : depth of the
-    first trough [-]; regularity : mean over three standard deviations of the zero crossings' intervals [-]
-    (Thornhill, Huang, Zhang 2003).
+    period_s : lag of the first peak [s]; first, third : heights of these peaks [-]; trough : depth of the first
+    trough [-]; regularity : mean over three standard deviations of the zero crossings' intervals [-] (Thornhill,
+    Huang, Zhang 2003).
     """
 
     period_s: float
@@ -81,7 +81,7 @@ def _regularity(r: Floats) -> float:
 
 
 def rhythm(x: Floats, dt_s: float, period_s: float) -> Rhythm:
-    """Read the autocorrelation of a band's signal, shape (m,), about the period at which its peak is expected."""
+    """Autocorrelation features of a band's signal, shape (m,), near the period of the expected peak."""
     lag = period_s / dt_s
     r = autocorrelation(x, min(x.size - 2, int(6 * lag) + 2))
     at, first = _peak(r, 0.6 * lag, 1.45 * lag)
@@ -93,10 +93,10 @@ def rhythm(x: Floats, dt_s: float, period_s: float) -> Rhythm:
 
 
 def levelled_correlation(x: Floats, dt_s: float, period_s: float) -> float:
-    """How well a band's signal comes back after a period once no half-cycle is larger than the usual one [-].
+    """Autocorrelation of a band's signal at one period after limiting half-cycles to the usual size [-].
 
-    The lesser of the autocorrelation's first peak and 1.5 times the trough before it. One step of the load, through
-    the band a few large swings, hides a cycle of many halves from the plain autocorrelation; not from this one.
+    The lesser of the first peak and 1.5 times the trough before it. One load step, which the band filter turns into a
+    few large swings, hides a cycle of many half-cycles from the ordinary autocorrelation, but not from this one.
     """
     usual = float(np.median(np.abs(x)))
     if usual <= 0.0:
@@ -106,7 +106,7 @@ def levelled_correlation(x: Floats, dt_s: float, period_s: float) -> float:
 
 
 def _averaged(error: Floats, good: Mask, blocks: int, width: int) -> tuple[Floats, Mask]:
-    """Means of the good samples of each block, 0 in blocks that are half bad, and which are not, shape (blocks,)."""
+    """Means of the good samples of each block, 0 if half of them are bad, and the other blocks, shape (blocks,)."""
     weight = good[: blocks * width].reshape(blocks, width).mean(axis=1)
     total = np.where(good, error, 0.0)[: blocks * width].reshape(blocks, width).mean(axis=1)
     use = weight > 0.5
@@ -114,16 +114,16 @@ def _averaged(error: Floats, good: Mask, blocks: int, width: int) -> tuple[Float
 
 
 def correlation_time(error: Floats, good: Mask, dt_s: float, scale_s: float) -> float | None:
-    """The time [s] after which the autocorrelation of the averaged error is under 1/e.
+    """The time [s] after which the autocorrelation of the averaged error is below 1/e.
 
-    After a load has moved PV, the error of a PI loop dies with its slowest pole. Where Kp times the process gain is
-    under one, that is about Ti/(Kp K), longer than Ti: a correlation time of several integral times is a controller
-    that lets errors stand. With Kp K of 1.2 to 3 it is 0.5 to 1.7 Ti, with 0.45 and less 2 to 12 Ti, whether the load
-    steps or wanders (tests/identification/signals/test_correlation_time.py).
+    After a load change, the error of a PI loop decays with its slowest pole. If Kp times the process gain is below
+    one, its time constant is about Ti/(Kp K), longer than Ti: a correlation time of several integral times indicates
+    sluggish control. With Kp K of 1.2 to 3 it is 0.5 to 1.7 Ti, with 0.45 and less 2 to 12 Ti, whether the load steps
+    or wanders (tests/identification/signals/test_correlation_time.py).
 
-    error, good : SP - PV and where it may be used, shape (n,); scale_s : the loop's own time [s], its integral time,
-    the answer has steps of a tenth of it. None where the record holds fewer than ten of `scale_s`, samples are
-    coarser than a fifth of it, or nothing moves.
+    error, good : SP - PV and where it may be used, shape (n,); scale_s : the loop's own time [s], its integral time;
+    the result has steps of a tenth of it. None if the record is shorter than ten of `scale_s`, samples are coarser
+    than a fifth of it, or nothing moves.
     """
     if not math.isfinite(scale_s) or dt_s > SIGNALS.coarsest * scale_s:
         return None
@@ -147,8 +147,8 @@ def correlation_time(error: Floats, good: Mask, dt_s: float, scale_s: float) -> 
 def harris_index(error: Floats, usable: Mask, dt_s: float, dead_time_s: float) -> float | None:
     """Minimum variance over variance of the error: 1 is minimum variance, 0 is far from it.
 
-    The minimum variance is what a predictor one dead time ahead leaves unexplained (Harris 1989; estimated by
-    regression as in Desborough, Harris 1992).
+    The minimum variance is the residual of a predictor one dead time ahead (Harris 1989; estimated by regression as
+    in Desborough, Harris 1992).
 
     error, usable : shape (n,). None where fewer than 200 samples are usable or the error is constant.
     """

@@ -1,8 +1,8 @@
-"""Two signals about one frequency: whether they move together, and which of them is later.
+"""Coherence and lag of two signals near one frequency.
 
-Lines are compared in pieces of the band within which the phase may be taken as constant, so that a delay or a slow
-wandering of the phase does not hide what is shared, and after a Hann taper, so that a steady wave stays in its lines.
-Granger's test asks whether the past of one helps to foresee the other.
+Spectral lines are compared in sections of the band in which the phase is nearly constant, so that a delay or a slow
+phase drift does not reduce the coherence, and after a Hann taper, which limits the leakage of a steady oscillation.
+Granger's test checks whether the past of one signal improves the prediction of the other.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from identification.record import Floats
 from identification.signals.spectrum import Complex
 
 HANN_WIDTH = 1.8
-"""Lines that a Hann taper makes one: neighbours correlate by 2/3, next ones by 1/6, and squares add up."""
+"""Lines that a Hann taper combines: neighbours correlate by 2/3, next ones by 1/6, and squares add up."""
 DRIFT_BLOCKS = 64
-"""Parts of a record whose phases are compared for a drift."""
+"""Parts of a record whose phases are compared to find a drift."""
 DRIFTS = np.arange(-60, 61) / 20.0
-"""Drifts tried [turns over the record]."""
+"""Candidate drifts [turns over the record]."""
 TURNS = np.exp(2j * np.pi * DRIFTS[:, None] * ((np.arange(DRIFT_BLOCKS) + 0.5) / DRIFT_BLOCKS))
-"""What turns each block's phase back by each drift, shape (drifts, blocks)."""
+"""Factors that compensate each block's phase for each drift, shape (drifts, blocks)."""
 Whole = NDArray[np.int64]
 
 
 def tapered(lines: Complex) -> Complex:
-    """Lines of the Hann-tapered signal from those of the signal, shape (m - 2,): those with both neighbours."""
+    """Lines of the Hann-tapered signal from those of the signal, shape (m - 2,): those with two neighbours."""
     return lines[1:-1] - 0.5 * (lines[:-2] + lines[2:])
 
 
 def band(line: float) -> tuple[int, int, int]:
-    """First line, line after the last and width of the pieces [lines] of the band about a frequency [lines]."""
+    """First line, line after the last and width of the sections [lines] of the band about a frequency [lines]."""
     half = max(SIGNALS.shared_band * line, SIGNALS.side_lines)
     width = max(SIGNALS.piece_lines, round(SIGNALS.piece * line))
     return max(round(line - half), 1), round(line + half) + 1, width
@@ -46,12 +46,12 @@ def band(line: float) -> tuple[int, int, int]:
 
 @cache
 def chance_coherence(lines: int, width: int, chance: float) -> float:
-    """Coherence that two signals without anything in common reach with a probability of `chance` [-].
+    """Coherence that two unrelated signals exceed with a probability of `chance` [-].
 
-    Of one piece it is distributed as Beta(1, d - 1), d the independent lines of the piece (Carter, Knapp, Nuttall
-    1973); of a mean over pieces as the beta of the same mean and a variance as many times smaller.
+    For one section it is distributed as Beta(1, d - 1), d the independent lines of the section (Carter, Knapp,
+    Nuttall 1973); for a mean over sections as the beta of the same mean and a variance as many times smaller.
 
-    lines, width : lines of the band, and of one of its pieces.
+    lines, width : lines of the band, and of one of its sections.
     """
     free = max(width / HANN_WIDTH, 1.5)
     pieces = max(lines // width / SIGNALS.uneven, 1.0)
@@ -61,7 +61,7 @@ def chance_coherence(lines: int, width: int, chance: float) -> float:
 
 @njit(cache=True)
 def _cross(mine: Complex, yours: Complex) -> tuple[float, float]:
-    """Squared cross power of two pieces of lines, and the product of their powers."""
+    """Squared cross power of two sections of lines, and the product of their powers."""
     re, im, own, other = 0.0, 0.0, 0.0, 0.0
     for k in range(mine.size):
         x, y = mine[k], yours[k]
@@ -78,11 +78,11 @@ def coherences(
 ) -> Floats:
     """Coherence of one stretch of lines with others over a band [-].
 
-    flat : the lines of all stretches, one after the other; offset, first, count : shape (s,), where in `flat` each
-    stretch begins, the number of its first line, and how many it has; one : the stretch that is compared; others :
-    shape (k,), those with which it is compared; span : shape (3,), first line, line after the last and width of the
-    pieces (`band`); shift : lines by which the others are shifted: shifted ones share nothing but the shape of their
-    band. Returns shape (k,), 0 where a stretch does not hold the band.
+    flat : the lines of all stretches, one after the other; offset, first, count : shape (s,), start of each stretch
+    in `flat`, number of its first line, and number of lines; one : the stretch that is compared; others : shape (k,),
+    those with which it is compared; span : shape (3,), first line, line after the last and width of the sections
+    (`band`); shift : shift of the others in lines: shifted stretches have only the shape of their band in common.
+    Returns shape (k,), 0 where a stretch does not cover the band.
     """
     out = np.zeros(others.size)
     low, high = span[0], span[1]
@@ -107,10 +107,10 @@ def coherences(
 
 
 def drift(x: Complex, y: Complex) -> Floats:
-    """Turns over the record by which the phases of a signal and of others drift apart, of either sign, at most three.
+    """Phase drift over the record between a signal and others [turns], of either sign, at most three.
 
-    Two signals of one source keep step: their phases differ by no more at the end than at the beginning. Of two
-    others a Fourier line apart the difference turns once over the record.
+    Two signals with one source have a constant phase difference. If the sources are one Fourier line apart, the
+    difference changes by one turn over the record.
 
     x, y : complex, shapes (m,) and (k, m), lines of the same numbers, not tapered. Returns shape (k,).
     """
@@ -123,7 +123,7 @@ def drift(x: Complex, y: Complex) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """How much later a second signal is: lag_s [s], its standard deviation [s], and the coherence at that lag [-]."""
+    """Lag of a second signal: lag_s [s], its standard deviation [s], and the coherence at that lag [-]."""
 
     lag_s: float
     deviation_s: float
@@ -131,13 +131,13 @@ class Delay:
 
 
 def lag(x: Complex, y: Complex, duration_s: float, most_s: float) -> Delay:
-    """Group delay of a second signal behind a first one, by the slope of their phase over the band.
+    """Group delay of a second signal behind a first one, from the slope of their phase over the band.
 
-    A steady wave tells no delay, for its phase is known up to whole turns alone; what tells is how its size and its
-    phase change over time, and the deviation says how well (Carter 1987).
+    A steady oscillation does not determine the delay, because its phase is known only up to whole turns; changes of
+    its size and phase over time do, and the deviation gives the precision (Carter 1987).
 
     x, y : complex, shape (m,), lines of the same numbers; duration_s : line k is the frequency k / duration_s [s];
-    most_s : largest lag looked for, either way [s].
+    most_s : largest lag searched, in both directions [s].
     """
     cross = np.conj(x) * y
     power = float(np.sqrt(np.sum(np.abs(x) ** 2) * np.sum(np.abs(y) ** 2)))
@@ -148,7 +148,7 @@ def lag(x: Complex, y: Complex, duration_s: float, most_s: float) -> Delay:
     found = np.abs(ifft(cross, size)) * size / power
     reach = min(max(int(most_s / step), 1), size // 2 - 1)
     ahead = np.concatenate((found[-reach:], found[: reach + 1]))
-    # a delay of y turns the phase of conj(x) y backwards: its transform peaks where it is turned forward again
+    # a delay of y rotates the phase of conj(x) y backwards: its transform peaks where it is rotated back
     at = int(np.argmax(ahead)) - reach
     best = min(float(ahead[at + reach]) ** 2, 1.0)
     weight = np.abs(cross)
@@ -162,16 +162,16 @@ def lag(x: Complex, y: Complex, duration_s: float, most_s: float) -> Delay:
 
 
 RIDGE = 1e-9
-"""Share of a column's power that is added to it: rounded trends have pasts that depend on each other."""
+"""Share of a column's power that is added to it, because pasts of rounded trends are collinear."""
 
 
 def granger_f(signals: Floats, lags: int, asked: int | None = None) -> Floats:
-    """F statistics of every signal's past in foreseeing every other beside that one's own past.
+    """F statistics for predicting every signal from the past of every other in addition to its own past.
 
-    signals : shape (k, n), samples of one clock; lags : samples of the past that are used; asked : so many of the
-    first signals, whose pairs with those behind them are wanted, None for all pairs. Returns shape (k, k), F[i, j]:
-    signal i foresees signal j; 0 on the diagonal, for pairs that are not wanted, and everywhere where n is under four
-    times the constants of a model.
+    signals : shape (k, n), samples of one clock; lags : number of past samples used; asked : number of first signals
+    whose pairs with the later ones are computed, None for all pairs. Returns shape (k, k), F[i, j]: signal i predicts
+    signal j; 0 on the diagonal, for pairs that are not computed, and everywhere if n is less than four times the
+    constants of a model.
     """
     k, n = signals.shape
     rows = n - lags
@@ -203,8 +203,8 @@ def granger_f(signals: Floats, lags: int, asked: int | None = None) -> Floats:
 
 
 def _lagged(x: Floats, y: Floats, lags: int) -> Floats:
-    """Sums of products of signals with others, each as far back as every number of samples up to `lags`, about the
-    means: those of the first numbers, and what one sample more at the start and one fewer at the end makes of them.
+    """Sums of products of signals with others about their means, each delayed by 0 to `lags` samples: the first ones
+    directly, each next one by adding one sample at the start and removing one at the end.
 
     x, y : shapes (s, a, n) and (s, b, n). Returns shape (s, a, b, lags + 1, lags + 1).
     """
@@ -224,5 +224,5 @@ def _lagged(x: Floats, y: Floats, lags: int) -> Floats:
 
 
 def _explained(gram: Floats, cross: Floats) -> Floats:
-    """Power that each of some sets of columns explains, by its normal equations, shape (s,)."""
+    """Power explained by each of several sets of columns, by its normal equations, shape (s,)."""
     return np.asarray(np.einsum("sc,sc->s", cross, np.linalg.solve(gram, cross[..., None])[..., 0]))

@@ -1,4 +1,4 @@
-"""Indices of the literature for sticking valves, oscillation and sluggish control, and where it draws the line.
+"""Published indices for sticking valves, oscillation and sluggish control, with their published limits.
 
 Each is a pure function of trends on one clock, and abstains (None) where its own conditions are not met. Trends have
 shape (n,), OP in % of OP span and PV in % of span; `period` is that of the cycle [samples].
@@ -22,8 +22,8 @@ Values = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """Where a publication draws its lines: all values above `above` are what the index looks for, all at most `below`
-    are not, and between them the index is undecided; without `below`, what is not above is not."""
+    """Published limits of an index: positive if all values are above `above`, negative if all are at most `below`,
+    otherwise undecided; without `below`, negative if not positive."""
 
     above: Values
     below: Values = ()
@@ -39,33 +39,33 @@ PUBLISHED: Mapping[str, Published] = {
     "idle": Published((0.25,), (0.0,)),
 }
 """Limits by index, as published: Horch for phases of 60 and 30 degrees from an even correlation; Yamashita's 1/4 is
-what two unrelated signals have; Choudhury, Shah, Thornhill, Shook 2006. Kano and Hägglund 1999 give none but the ends
+the value for two unrelated signals; Choudhury, Shah, Thornhill, Shook 2006. Kano and Hägglund 1999 give only the ends
 of the scale: those of `kano` and `idle` are ours."""
 HALVES, HALF_SAMPLES, CYCLES = 6, 5, 3.0
-"""Half-cycles that a curve fit needs, samples of the shortest one, and cycles that all else needs; ours."""
+"""Least half-cycles of a curve fit, samples of the shortest one, and cycles for all other indices; ours."""
 THIRD = 0.4307
-"""Deviations within which a third of a Gaussian lies: the steps of a trend are up, still and down alike often."""
+"""Number of standard deviations that contain a third of a Gaussian: steps up, none and down are equally frequent."""
 STILL, MOVED = 0.25, 0.1
-"""A trend stands still where it steps by less than this share of its mean step over a cycle, and moves where it
-covers this share of its range; Kano leaves both to the user."""
+"""A trend is constant where its step is below this share of its mean step over a cycle, and moves where it covers
+this share of its range; Kano leaves both to the user."""
 SEGMENT, DATA, FEWEST, LOUD = 64, 4096, 16, 10.0
 """Samples of a segment of the bicoherence and of its data (Choudhury, Shah, Thornhill 2004); ours: fewest segments,
-and the power over the median from which one is left out, for a step in one of them looks coherent everywhere."""
+and the power over the median above which a segment is left out, because one step makes all pairs coherent."""
 CONFIDENCE, TAPERED = 0.05, 2.2
-"""Chance with which Gaussian noise passes the test of the bicoherence, and pairs of its lines that count as one:
+"""Probability that Gaussian noise passes the test of the bicoherence, and number of its line pairs that count as one:
 under the Hann taper the six neighbours of a pair correlate by (2/3)^2 with it, and squares add up."""
 ROUNDING = 1e-9
-"""Share of the largest power under which lines hold nothing but rounding."""
+"""Share of the largest power below which lines contain only rounding."""
 DISTURBED_PCT, SUPERVISED = 1.0, 50.0
-"""Amplitude of the oscillation from which a half-cycle is a load disturbance [% of span], and integral times in which
-they are counted (Hägglund 1995)."""
+"""Amplitude of the oscillation above which a half-cycle is a load disturbance [% of span], and integral times over
+which they are counted (Hägglund 1995)."""
 IDLE_STEP, IDLE_STEPS, AFTER_MOVE = 0.1, 10, 10
-"""Size of a step in standard deviations of all from which its sign is read, steps that both signals need, and steps
-about a move of the set point that do not count; ours. A load has moved PV where the error is above its deviation."""
+"""Step size in standard deviations of all above which its sign counts, required steps of both signals, and excluded
+steps after a set point move; ours. A load has moved PV where the error exceeds its deviation."""
 
 
 def concluded(name: str, values: Sequence[float] | None) -> bool | None:
-    """Whether an index finds what it looks for by its published limits: None where it abstains or is undecided."""
+    """Result of an index by its published limits: None where it abstains or is undecided."""
     if values is None or not all(map(math.isfinite, values)):
         return None
     lines = PUBLISHED[name]
@@ -75,8 +75,8 @@ def concluded(name: str, values: Sequence[float] | None) -> bool | None:
 
 
 def _centred(x: Floats, period: float) -> Floats | None:
-    """A trend less its mean over the cycle about each sample, half a cycle cut at both ends; None where that leaves
-    too few cycles, or nothing that moves."""
+    """A trend less its mean over the cycle about each sample, half a cycle cut at both ends; None if too few cycles
+    remain or nothing moves."""
     width = max(round(period), 1)
     if x.size < (CYCLES + 1.0) * width:
         return None
@@ -88,10 +88,10 @@ def _centred(x: Floats, period: float) -> Floats | None:
 
 
 def cross_correlation(op: Floats, pv: Floats, period: float) -> Values | None:
-    """How odd the cross-correlation of OP and PV is: by the lags of the zero crossings beside lag 0, and by heights.
+    """Oddness of the cross-correlation of OP and PV: by the lags of the zero crossings beside lag 0, and by heights.
 
-    Both are 0 of an even one (PV opposed to OP: a load, or tight tuning) and 1 of an odd one (a quarter of a cycle
-    apart: a valve that sticks), in loops whose process is no integrator (Horch 1999, Control Engineering Practice 7).
+    Both are 0 for an even one (PV opposed to OP: a load, or tight tuning) and 1 for an odd one (a quarter of a cycle
+    apart: a sticking valve), in loops whose process is no integrator (Horch 1999, Control Engineering Practice 7).
     """
     u, y = _centred(op, period), _centred(pv, period)
     if u is None or y is None:
@@ -111,8 +111,8 @@ def cross_correlation(op: Floats, pv: Floats, period: float) -> Values | None:
 
 
 def _half_misfits(y: Floats, t: Floats, length: float) -> tuple[float, float]:
-    """Mean square that a half sine, and the best triangle, leave of a half-cycle of a length, at times t from its
-    start, shape (n,)."""
+    """Mean square residual of a half sine, and of the best triangle, for a half-cycle of a length, at times t from
+    its start, shape (n,)."""
     power, sine = float(y @ y), np.sin(np.pi * t / length)
     rest = length - t
     rising = np.cumsum(y * t)[:-1], np.cumsum(t * t)[:-1]
@@ -125,11 +125,11 @@ def _half_misfits(y: Floats, t: Floats, length: float) -> tuple[float, float]:
 
 
 def curve_fit(x: Floats, period: float) -> Values | None:
-    """Misfit of a sine over that of sine and triangle together, half-cycle by half-cycle: 0 of a sine, 1 of a
+    """Misfit of a sine over that of sine and triangle together, half-cycle by half-cycle: 0 for a sine, 1 for a
     triangle.
 
-    A valve that sticks makes triangles of what integrates behind it: of OP, or of PV where the process is an
-    integrator (He, Wang, Pottmann, Qin 2007, Industrial & Engineering Chemistry Research 46).
+    A sticking valve makes triangles after an integration: in OP, or in PV if the process is an integrator (He, Wang,
+    Pottmann, Qin 2007, Industrial & Engineering Chemistry Research 46).
     """
     y = _centred(x, period)
     if y is None:
@@ -148,7 +148,7 @@ def curve_fit(x: Floats, period: float) -> Values | None:
 
 
 def _ways(x: Floats) -> np.ndarray | None:
-    """Each step of a trend as -1, 0 or 1; None of a constant."""
+    """Each step of a trend as -1, 0 or 1; None for a constant."""
     step = np.diff(x)
     spread = float(step.std())
     if not spread > 1e-12 * max(float(np.abs(x).max()), 1.0):
@@ -158,8 +158,8 @@ def _ways(x: Floats) -> np.ndarray | None:
 
 
 def qualitative_shape(op: Floats, pv: Floats, period: float) -> Values | None:
-    """Shares of the moving time in which OP moves and flow stands still, and of those whose flow then moves on the
-    same way, as a slip does; 1/4 and less of unrelated signals.
+    """Shares of the moving time in which OP moves while flow is constant, and of those after which flow moves in the
+    same direction, as in a slip; 1/4 and less for unrelated signals.
 
     PV is a flow that rises with OP, sampled some ten times a cycle (Yamashita 2006, Control Engineering Practice 14:
     rho 1 and rho 3).
@@ -180,7 +180,7 @@ def qualitative_shape(op: Floats, pv: Floats, period: float) -> Values | None:
 
 
 def standing_share(op: Floats, pv: Floats, period: float) -> Values | None:
-    """Share of the time in which flow stands still while OP moves; near 1 of a valve that sticks most of the time.
+    """Share of the time in which flow is constant while OP moves; near 1 for a valve that sticks most of the time.
 
     PV is a flow (Kano, Maruta, Kugemoto, Shimizu 2004, DYCOPS: method A).
     """
@@ -203,7 +203,7 @@ def standing_share(op: Floats, pv: Floats, period: float) -> Values | None:
 
 
 def _bicoherence(x: Floats) -> tuple[Floats, int] | None:
-    """Squared bicoherence of a signal at pairs of frequencies, shape (p,), and the segments it is of."""
+    """Squared bicoherence of a signal at pairs of frequencies, shape (p,), and the number of its segments."""
     frames = np.lib.stride_tricks.sliding_window_view(x[-DATA:], SEGMENT)[:: SEGMENT // 2]
     frames = frames - frames.mean(axis=1, keepdims=True)
     size = np.mean(frames**2, axis=1)
@@ -223,11 +223,11 @@ def _bicoherence(x: Floats) -> tuple[Floats, int] | None:
 
 
 def nonlinearity(error: Floats) -> Values | None:
-    """Indices of non-Gaussianity and nonlinearity of an error: both about 0 and less of a linear loop.
+    """Indices of non-Gaussianity and nonlinearity of an error: both about 0 or less for a linear loop.
 
-    The mean of its squared bicoherence over what Gaussian noise reaches, and the largest over mean and twice the
-    deviation (Choudhury, Shah, Thornhill 2004, Automatica 40). A segment should hold some cycles; what is symmetric
-    about its mean, as a triangle or a square wave, has no bicoherence.
+    The mean of its squared bicoherence less the limit for Gaussian noise, and its maximum less the mean plus twice
+    the deviation (Choudhury, Shah, Thornhill 2004, Automatica 40). A segment should contain several cycles; a signal
+    symmetric about its mean, such as a triangle or a square wave, has no bicoherence.
     """
     found = _bicoherence(error) if error.size >= SEGMENT else None
     if found is None:
@@ -239,11 +239,11 @@ def nonlinearity(error: Floats) -> Values | None:
 
 
 def apparent_stiction(op: Floats, pv: Floats, period: float) -> float | None:
-    """Chord along OP, through its middle, of the ellipse of OP and PV in the band of the cycle [% of OP span].
+    """Chord along OP, through the centre, of the ellipse of OP and PV in the band of the cycle [% of OP span].
 
     The ellipse is that of the moments, exact for sines (Choudhury, Shah, Thornhill, Shook 2006, Control Engineering
-    Practice 14). It is what the loop does with the valve, dead time and lag included: of a valve of width d before a
-    process that only follows it is 4/pi of d for OP far beyond d.
+    Practice 14). It includes the effects of loop, dead time and lag: a valve of width d before a process that only
+    follows it gives 4/pi of d if OP moves far beyond d.
     """
     if op.size < CYCLES * period or not min(float(np.ptp(op)), float(np.ptp(pv))) > 0.0:
         return None
@@ -256,8 +256,8 @@ def apparent_stiction(op: Floats, pv: Floats, period: float) -> float | None:
 
 
 def load_disturbances(error: Floats, dt_s: float, ti_s: float) -> Values | None:
-    """Most half-cycles of an error [% of span] within fifty integral times whose absolute integral exceeds that of an
-    oscillation of 1 % at the period of the integral time; over ten: the loop oscillates.
+    """Largest number, within fifty integral times, of half-cycles of an error [% of span] whose absolute integral
+    exceeds that of an oscillation of 1 % at the period of the integral time; over ten: the loop oscillates.
 
     Older ones fade (Hägglund 1995, Control Engineering Practice 3). None without an integral time, with too few
     samples in one, or in a record shorter than the time of supervision.
@@ -275,11 +275,11 @@ def load_disturbances(error: Floats, dt_s: float, ti_s: float) -> Values | None:
 
 
 def idle_index(op: Floats, pv: Floats, sp: Floats, way: float) -> Values | None:
-    """Time in which OP and PV go the same way less that in which they go against each other, over both, while a load
-    has moved PV: near 1 of sluggish control, about 0 and less of any other.
+    """Time in which OP and PV move in the same direction less that of opposite directions, over both, while a load
+    has moved PV: near 1 for sluggish control, about 0 or less otherwise.
 
-    Sampled a few times in the loop's own time; steps soon after a move of the set point are left out; way, the sign
-    of the process gain (Hägglund 1999, Control Engineering Practice 7).
+    Sampled a few times in the loop's own time; steps soon after a set point move are left out; way, the sign of the
+    process gain (Hägglund 1999, Control Engineering Practice 7).
     """
     u, y, off = np.diff(op), np.diff(pv), 0.5 * np.abs(sp[1:] - pv[1:] + sp[:-1] - pv[:-1])
     moved = np.convolve(np.abs(np.diff(sp)) > 1e-9, np.ones(2 * AFTER_MOVE + 1))[

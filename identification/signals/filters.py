@@ -1,4 +1,4 @@
-"""Filters over whole trends: a notch about one period, a band of periods, straight lines taken out."""
+"""Filters over whole trends: a notch about one period, a band of periods, removal of straight lines."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from identification.record import Floats
 
 
 def notch(x: Floats, period: float, width: float) -> Floats:
-    """The signal, shape (n,), without a narrow band about one period [samples], `width` of its frequency wide.
+    """The signal, shape (n,), without a narrow band about one period [samples] of relative width `width`.
 
     Second-order notch, zeros on the unit circle; gain one far from the band.
     """
@@ -24,8 +24,8 @@ def notch(x: Floats, period: float, width: float) -> Floats:
 
 
 def in_band(x: Floats, shortest: float, longest: float) -> Floats:
-    """The signal, shape (n,), within a band of periods [samples], both ways through a second-order Butterworth
-    filter, so that nothing is late; all that is faster than `longest` where the shortest is about two samples."""
+    """The signal, shape (n,), within a band of periods [samples], by a second-order Butterworth filter in both
+    directions, without delay; all periods shorter than `longest` if the shortest is about two samples."""
     fast = 2.0 / shortest if shortest > 2.0 else 1.0
     slow = min(2.0 / longest, 0.9 * fast)
     cut, kind = (slow, "highpass") if fast >= 0.95 else ([slow, fast], "bandpass")
@@ -52,7 +52,7 @@ def stretch_ends(n: int, window: int) -> NDArray[np.int64]:
 
 
 def without_lines(x: Floats, window: int) -> Floats:
-    """x, shape (n,), less the straight line that suits each stretch best; x where window is 0 or longer than it."""
+    """x, shape (n,), less the best straight line of each stretch; x where window is 0 or longer than it."""
     n = x.size
     if window <= 0 or window >= n:
         return x

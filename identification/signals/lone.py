@@ -1,4 +1,4 @@
-"""Single values that stand alone: nothing before or after goes with them."""
+"""Isolated single values, unrelated to the values before and after."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from identification.record import Floats, Mask
 
 
 def lone_values(x: Floats, usable: Mask, factor: float, least: float) -> Mask:
-    """True where a single value stands off both neighbours, on one side, by so many usual changes and by a share
-    `least` of the range of all others, while the neighbours are near to one another; shape (n,)."""
+    """True where a single value differs from both neighbours, in one direction, by so many usual changes and by a
+    share `least` of the range of all others, while the neighbours are near each other; shape (n,)."""
     out = np.zeros(x.size, dtype=bool)
     if x.size < 5:
         return out
@@ -25,6 +25,6 @@ def lone_values(x: Floats, usable: Mask, factor: float, least: float) -> Mask:
 
 
 def without_lone(x: Floats, lone: Mask) -> Floats:
-    """The signal, each such value as the one before, shape (n,)."""
+    """The signal with each such value replaced by the one before, shape (n,)."""
     at = np.maximum.accumulate(np.where(lone, 0, np.arange(x.size)))
     return x[at]

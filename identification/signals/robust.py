@@ -1,4 +1,4 @@
-"""Noise with outliers beside it: its spread, and what each innovation counts, so that no single event decides."""
+"""Robust statistics of noise with outliers: spread, and weights of innovations, so that no single event decides."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from identification.limits import SIGNALS
 from identification.record import Floats, Mask
 
 NORMAL_QUARTILE = 0.6745
-"""Median size of a Gaussian variable in terms of its standard deviation [-]."""
+"""Median size of a Gaussian variable relative to its standard deviation [-]."""
 
 
 def robust_deviation(e: Floats) -> float:
-    """Standard deviation of a variable about zero by its median size, e of shape (n,); outliers leave it alone."""
+    """Standard deviation of a variable about zero from its median size, e of shape (n,); insensitive to outliers."""
     return float(np.median(np.abs(e))) / NORMAL_QUARTILE
 
 
 def clipped_gain(mine: Floats, other: Floats) -> Floats:
-    """Gain in log likelihood [nat] at every innovation of one model over another's, none counting beyond an outlier.
+    """Gain in log likelihood [nat] at every innovation of one model over another's, with outliers limited.
 
     mine, other : shape (n,), innovations of the two, in one unit; the first give the scale. Returns shape (n,), zero
     where the first have no scale.
@@ -30,6 +30,6 @@ def clipped_gain(mine: Floats, other: Floats) -> Floats:
 
 
 def robust_weights(e: Floats, inside: Mask) -> Floats:
-    """What each innovation counts in a fit, shape (n,): 1, falling from an outlier on (Huber 1964), 0 outside."""
+    """Weight of each innovation in a fit, shape (n,): 1, decreasing for outliers (Huber 1964), 0 outside."""
     size = np.abs(e) / max(robust_deviation(e[inside]), 1e-12)
     return np.where(inside, np.minimum(1.0, SIGNALS.outlier / np.maximum(size, SIGNALS.outlier)), 0.0)

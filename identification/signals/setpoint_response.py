@@ -1,4 +1,4 @@
-"""The part of the error that the set point explains."""
+"""The part of the error explained by the set point."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from identification.record import Floats, Mask
 from identification.signals.spectrum import Complex
 
 SMALLEST = 1e-200
-"""Power of a set point that stands still but for rounding."""
+"""Power of a set point that is constant except for rounding."""
 
 
 def _running(x: Complex, first: np.ndarray, last: np.ndarray) -> Complex:
@@ -20,8 +20,8 @@ def _running(x: Complex, first: np.ndarray, last: np.ndarray) -> Complex:
 def without_setpoint(error: Complex, sp: Complex) -> Complex:
     """Lines of the error less the response to the set point.
 
-    The response is the ratio of cross to auto spectrum over a band that widens with frequency, so steps, square
-    waves and the set point of a cascade's inner loop are taken out whole and little else is.
+    The response is the ratio of cross to auto spectrum over a band that widens with frequency, so steps, square waves
+    and the set point of a cascade's inner loop are removed completely and little else is.
 
     error, sp : complex, shape (m,), lines of both signals.
     """
@@ -35,12 +35,12 @@ def without_setpoint(error: Complex, sp: Complex) -> Complex:
 
 
 def moves(sp: Floats) -> Mask:
-    """True at each sample at which the set point is another than before, shape (n,)."""
+    """True at each sample at which the set point differs from the one before, shape (n,)."""
     return np.abs(np.diff(sp, prepend=sp[0])) > 1e-9 * max(float(np.ptp(sp)), SMALLEST)
 
 
 def amplitude_at_rest(error: Floats, sp: Floats, usable: Mask, period: float) -> tuple[float, int]:
-    """Amplitude of a period where the set point has stood still for long, and the stretches that tell it.
+    """Amplitude of a period while the set point has long been constant, and the number of stretches used.
 
     A sine with a straight line is fitted to each stretch of one period, half of one apart, in which every sample is
     usable and whose set point has not moved for two periods before its end.

@@ -1,7 +1,7 @@
-"""Spectra of a loop's error: one Fourier transform, from which bands, peaks and the shape of cycles are read.
+"""Spectra of a loop's error: one Fourier transform, from which bands, peaks and the shape of cycles are computed.
 
-A line of the spectrum asks for one period. Where every half of a cycle is as long as friction lets it, power still
-gathers about the mean period, all the time and not in one event, and its halves differ in length and size.
+A single line requires a constant period. If friction varies the half-cycles of a cycle, power is still concentrated
+near the mean period, at all times and not in one event, and the halves differ in length and size.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from identification.record import Floats
 Complex = NDArray[np.complex128]
 
 PER_OCTAVE = 6
-"""Centre frequencies tried per octave."""
+"""Candidate centre frequencies per octave."""
 
 
 @dataclass(frozen=True, slots=True)
 class Spectrum:
-    """One-sided transform of a signal without its straight line.
+    """One-sided transform of a signal after removal of its straight line.
 
     lines : complex, shape (m,); n, dt_s : samples and interval [s]; variance : of the signal.
     """
@@ -52,7 +52,7 @@ def without_line(x: Floats) -> Floats:
 
 
 def spectrum(x: Floats, dt_s: float) -> Spectrum:
-    """Transform of a signal, of all of it: what is cut or padded would be another share of it at another sampling."""
+    """Transform of the whole signal: cutting or padding would change its share with the sampling."""
     flat = without_line(x)
     return Spectrum(rfft(flat), x.size, dt_s, float(flat @ flat) / x.size)
 
@@ -68,7 +68,7 @@ def tapered_power(s: Spectrum) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Bands:
-    """Mean power about trial frequencies and what their surroundings lead to expect.
+    """Mean power about trial frequencies and the value expected from their surroundings.
 
     line : trial frequencies in lines, shape (b,); power, prominence : shape (b,).
     """
@@ -114,7 +114,7 @@ def peak_prominence(power: Floats, line: float) -> float:
 
 
 def _usual_power(s: Spectrum, low: float, high: float) -> float:
-    """Median over time of the power per line of a band, in lines low to high."""
+    """Median over time of the power per line of a band from line low to high."""
     first = min(max(math.ceil(low), 1), s.lines.size - 2)
     last = max(min(int(high), s.lines.size - 2), first)
     part = s.lines[first : last + 1]
@@ -126,8 +126,8 @@ def _usual_power(s: Spectrum, low: float, high: float) -> float:
 def usual_prominence(s: Spectrum, line: float) -> float:
     """Power about a frequency over the geometric mean of the power on both sides, each its median over time [-].
 
-    As the prominence of `bands`, whose mean over time one event can fill: a step in the surroundings, a burst
-    at the peak. For Gaussian noise median and mean have one ratio in every band, so both agree.
+    Like the prominence of `bands`, but one event cannot dominate it: a step in the surroundings, a burst at the peak.
+    For Gaussian noise median and mean have the same ratio in every band, so both agree.
     """
     near = _usual_power(s, line / SIGNALS.peak_band, line * SIGNALS.peak_band)
     low = _usual_power(s, line / SIGNALS.side_far, line / SIGNALS.own_band)
@@ -138,8 +138,8 @@ def usual_prominence(s: Spectrum, line: float) -> float:
 def band_signal(
     s: Spectrum, line: float, below: float = SIGNALS.wide_band, above: float | None = None
 ) -> tuple[Floats, float]:
-    """The signal from a factor below a frequency to one above it, the same where none is given, at about 24 samples a
-    period.
+    """The signal in a band from a factor below a frequency to one above (the same if not given), at about 24 samples
+    a period.
 
     Returns the band's signal and its sample interval [s].
     """
@@ -159,13 +159,13 @@ def analytic(s: Spectrum, line: float, factor: float, size: int) -> Complex:
 
 
 def locked_harmonic(s: Spectrum, period_s: float, order: int = 3, cycle: Spectrum | None = None) -> float:
-    """Size of a harmonic that is locked to the fundamental's phase, over the fundamental.
+    """Size of a harmonic that is phase-locked to the fundamental, relative to the fundamental.
 
-    The mean of z3 exp(-3i phase1) over the mean of |z1|: a triangle gives 1/9, a square 1/3, a sine with noise
-    about it nothing, for its third harmonic has no fixed phase.
+    The mean of z3 exp(-3i phase1) over the mean of |z1|: a triangle gives 1/9, a square 1/3, a sine with noise zero,
+    because its third harmonic has no fixed phase.
 
-    s : of the signal whose harmonic it is; period_s : of the fundamental [s]; order : of the harmonic; cycle : of the
-    signal whose fundamental it is, on the same times; None: the same signal.
+    s : of the signal with the harmonic; period_s : of the fundamental [s]; order : of the harmonic; cycle : of the
+    signal with the fundamental, on the same times; None: the same signal.
     """
     line = s.duration_s / period_s
     if order * line * 1.15 >= s.lines.size - 1:
@@ -188,8 +188,8 @@ def envelope(s: Spectrum, line: float) -> tuple[Floats, float]:
 
 
 def half_cycles(x: Floats, dt_s: float) -> Floats:
-    """Lengths [s], shape (h,), of the half-cycles of a signal without drift, shape (n,), at interval dt_s [s]; those
-    at the ends left out."""
+    """Lengths [s], shape (h,), of the half-cycles of a signal without drift, shape (n,), at interval dt_s [s],
+    without those at the ends."""
     beyond = SIGNALS.turn * math.sqrt(float(x @ x) / max(x.size, 1))
     side = np.where(x > beyond, 1, np.where(x < -beyond, -1, 0))
     outside = np.flatnonzero(side)
@@ -197,10 +197,10 @@ def half_cycles(x: Floats, dt_s: float) -> Floats:
 
 
 def size_kurtosis(s: Spectrum, line: float) -> float:
-    """Kurtosis of the band about a frequency [-]: 1.5 where every cycle is as large as the other.
+    """Kurtosis of the band about a frequency [-]: 1.5 if all cycles have the same size.
 
-    Noise through a resonance is Gaussian, its envelope Rayleigh's, and has 3 (Rice 1945); a load from a machine, a
-    limit cycle, a loop between OP's limits keep their size.
+    Noise through a resonance is Gaussian with a Rayleigh envelope and has 3 (Rice 1945); a load from a machine, a
+    limit cycle, or a loop between OP's limits has a constant size.
     """
     x, _ = band_signal(s, line, SIGNALS.own_band)
     power = float(x @ x) / x.size
@@ -209,11 +209,11 @@ def size_kurtosis(s: Spectrum, line: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """What the wide band about a period looks like.
+    """Properties of the wide band about a period.
 
-    kurtosis : fourth moment over the squared second [-]: Gaussian noise 3 however coloured, a triangle 1.8, a sine
-    1.5, a square 1, for a cycle swings between limits and noise does not; spread : standard deviation of the
-    logarithm of the half-cycles' lengths [-]; share : of the record's variance [-].
+    kurtosis : fourth moment over the squared second [-]: Gaussian noise 3 in any colour, a triangle 1.8, a sine 1.5,
+    a square 1, because a cycle has limits and noise has none; spread : standard deviation of the logarithm of the
+    half-cycles' lengths [-]; share : of the record's variance [-].
     """
 
     kurtosis: float
@@ -222,7 +222,7 @@ class Shape:
 
 
 def shape(s: Spectrum, line: float) -> Shape:
-    """Shape of the signal about a frequency, wide enough for halves that differ and for edges."""
+    """Shape of the signal about a frequency, wide enough for unequal half-cycles and for edges."""
     x, dt_s = band_signal(s, line, SIGNALS.shape_below, SIGNALS.shape_above)
     power = float(x @ x) / x.size
     if power <= 0.0:

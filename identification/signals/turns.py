@@ -1,4 +1,4 @@
-"""Where OP turns, and what follows: half-cycles laid over one another, with the part in which the stem stands."""
+"""OP reversals and the half-cycles after them, superimposed, with the part in which the stem is at rest."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from identification.limits import FIT
 from identification.record import Floats, Mask
 
 POINTS = 40
-"""Points of a half-cycle of usual length; ours: enough to see a corner."""
+"""Points of a half-cycle of usual length; ours: enough to show a corner."""
 LONGEST = 2.0
 """Half-cycles are cut at this many usual lengths [-]; ours."""
 
 
 @njit(cache=True)
 def turning_points(x: Floats, size: float) -> np.ndarray:
-    """Samples at which a signal, shape (n,), turns by more than a size, shape (t,)."""
+    """Samples at which a signal, shape (n,), reverses by more than a size, shape (t,)."""
     out = np.empty(x.size, dtype=np.int64)
     count, high, low, way = 0, 0, 0, 0
     for k in range(x.size):
@@ -45,7 +45,7 @@ def _usual_range(x: Floats, length: int) -> float:
 
 
 def turns_of(op: Floats, period: float) -> np.ndarray:
-    """Samples at which OP, shape (n,), turns in a cycle of that period [samples], shape (t,)."""
+    """Samples of OP reversals, shape (t,), in a cycle of a period [samples]; op of shape (n,)."""
     half = max(int(period / (2 * FIT.smoothed)), 1)
     kernel = np.full(2 * half + 1, 1.0 / (2 * half + 1))
     smooth = np.convolve(np.pad(op, half, mode="edge"), kernel, mode="valid")
@@ -54,11 +54,11 @@ def turns_of(op: Floats, period: float) -> np.ndarray:
 
 @dataclass(frozen=True, slots=True)
 class Half:
-    """One half-cycle from a turn of OP on.
+    """One half-cycle after an OP reversal.
 
-    start_s : time of the turn, from the record's start [s]; op, pv, late : OP, PV, and PV the dead time later, every
-    `step_s` after the turn [% of OP, % of span], shape (k,) each; stuck : first and last (excluded) of these points
-    at which OP has not yet moved by the stickband and PV has come to rest from what was before.
+    start_s : time of the reversal, from the record's start [s]; op, pv, late : OP, PV, and PV delayed by the dead
+    time, every `step_s` after the reversal [% of OP, % of span], shape (k,) each; stuck : first and last (excluded)
+    of the points at which OP has not yet moved by the stickband and PV has settled from earlier moves.
     """
 
     start_s: float
@@ -71,8 +71,8 @@ class Half:
 
 @dataclass(frozen=True, slots=True)
 class StemMarks:
-    """What marks the time in which a stem stands: stickband [% of OP], 0 for a sound valve; dead time, and the time
-    after which PV has answered what was before [s]."""
+    """Limits of the time in which a stem is at rest: stickband [% of OP], 0 for a valve without fault; dead time, and
+    the settling time of PV after earlier moves [s]."""
 
     stickband: float
     dead_s: float
@@ -89,11 +89,11 @@ def halves(
     marks: StemMarks,
     most: int,
 ) -> tuple[Half, ...]:
-    """The last half-cycles of a record that are good throughout.
+    """The last half-cycles of a record without bad samples.
 
     op, pv : shape (n,) [% of OP, % of span]; good : bool, shape (n,), True where samples may be used; turns : shape
-    (t,), samples at which OP turns; dt_s, period_s : sample interval and period of the cycle [s]; most : half-cycles
-    wanted. Oldest first; none where OP does not turn twice.
+    (t,), samples of OP reversals; dt_s, period_s : sample interval and period of the cycle [s]; most : largest number
+    of half-cycles. Oldest first; empty with fewer than two OP reversals.
     """
     step = max(0.5 * period_s / POINTS, dt_s)
     found: list[Half] = []
@@ -111,7 +111,7 @@ def halves(
 
 
 def _stuck(op: Floats, step_s: float, marks: StemMarks) -> tuple[int, int]:
-    """Points from where PV has answered what was before to where OP has moved the stickband; (0, 0) for none."""
+    """Points from the settling of PV to where OP has moved by the stickband; (0, 0) for none."""
     if marks.stickband <= 0:
         return 0, 0
     moved = np.abs(op - op[0]) >= marks.stickband

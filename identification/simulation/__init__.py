@@ -1,1 +1,1 @@
-"""The simulator: valve, valve chain, process, and the loop open or closed."""
+"""The simulator: valve, valve chain, process, and the open or closed loop."""

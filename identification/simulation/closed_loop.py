@@ -1,4 +1,4 @@
-"""Loops closed by a PI(D): one from SP and load, as settings are searched with, and the whole model of explain."""
+"""Closed loops under a PI(D): one driven by SP and load, used for tuning, and the full model of explain."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from identification.simulation.valve_chain import flow_step, friction_of, memory
 from identification.simulation.vessel import at_start, vessel_span
 
 CONTINUOUS_STEPS = 50
-"""Steps per dead time (or time constant) that stand for a continuous controller, scan_s = 0; ours: at 50 the
-period of the study's example is within 1 % of the limit."""
+"""Steps per dead time (or time constant) that approximate a continuous controller, scan_s = 0; ours: at 50 the period
+of the study's example is within 1 % of the limit."""
 
 
 @njit(cache=True)
@@ -67,7 +67,7 @@ def scan_step(loop: Loop) -> float:
 def closed_loop(
     loop: Loop, sp: Floats, load: Floats, op_start: float = 50.0, tag: str = "simulated", start_s: float = 0.0
 ) -> LoopRecord:
-    """A closed loop under SP and load, stepped at the controller's scan.
+    """Simulate a closed loop under SP and load, stepped at the controller's scan.
 
     The controller is the law of pi.py. The loop starts at rest with PV = sp[0].
 
@@ -125,10 +125,10 @@ def closed_model(
 ) -> tuple[Floats, Floats]:
     """PV and OP, shape (n,) each [% of span], of a model under its PI controller.
 
-    inputs : its `op` gives the OP at rest by its first value, and the length; c : shape (SIZE,), parameters of the
-    model; START is where PV stands at first; sp : shape (n,), set point [% PV]; kp : gain [% OP/% PV]; ti_samples :
-    integral time [samples]. Raises NotAssessedError: where transport with the flow's speed, or an effect without
-    lines in the kernel, is in the model.
+    inputs : the first value of its `op` is the OP at rest, and its length is that of the simulation; c : shape
+    (SIZE,), parameters of the model; START is the initial PV; sp : shape (n,), set point [% PV]; kp : gain [% OP/%
+    PV]; ti_samples : integral time [samples]. Raises NotAssessedError if the model has transport with the flow's
+    speed, or an effect without code in the kernel.
     """
     if c[Slot.PIPE] != 0 or acting(c):
         raise NotAssessedError(

@@ -1,6 +1,6 @@
-"""A first-order process with dead time on a clock: the exact zero-order hold, fractional dead time included.
+"""A first-order process with dead time on a clock: the exact zero-order hold, including fractional dead time.
 
-Between two scans OP, and so the stem of a rate-independent valve, stands still; stepping at the scan is then exact.
+Between two scans OP is constant, and so is the stem of a rate-independent valve; stepping at the scan is then exact.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from identification.models import Integrator, Process
 from identification.record import Floats
 
 WHOLE = 1e-12
-"""A dead time this close below a whole number of samples is that many."""
+"""A dead time this close below a whole number of samples is rounded to it."""
 
 
 class Lag(NamedTuple):
@@ -29,7 +29,7 @@ class Lag(NamedTuple):
 
 @njit(cache=True)
 def _whole_and_part(dead_time_s: float, dt_s: float) -> tuple[int, float]:
-    """A dead time in whole samples, and the part of one that is left [-]."""
+    """A dead time in whole samples, and the remaining fraction [-]."""
     steps = dead_time_s / dt_s
     delay = math.floor(steps + WHOLE)
     return delay, max(steps - delay, 0.0)
@@ -62,15 +62,15 @@ def discretize(process: Process, dt_s: float) -> Lag:
 
 @njit(cache=True, inline="always")
 def stepped(y: float, lag: Lag, late: float, later: float) -> float:
-    """The response one sample on, of an input `delay` samples ago and one more."""
+    """The response one sample later, for the input `delay` samples ago and the one before."""
     return lag.pole * y + lag.now * late + lag.before * later
 
 
 @njit(cache=True)
 def respond(stem: Floats, lag: Lag, factor: int = 1) -> Floats:
-    """Response to a stem, shape (n // factor,), as means of blocks of its samples, of a process at rest at first.
+    """Response to a stem, shape (n // factor,), as means of blocks of its samples, of a process initially at rest.
 
-    The stem before its first value is as its first.
+    The stem before its first value is equal to the first.
     """
     n = stem.size // factor
     out = np.empty(n)
@@ -87,9 +87,9 @@ def respond(stem: Floats, lag: Lag, factor: int = 1) -> Floats:
 
 @njit(cache=True)
 def respond_together(stems: tuple[Floats, Floats, Floats], lags: tuple[Lag, Lag, Lag], factor: int) -> Floats:
-    """Three of these at once, shape (3, n // factor).
+    """Three such responses at once, shape (3, n // factor).
 
-    Each step waits for the one before, so three side by side take hardly longer than one.
+    Each step depends on the one before, so three in parallel take hardly longer than one.
     """
     (s0, s1, s2), (l0, l1, l2) = stems, lags
     n = s0.size // factor
@@ -109,7 +109,7 @@ def respond_together(stems: tuple[Floats, Floats, Floats], lags: tuple[Lag, Lag,
 
 @njit(cache=True, error_model="numpy")
 def held(lag_s: float, h: float) -> tuple[float, float]:
-    """What is left of a first-order lag's distance from its aim after h seconds, and the mean of it meanwhile."""
+    """Remaining share of a first-order lag's distance from its target after h seconds, and its mean meanwhile."""
     if lag_s <= 0.0 or h <= 0.0:
         return 0.0, 0.0
     pole = math.exp(-h / lag_s)
@@ -127,11 +127,11 @@ def _followed(x: Floats, left: float, mean: float) -> Floats:
 
 @njit(cache=True)
 def lagged(x: Floats, lag_s: float, dt_s: float) -> Floats:
-    """Mean over each sample, shape (n,), of a first-order lag of a held signal, at rest at first."""
+    """Mean over each sample, shape (n,), of a first-order lag of a held signal, initially at rest."""
     return _followed(x, *held(lag_s, dt_s))  # type: ignore[no-any-return]
 
 
 def first_order(x: Floats, samples: float) -> Floats:
-    """A signal, shape (n,), behind a first-order filter of a time constant in samples (0: none), at rest at first."""
+    """A signal, shape (n,), behind a first-order filter, time constant in samples (0: none), initially at rest."""
     left = math.exp(-1.0 / samples) if samples > 0 else 0.0
     return x if samples <= 0 else _followed(x, left, left)  # type: ignore[no-any-return]

@@ -1,4 +1,4 @@
-"""The loop model run open over a recorded OP: the one simulator of candidates, explanation and saved model."""
+"""The loop model in open loop under a recorded OP: the one simulator of candidates, explanation and saved model."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from identification.simulation.valve_chain import COASTS, flow
 from identification.simulation.vessel import outflow, outflow_of, plain_vessel, transported, vessel
 
 RAMP = 0.5
-"""Change of PV [% PV] over which a switched load comes on; ours: about the noise of a transmitter, so that the place
-of the switch has a slope to search along."""
+"""Change of PV [% PV] over which a switched load comes on; ours: about a transmitter's noise, so that the search for
+the switching point has a slope."""
 LEAST_GAIN = 0.05
-"""What is left of a gain at least; ours, as of one that goes with the level."""
+"""Smallest remaining share of a gain; ours, equal to that of a gain that depends on the level."""
 
 
 @njit(cache=True)
 def switched(pv: Floats, at: float, band: float) -> Floats:
-    """How far a load is on, from 0 to 1, shape (n,), that PV switches on above a place and off below it.
+    """Share of a load that is on, from 0 to 1, shape (n,), switched on by PV above a value and off below it.
 
-    pv, at : [% PV]; band : from off to on [% PV]. It is off before the first sample that is above.
+    pv, at : [% PV]; band : from off to on [% PV]. It is off before the first sample above.
     """
     out = np.empty_like(pv)
     on, half = 0.0, 0.5 * band
@@ -39,20 +39,20 @@ def switched(pv: Floats, at: float, band: float) -> Floats:
 
 
 def gain_change_by_history(pv: Floats, change: float, memory_s: float, dt_s: float) -> Floats:
-    """Relative change of gain with where PV has been before each sample, shape (n,).
+    """Relative change of gain that depends on PV before each sample, shape (n,).
 
-    pv : deviation from where the gain is itself, shape (n,) [% PV]; change : per 10 % of PV [-]; memory_s : time
-    constant of the mean that is remembered [s].
+    pv : deviation from the PV of nominal gain, shape (n,) [% PV]; change : per 10 % of PV [-]; memory_s : time
+    constant of the moving mean [s].
     """
     past = lagged(np.concatenate((np.zeros(1), pv[:-1])), memory_s, dt_s)
     return np.maximum(change * past / 10.0, LEAST_GAIN - 1.0)  # type: ignore[no-any-return]
 
 
 def returned(pv: Floats, way_s: float, dt_s: float) -> Floats:
-    """PV as it was a while before the middle of each sample, shape (n,); before the first sample as at the first, and
-    never later than at the sample itself, for what comes after is not known yet.
+    """PV at a fixed time before the middle of each sample, shape (n,); before the first sample equal to the first,
+    and never later than the sample itself, because later values are not known yet.
 
-    pv : shape (n,) [% PV]; way_s : how long before [s].
+    pv : shape (n,) [% PV]; way_s : the delay [s].
     """
     k = np.arange(pv.size)
     return np.interp(np.minimum(k + 0.5 - way_s / dt_s, k), k, pv)
@@ -68,21 +68,21 @@ OUTSIDE = (
     *(Slot.MODE_T, Slot.SPEED, Slot.HEAD_BIAS, Slot.RECALL_T),
     *(Slot.SWITCH, Slot.SWITCH_AT, Slot.SWITCH_BAND, Slot.RETURNED, Slot.RETURNS_S),
 )
-"""Parameters that a vessel of first order with constant gain, and what stands before and behind it, take care of, and
-those that do nothing by themselves. Any other at work asks for the whole vessel, a new one too."""
+"""Parameters covered by a first-order vessel with constant gain and by the parts before and behind it, and those
+without an effect of their own. Any other active parameter, also a new one, needs the full vessel."""
 NEUTRAL = neutral()[:SIZE]
 WITHIN = np.setdiff1d(np.arange(SIZE), np.array([int(s) for s in OUTSIDE]))
-"""Places of all the others."""
+"""Indices of all the others."""
 
 
 @dataclass(frozen=True, slots=True)
 class ModelInputs:
-    """What is recorded and not fitted.
+    """Recorded quantities, which are not fitted.
 
-    op : shape (n,) [% OP]; dt_s [s]; middle : OP that counts as zero [% OP]; level : PV that counts as zero
-    [% PV]; pv_range : lowest and highest PV; step_at : samples at which the load may step; neighbour : another
-    loop's OP less its mean, shape (n,); longest_s : longest time constant that counts as one [s]; pv : PV as recorded
-    less level, shape (n,), by which gain or load may go; None where it is what is asked for.
+    op : shape (n,) [% OP]; dt_s [s]; middle : OP that counts as zero [% OP]; level : PV that counts as zero [% PV];
+    pv_range : lowest and highest PV; step_at : samples at which the load may step; neighbour : another loop's OP less
+    its mean, shape (n,); longest_s : longest time constant that counts as one [s]; pv : recorded PV less level, shape
+    (n,), on which gain or load may depend; None where PV is to be simulated.
     """
 
     op: Floats
@@ -119,7 +119,7 @@ def as_parameters(process: Process, valve: Valve = None) -> Floats:
 
 
 def head(inputs: ModelInputs, c: Floats) -> Floats:
-    """Slow relative supply, shape (n,): straight lines between knots, mean zero."""
+    """Slow relative supply, shape (n,): linear between knots, mean zero."""
     knots = c[int(Slot.HEAD) : int(Slot.HEAD) + KNOTS]
     if not knots.any():
         return np.zeros(inputs.op.size)
@@ -128,7 +128,7 @@ def head(inputs: ModelInputs, c: Floats) -> Floats:
 
 
 def load(inputs: ModelInputs, c: Floats) -> Floats:
-    """Load at the vessel's inlet, shape (n,) [% OP], as the constants say."""
+    """Load at the vessel's inlet, shape (n,) [% OP], from the constants."""
     act = np.zeros(inputs.op.size)
     for i, at in enumerate(inputs.step_at[:STEPS]):
         act[at:] += c[int(Slot.STEP) + i]
@@ -145,20 +145,20 @@ def load(inputs: ModelInputs, c: Floats) -> Floats:
 
 
 def history(inputs: ModelInputs, c: Floats) -> Floats:
-    """Relative change of gain with where the recorded PV has been, shape (n,)."""
+    """Relative change of gain that depends on past recorded PV, shape (n,)."""
     if inputs.pv is None or c[Slot.RECALL] == 0:
         return np.zeros(inputs.op.size)
     return gain_change_by_history(inputs.pv, float(c[Slot.RECALL]), float(c[Slot.RECALL_T]), inputs.dt_s)
 
 
 def through_valve(inputs: ModelInputs, c: Floats) -> Floats:
-    """Flow through the valve during each sample [% OP], shape (n,), that the model gives for the recorded OP."""
+    """Flow through the valve during each sample [% OP], shape (n,), of the model under the recorded OP."""
     op = acted(Signal.OP, inputs.op, c, inputs.dt_s)
     return acted(Signal.FLOW, flow(op, c, inputs.dt_s, inputs.middle), c, inputs.dt_s)
 
 
 def simulate(inputs: ModelInputs, c: Floats) -> Floats:
-    """PV's deviation from inputs.level [% PV], shape (n,), that the model gives for the recorded OP.
+    """PV's deviation from inputs.level [% PV], shape (n,), of the model under the recorded OP.
 
     c : shape (SIZE,), constants (parameters.py).
     """
@@ -183,25 +183,25 @@ def from_flow(inputs: ModelInputs, c: Floats, through: Floats) -> Floats:
 
 
 def gain_over_record(inputs: ModelInputs, c: Floats) -> Floats:
-    """Relative gain of the process over the recording, shape (n,): the supply, drift, and PV's past."""
+    """Relative gain of the process over the recording, shape (n,): supply, drift, and past PV."""
     supply = head(inputs, c) + history(inputs, c)
     return 1.0 + supply if c[Slot.DRIFT] == 0 else 1.0 + c[Slot.DRIFT] * inputs.clock + supply
 
 
 def load_over_record(inputs: ModelInputs, c: Floats) -> Floats:
-    """Load at the inlet with what goes with the gain, a supply's or that of PV's past, shape (n,) [% OP]."""
+    """Load at the inlet, including the part from a varying gain by supply or past PV, shape (n,) [% OP]."""
     return load(inputs, c) + c[Slot.HEAD_BIAS] * (head(inputs, c) + history(inputs, c))
 
 
 def outflow_head(inputs: ModelInputs, c: Floats) -> float:
-    """Level deviation at which a rooted vessel would be empty, with its sign turned [% PV]."""
+    """Level deviation at which a vessel with square-root outflow would be empty, sign reversed [% PV]."""
     return max(inputs.level, 1.0) / float(c[Slot.ROOT]) if c[Slot.ROOT] > 0 else 1.0
 
 
 def begun_at_rest(inputs: ModelInputs, c: Floats) -> Floats:
-    """Constants, shape (SIZE,), whose vessel before the last feeds it at the first sample what its own level lets go.
+    """Constants, shape (SIZE,), for which the vessel before the last feeds it the outflow of its own initial level.
 
-    A record may begin in the middle of a move; where the vessel before the last stood then is of that record alone.
+    A record may begin during a move; the initial level of the vessel before the last belongs to that record alone.
     """
     out = c.copy()
     flow_out, _ = outflow(float(c[Slot.START]), outflow_of(c, outflow_head(inputs, c)))
@@ -211,7 +211,7 @@ def begun_at_rest(inputs: ModelInputs, c: Floats) -> Floats:
 
 
 def counted_from_level(inputs: ModelInputs, c: Floats) -> Floats:
-    """Constants, shape (SIZE,), whose caps [% PV] count from inputs.level, as the vessel's own deviations do."""
+    """Constants, shape (SIZE,), with caps [% PV] relative to inputs.level, as the vessel's own deviations are."""
     out = c.copy()
     out[Slot.CAP] -= inputs.level
     out[Slot.UPPER_CAP] -= inputs.level

@@ -1,5 +1,5 @@
-"""What a loop model is made of: parameters, one place each and neutral unless freed, and what an effect adds to it:
-those that it frees, where their search begins, and acts of its own."""
+"""Definition of a loop model: parameters, each with one index and a neutral value, and the additions of an effect:
+its free parameters, their starts, and its own acts."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from identification.record import Floats
 
 Start = Mapping[int, float]
 KNOTS = 12
-"""Knots of a slow supply; ours: a wander of a twelfth of the record is followed, loop dynamics are not."""
+"""Knots of a slow supply; ours: they follow a change over a twelfth of the record, but not loop dynamics."""
 STEPS = 3
-"""Load steps that one model may hold."""
+"""Largest number of load steps in one model."""
 
 
 class Slot(IntEnum):
@@ -80,14 +80,13 @@ class Slot(IntEnum):
 
 SIZE = int(Slot.HEAD) + KNOTS
 _OWN: dict[str, float] = {}
-"""Parameters that effects bring along, by name, with their neutral values; their places follow those of Slot."""
+"""Parameters defined by effects, by name, with their neutral values; their indices follow those of Slot."""
 
 
 def own_slot(name: str, neutral_value: float = 0.0) -> int:
-    """A place for a parameter that no kernel knows, which an effect's own act reads.
+    """An index for a parameter that no kernel uses, but an effect's own act.
 
-    name : its name in saved models, upper case, other than any in use; neutral_value : its value where the effect
-    does not act.
+    name : its name in saved models, upper case, unique; neutral_value : its value at which the effect does not act.
     """
     if name in Slot.__members__ or name in _OWN:
         raise ValueError(f"a parameter {name} is there already; expected a name of its own; choose another")
@@ -96,12 +95,12 @@ def own_slot(name: str, neutral_value: float = 0.0) -> int:
 
 
 def places() -> dict[str, int]:
-    """Name and place of every parameter, those in a row by their first."""
+    """Name and index of every parameter; of an array the first index."""
     return {s.name: int(s) for s in Slot} | {name: SIZE + i for i, name in enumerate(_OWN)}
 
 
 def neutral() -> Floats:
-    """Parameters of the plain loop, shape (SIZE + own,): unit gain and a time constant of one second."""
+    """Parameters of the baseline model, shape (SIZE + own,): unit gain and a time constant of one second."""
     c = np.concatenate((np.zeros(SIZE), np.fromiter(_OWN.values(), dtype=np.float64)))
     c[Slot.T], c[Slot.K], c[Slot.LEAK], c[Slot.RATIO] = 1.0, 1.0, 1.0, 1.0
     c[Slot.COAST] = -1.0
@@ -115,7 +114,7 @@ def neutral() -> Floats:
 
 
 def alone(c: Floats, slots: Iterable[int]) -> Floats:
-    """Some of a model's parameters, shape (SIZE + own,), all others neutral."""
+    """Some of a model's parameters, shape (SIZE + own,), with all others neutral."""
     out, kept = neutral(), list(slots)
     out[kept] = c[kept]
     return out
@@ -123,11 +122,11 @@ def alone(c: Floats, slots: Iterable[int]) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Param:
-    """A parameter that an effect frees.
+    """A free parameter of an effect.
 
-    slot : its place among the model's parameters; name, unit : as answered; low, high : bounds in its own unit, times
-    the scale named by `scale` (scales() in prediction_error.py); log : searched by its logarithm; title : what pages
-    call it, its name where empty; hidden : whether another number, derived from it, is shown in its place.
+    slot : its index among the model's parameters; name, unit : as in the answer; low, high : bounds in its own unit,
+    times the scale named by `scale` (scales() in prediction_error.py); log : searched by its logarithm; title : its
+    name on pages, its name where empty; hidden : whether another number, derived from it, is shown instead.
     """
 
     slot: int
@@ -143,16 +142,16 @@ class Param:
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """One way in which an effect may act, as a candidate: its parameters, and starts in units of their scales.
+    """One form of an effect, as a candidate: its parameters, and starts in units of their scales.
 
-    delays : parameters whose start is taken off the dead time, which stood for them in the plain loop; replaces :
-    parameters of the plain loop that the effect makes meaningless; fixed : parameters set, not searched; needs : what
-    has to be in the recording, or in the model, before it can be tried (steps, line, neighbour, every scan of the
-    controller, experiment, moves); modes : time constants tried for a second mode, in that of the plain loop, and the
-    share that its gain may have; label : told apart by; penalty : added to that of the parameters; enter : turns the
-    plain loop's parameters, in place, where they change their meaning; opponent : what it has to do better than in an
-    experiment, of no name and a part of the plain loop's load; linear : the parameter that PV goes with in a straight
-    line, None of most: its start follows from those of the others.
+    delays : parameters whose start is subtracted from the dead time, which replaced them in the baseline model;
+    replaces : baseline parameters that lose their meaning; fixed : parameters set, not searched; needs : requirement
+    of the recording, or of the model, before it is tried (steps, line, neighbour, every scan of the controller,
+    experiment, moves); modes : candidate time constants of a second mode, relative to that of the baseline model, and
+    the share of its gain; label : distinguishes variants; penalty : added to that of the parameters; enter : converts
+    the baseline parameters, in place, if they change their meaning; opponent : the unnamed load that it must
+    outperform in an experiment; linear : the parameter on which PV depends linearly, None for most: its start follows
+    from those of the others.
     """
 
     params: tuple[Param, ...]
@@ -172,7 +171,7 @@ class Variant:
     needs: str = ""
 
     def set_in(self, c: Floats) -> Floats:
-        """A model's parameters, shape (SIZE + own,), with those set that are not searched."""
+        """A model's parameters, shape (SIZE + own,), with the fixed ones set."""
         out = c.copy()
         for slot, value in self.fixed.items():
             out[slot] = value
@@ -185,7 +184,7 @@ def each(slot: int, *values: float) -> tuple[Start, ...]:
 
 
 class Signal(StrEnum):
-    """The signal that an act changes, in the order of the loop."""
+    """The signal changed by an act, in the order of the loop."""
 
     OP = "op"
     FLOW = "flow"
@@ -194,11 +193,11 @@ class Signal(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Act:
-    """A step of the simulation that an effect brings along.
+    """A simulation step defined by an effect.
 
-    slot : the parameter without which it does nothing; neutral : its value then; signal : what it changes; work :
-    that signal, shape (n,) [% of span], from the signal, the model's parameters and the sample interval [s]. PV is
-    given as its deviation from the level that counts as zero.
+    slot : the parameter without which it has no effect; neutral : its value then; signal : the signal that it
+    changes; work : that signal, shape (n,) [% of span], from the signal, the model's parameters and the sample
+    interval [s]. PV is given as its deviation from the level that counts as zero.
     """
 
     slot: int
@@ -211,17 +210,17 @@ _ACTS: list[Act] = []
 
 
 def bring(acts: tuple[Act, ...]) -> None:
-    """Take acts into the simulator; the catalogue does so as it is read."""
+    """Register acts in the simulator; the catalogue does so when it is read."""
     _ACTS.extend(acts)
 
 
 def acting(c: Floats) -> bool:
-    """Whether any act is at work in a model."""
+    """Whether any act is active in a model."""
     return any(act.slot < c.size and c[act.slot] != act.neutral for act in _ACTS)
 
 
 def acted(signal: Signal, x: Floats, c: Floats, dt_s: float) -> Floats:
-    """The signal, shape (n,), after every act on it whose parameter is not neutral."""
+    """The signal, shape (n,), after every act on it with a parameter that is not neutral."""
     for act in _ACTS:
         if act.signal is signal and act.slot < c.size and c[act.slot] != act.neutral:
             x = act.work(x, c, dt_s)

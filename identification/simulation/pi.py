@@ -1,12 +1,12 @@
-"""The PID law, once: the velocity form with backward-Euler integration and a filtered derivative.
+"""The PID law in velocity form, with backward-Euler integration and a filtered derivative.
 
-PV passes a lag of pv_filter_s first. With e = SP - PV, dSP the move of SP, and s(e) what of the error counts (all of
-it; less inside the gap; e abs(e) / 100), OP moves at each scan by
+PV first passes a lag of pv_filter_s. With e = SP - PV, dSP the move of SP, and s(e) the effective error (e; reduced
+inside the gap; e abs(e) / 100), OP moves at each scan by
 
     kp (s(e(k)) - s(e(k-1) + (1 - sp_weight) dSP)) + ki s(e(k)) + D(k) - D(k-1)
     D(k) = a D(k-1) - kp Td / (Tf + dt) (PV(k) - PV(k-1) - td_sp_weight dSP),  Tf = Td / N,  a = Tf / (Tf + dt)
 
-at the most by op_rate dt, and is held within its limits, which is its anti-windup; ki = kp dt/Ti. kp > 0 means that
+but by at most op_rate dt. OP is clipped to its limits, which is the anti-windup; ki = kp dt/Ti. kp > 0 means that
 OP falls when PV rises. The derivative with its filter is that of Astrom, Hagglund (2006), in backward differences.
 """
 
@@ -23,8 +23,8 @@ from identification.record import Floats
 
 
 class Law(NamedTuple):
-    """The constants of a law per scan: gains, what the filters keep of their last value [-], the shape of the error,
-    limits of OP [% OP] and most that it moves [% OP]."""
+    """The constants of a law per scan: gains, shares of their last value kept by the filters [-], error shape, limits
+    of OP [% OP] and its largest move [% OP]."""
 
     kp: float
     ki: float
@@ -42,7 +42,7 @@ class Law(NamedTuple):
 
 
 Memory = tuple[float, float, float, float]
-"""OP, SP, PV behind its filter, and derivative part, of the scan before [%]."""
+"""OP, SP, filtered PV, and derivative part of the previous scan [%]."""
 
 
 def kept(lag_s: float, scan_s: float) -> float:
@@ -71,7 +71,7 @@ def per_scan(c: Pid, scan_s: float) -> Law:
 
 @njit(cache=True)
 def acting_error(e: float, law: Law) -> float:
-    """What of an error [% PV] the law acts on."""
+    """The part of an error [% PV] on which the law acts."""
     if law.gap > 0.0:
         inside = min(max(e, -law.gap), law.gap)
         e += (law.gap_gain - 1.0) * inside
@@ -80,7 +80,7 @@ def acting_error(e: float, law: Law) -> float:
 
 @njit(cache=True)
 def next_op(before: Memory, law: Law, sp: float, pv: float) -> Memory:
-    """Memory after one scan, whose first value is OP."""
+    """Memory after one scan; its first value is OP."""
     op, sp1, y1, d1 = before
     y = law.pv_keep * y1 + (1.0 - law.pv_keep) * pv
     moved = sp - sp1
@@ -92,15 +92,15 @@ def next_op(before: Memory, law: Law, sp: float, pv: float) -> Memory:
 
 
 def due_moves(e: Floats, kp: float, ti: float) -> Floats:
-    """Moves of OP that a PI law asks for at each sample, shape (n,); ti [samples]."""
+    """Moves of OP required by a PI law at each sample, shape (n,); ti [samples]."""
     return np.asarray(kp * (np.diff(e, prepend=e[0]) + e / ti))
 
 
 @njit(cache=True)
 def gapped(e: Floats, kp: float, ki: float, width: float, catches_up: bool) -> Floats:
-    """Path of OP, shape (n,), of a PI that stands still while |e| < width, from 0 and without limits.
+    """Path of OP, shape (n,), of a PI with constant OP while |e| < width, from 0 and without limits.
 
-    catches_up : whether the proportional part, on leaving the gap, answers for what e did within.
+    catches_up : whether the proportional part, on leaving the gap, includes the change of e inside it.
     """
     out = np.empty_like(e)
     u, last = 0.0, e[0]

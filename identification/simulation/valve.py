@@ -1,6 +1,6 @@
-"""Valve faults as operators on arrays: play (backlash) and stick-slip.
+"""Valve faults as operators on arrays: backlash and stick-slip.
 
-Both are rate independent: the stem's position depends on the order of OP's values, not on their timing.
+Both are rate independent: the stem position depends on the order of OP values, not on their timing.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from identification.models import Backlash, Motion, Stiction, Valve
 from identification.record import Floats
 
 SLIDES, HALTS, RESTS = 0.0, -1e-9, -math.inf
-"""Tolerances [% OP] of a stem in motion: it follows OP until OP turns (Choudhury, Thornhill, Shah 2005), until OP
-turns or stands still (Kano 2004; dry friction does so too, tests/identification/simulation/test_valve.py), or not
-at all (He, Wang, Pottmann, Qin 2007)."""
+"""Tolerances [% OP] of a moving stem: it follows OP until OP reverses (Choudhury, Thornhill, Shah 2005), until OP
+reverses or stops (Kano 2004; also true of dry friction, tests/identification/simulation/test_valve.py), or not at all
+(He, Wang, Pottmann, Qin 2007)."""
 TOLERANCES = {Motion.SLIDES: SLIDES, Motion.HALTS: HALTS, Motion.RESTS: RESTS}
 
 
 class StemLaw(NamedTuple):
     """A valve in the form that kernels use; breakaway 0 is an ideal one.
 
-    breakaway, sliding : distances |OP - stem| at which the stem lets go and comes to rest, (S + J)/2 and (S - J)/2:
-    static and kinetic friction in units of OP (He, Wang, Pottmann, Qin 2007); tolerance : OP's turning that a sliding
-    stem ignores, or HALTS or RESTS [% OP].
+    breakaway, sliding : distances |OP - stem| at which the stem starts to slip and comes to rest, (S + J)/2 and (S -
+    J)/2: static and kinetic friction in units of OP (He, Wang, Pottmann, Qin 2007); tolerance : reversal of OP that a
+    sliding stem ignores, or HALTS or RESTS [% OP].
     """
 
     breakaway: float = 0.0
@@ -36,7 +36,7 @@ class StemLaw(NamedTuple):
 
     @property
     def stickband(self) -> float:
-        """S [% OP]; the width of the play where slip_jump is 0."""
+        """S [% OP]; the backlash width where slip_jump is 0."""
         return self.breakaway + self.sliding
 
     @property
@@ -46,7 +46,7 @@ class StemLaw(NamedTuple):
 
     @property
     def valve(self) -> Valve:
-        """The valve of models.py; a stem that ignores a little turning slides."""
+        """The valve of models.py; a stem that ignores a small reversal slides."""
         if self.breakaway <= 0.0:
             return None
         if self.slip_jump <= 0.0:
@@ -80,15 +80,15 @@ def law_of(valve: Valve) -> StemLaw:
 
 
 Stem = tuple[float, float, float]
-"""Position [% OP], direction of motion (0: at rest) and OP's extreme since it moved."""
+"""Position [% OP], direction of motion (0: at rest) and OP's extreme since the motion began."""
 
 
 @njit(cache=True)
 def stem_step(stem: Stem, op: float, law: StemLaw) -> Stem:
     """The stem after one OP value.
 
-    At rest it holds until |OP - stem| > breakaway and then moves to the distance `sliding`. It follows at that
-    distance until OP turns back by more than `tolerance`; see SLIDES, HALTS, RESTS.
+    A stem at rest holds until |OP - stem| > breakaway and then moves to the distance `sliding`. It follows at that
+    distance until OP reverses by more than `tolerance`; see SLIDES, HALTS, RESTS.
     """
     at, moving, turned = stem
     if moving != 0.0:
@@ -107,17 +107,17 @@ def stem_step(stem: Stem, op: float, law: StemLaw) -> Stem:
 
 
 STILL = 0.01
-"""Speed of a stem with mass, in breakaway over its natural time, under which static friction holds it again; ours."""
+"""Speed of a stem with mass, in breakaway over its natural time, below which static friction holds it again; ours."""
 MOST_PIECES = 4
-"""Pieces of motion within one sample at most: a stem that turns at once is held; ours."""
+"""Largest number of pieces of motion within one sample: a stem that reverses immediately is held; ours."""
 
 
 @njit(cache=True)
 def heavy_step(stem: Stem, op: float, law: StemLaw, time_s: float, dt_s: float) -> tuple[float, Stem]:
     """Mean position over a sample, and the stem after it, of a stem with mass on a spring, critically damped, under
-    dry friction (Karnopp 1985), for an OP that stands over the sample; solved piece by piece.
+    dry friction (Karnopp 1985), for an OP constant over the sample; solved piece by piece.
 
-    stem : position [% OP], speed [%/s], and nothing; time_s : natural time of mass and spring [s].
+    stem : position [% OP], speed [%/s], and an unused value; time_s : natural time of mass and spring [s].
     """
     at, speed, left, total = stem[0], stem[1], dt_s, 0.0
     for _ in range(MOST_PIECES):
@@ -153,7 +153,7 @@ def moved_stem(stem: Stem, op: float, law: StemLaw, time_s: float, dt_s: float) 
 def walk(op: Floats, law: StemLaw, first: float, time_s: float = 0.0, dt_s: float = 1.0) -> Floats:
     """Stem positions [% OP], shape (n,), of a valve whose stem rests at `first` before the first sample.
 
-    time_s, dt_s : as of `moved_stem`; with mass, the mean positions over the samples.
+    time_s, dt_s : as in `moved_stem`; with mass, the mean positions over the samples.
     """
     out = np.empty_like(op)
     stem = (first, 0.0, op[0])
@@ -166,8 +166,8 @@ def walk(op: Floats, law: StemLaw, first: float, time_s: float = 0.0, dt_s: floa
 def first_slip(op: Floats, law: StemLaw) -> float:
     """Stem position before the first sample [% OP] of a valve of which only OP, shape (n,), is known.
 
-    Once OP has covered the stickband (breakaway + sliding) the stem has slipped, wherever it was: it lets go there
-    at the latest. A valve whose OP never covers it does not move and stands at the first OP.
+    Once OP has covered the stickband (breakaway + sliding) the stem has slipped, from any position, there at the
+    latest. If OP never covers it, the stem does not move and is at the first OP.
     """
     low, high = op[0], op[0]
     for k in range(op.size):
@@ -180,9 +180,9 @@ def first_slip(op: Floats, law: StemLaw) -> float:
 def stem_position(op: Floats, valve: Valve, start: float | None = None) -> Floats:
     """Stem position [% OP], shape (n,), behind any valve of models.py.
 
-    start : stem position before the first sample [% OP], None: op[0], the middle of a play. J = 0 is play of width S,
-    whatever the motion; a stem that rests, with S = J, is the relay of the describing function, height and hysteresis
-    S/2.
+    start : stem position before the first sample [% OP], None: op[0], the middle of the backlash. J = 0 is backlash
+    of width S, whatever the motion; a stem that rests, with S = J, is the relay of the describing function, height
+    and hysteresis S/2.
     """
     law = law_of(valve)
     if op.size == 0 or law.breakaway <= 0.0:
@@ -192,5 +192,5 @@ def stem_position(op: Floats, valve: Valve, start: float | None = None) -> Float
 
 
 def play(op: Floats, width: float, start: float | None = None) -> Floats:
-    """Stem position [% OP], shape (n,), behind play of full width `width` [% OP]."""
+    """Stem position [% OP], shape (n,), behind backlash of full width `width` [% OP]."""
     return stem_position(op, Backlash(width), start)

@@ -1,7 +1,7 @@
-"""From OP to flow, sample by sample: slew, positioner, play or stick-slip, stops, second valve, trim.
+"""From OP to flow, sample by sample: slew, positioner, backlash or stick-slip, stops, second valve, trim.
 
-A step is given OP as it stands over one sample and returns the mean flow over it. The valve's memory is a row of
-numbers, so that a loop open from a recorded OP and a loop closed by its controller take the same steps.
+A step takes the OP of one sample and returns the mean flow over it. The valve's memory is an array of numbers, so
+that an open loop under a recorded OP and a loop closed by its controller use the same steps.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ from identification.simulation.valve import (
 )
 
 COASTS = {Motion.RESTS: -1.0, Motion.HALTS: -0.5, Motion.SLIDES: 0.0}
-"""The parameter COAST of what a stem in motion does."""
+"""The parameter COAST for each motion of the stem."""
 BEHAVIOUR = {coast: TOLERANCES[motion] for motion, coast in COASTS.items()}
 SERVO_STEPS = 5
-"""Steps of a positioner within one sample; ours: its period is never under four samples."""
+"""Steps of a positioner within one sample; ours: its period is never below four samples."""
 RATE, SERVO, DAMPING, DEADBAND = (int(s) for s in (Slot.RATE, Slot.SERVO, Slot.DAMPING, Slot.DEADBAND))
 STOP_HI, STOP_LO, BEND, SPLIT = (int(s) for s in (Slot.STOP_HI, Slot.STOP_LO, Slot.BEND, Slot.SPLIT))
 RATIO, SPLIT_DEAD, SPLIT_LAG = (int(s) for s in (Slot.RATIO, Slot.SPLIT_DEAD, Slot.SPLIT_LAG))
 STEM_T = int(Slot.STEM_T)
 STRAIGHT = 1e-9
-"""A bend under this is none."""
+"""A curvature below this is treated as none."""
 SLEWED, SERVED, SPEED, STEM, MOVING, TURNED, SECOND = range(7)
-"""Places in the valve's memory: slewing stem, positioner and its speed, stem with its motion and OP's extreme, lag of
-the second valve."""
+"""Indices of the valve's memory: slewing stem, positioner and its speed, stem with its motion and OP's extreme, lag
+of the second valve."""
 
 
 @njit(cache=True)
 def slew_step(at: float, op: float, most: float) -> tuple[float, float]:
-    """Mean position over a sample, and position after it, of a stem that moves by `most` [%] a sample at most."""
+    """Mean position over a sample, and position after it, of a stem that moves by at most `most` [%] per sample."""
     gap = op - at
     if abs(gap) <= most:
         return op - 0.5 * gap * abs(gap) / most, op
@@ -70,7 +70,7 @@ def servo_step(
 
 @njit(cache=True)
 def second_valve(x: float, c: Floats) -> float:
-    """What a second valve adds to the flow at rest [% OP]: it takes over above the split point after a dead zone."""
+    """Flow at rest added by a second valve [% OP]: it takes over above the split point after a dead zone."""
     above = max(x - c[SPLIT], 0.0)
     return c[RATIO] * max(above - c[SPLIT_DEAD], 0.0) - above
 
@@ -83,7 +83,7 @@ def curved(x: float, bend: float, middle: float) -> float:
 
 @njit(cache=True)
 def flow_step(op: float, m: Floats, c: Floats, friction: StemLaw, dt_s: float, middle: float) -> float:
-    """Mean flow over a sample [% OP]; the valve's memory `m` is moved on."""
+    """Mean flow over a sample [% OP]; updates the valve's memory `m`."""
     x = op
     if not math.isinf(c[RATE]):
         x, m[SLEWED] = slew_step(m[SLEWED], x, c[RATE] * dt_s)
@@ -105,7 +105,7 @@ def flow_step(op: float, m: Floats, c: Floats, friction: StemLaw, dt_s: float, m
 
 @njit(cache=True)
 def before_stem(op: Floats, c: Floats, dt_s: float) -> Floats:
-    """The same steps over a whole recording, shape (n,), as far as slew and positioner."""
+    """Slew and positioner over a whole recording, shape (n,), by the same steps."""
     x = op.copy()
     if not math.isinf(c[RATE]):
         at, most = op[0], c[RATE] * dt_s
@@ -120,7 +120,7 @@ def before_stem(op: Floats, c: Floats, dt_s: float) -> Floats:
 
 @njit(cache=True)
 def behind_stem(x: Floats, c: Floats, dt_s: float, middle: float) -> Floats:
-    """And from the stem on: stops, second valve, trim."""
+    """The chain from the stem on: stops, second valve, trim."""
     if not (math.isinf(c[STOP_HI]) and math.isinf(c[STOP_LO])):
         x = np.minimum(np.maximum(x, c[STOP_LO]), c[STOP_HI])
     if not math.isinf(c[SPLIT]):
@@ -143,7 +143,7 @@ def friction_of(c: Floats) -> StemLaw:
 
 
 def memory(op: float, stem: float | None = None) -> Floats:
-    """A valve at rest at an OP [% OP], shape (7,), its stem elsewhere where so given."""
+    """Memory of a valve at rest at an OP [% OP], shape (7,), optionally with another stem position."""
     return np.array([op, op, 0.0, op if stem is None else stem, 0.0, op, math.nan])
 
 
@@ -152,8 +152,8 @@ def flow(op: Floats, c: Floats, dt_s: float, middle: float) -> Floats:
 
     op : shape (n,), recorded OP [% OP]; c : shape (SIZE,), constants of the model; dt_s : sample interval [s]; middle
     : OP at which a curved valve has unit gain [% OP]. Returns shape (n,), flow during each sample. A stem with
-    friction starts where OP does, if OP ever leaves there, else where it stands once it has slipped; and from there
-    by PLACE, in distances at which it lets go.
+    friction starts at OP if OP ever slips it from there, otherwise at its position after the first slip; PLACE shifts
+    the start, in breakaway distances.
     """
     x = before_stem(np.ascontiguousarray(op, dtype=np.float64), c, dt_s)
     law = friction_of(c)

@@ -1,4 +1,4 @@
-"""From flow to PV: transport, vessel, further modes and transmitter, stepped exactly for held inputs."""
+"""From flow to PV: transport, vessel, further modes and transmitter, exact for held inputs."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ SLOPE, ROOT, CAP = (int(s) for s in (Slot.SLOPE, Slot.ROOT, Slot.CAP))
 LEAK, PIPE, GAIN_SLOPE, SPEED = (int(s) for s in (Slot.LEAK, Slot.PIPE, Slot.GAIN_SLOPE, Slot.SPEED))
 UPPER_CAP, PASSED, BEGUN = (int(s) for s in (Slot.UPPER_CAP, Slot.PASSED, Slot.BEGUN))
 Memory = tuple[float, float, float, float]
-"""What a vessel remembers: level, second mode, second and third lag."""
+"""State of a vessel: level, second mode, second and third lag."""
 SHORT = 0.03
-"""Step, in terms of an outflow's own time, below which the exponential step is summed: the next term is 5e-16."""
+"""Step, relative to an outflow's time constant, below which the exponential is a series: the next term is 5e-16."""
 C1, C2, C3, C4, C5, C6 = ((-1.0) ** k / math.factorial(k + 1) for k in range(1, 7))
 """Coefficients of (1 - exp(-z)) / z."""
 WEIR = 25.0
-"""Outflow over the cap per % of level, in terms of the vessel's own; ours: stiff against every vessel."""
+"""Outflow over the cap per % of level, relative to the vessel's own; ours: stiff compared with every vessel."""
 
 
 @njit(cache=True, error_model="numpy")
 def transported(flow: Floats, delay_s: float, pipe: float, middle: float, dt_s: float) -> Floats:
-    """Mean of what leaves the pipe during each sample, shape (n,), where the flow sets the transport's speed.
+    """Mean outflow of the pipe during each sample, shape (n,), where the flow determines the transport speed.
 
     delay_s [s] at flow `middle`; pipe : relative change of speed per relative change of flow.
     """
@@ -56,12 +56,12 @@ def transported(flow: Floats, delay_s: float, pipe: float, middle: float, dt_s: 
 
 
 class Outflow(NamedTuple):
-    """How a vessel's outflow and its pace depend on its level and on the way it goes.
+    """Dependence of a vessel's outflow and time constant on its level and on the direction of motion.
 
-    slope : bend of the outflow [per % PV]; leak : outflow per level of a linear vessel [-]; root : nonzero where
-    the outflow goes with the root of the level; head : level deviation at which a rooted vessel would be empty, with
-    its sign turned [% PV]; cap : level over which it spills [% PV]; gain_slope [per % PV], speed : gain that goes
-    with the level, and its power in the time constant; up, down : pace of a rising and of a falling level [-].
+    slope : curvature of the outflow [per % PV]; leak : outflow per level of a linear vessel [-]; root : nonzero where
+    the outflow depends on the square root of the level; head : level deviation at which such a vessel would be empty,
+    sign reversed [% PV]; cap : level above which it overflows [% PV]; gain_slope [per % PV], speed : gain that
+    depends on the level, and its power in the time constant; up, down : rate of a rising and of a falling level [-].
     """
 
     slope: float
@@ -77,14 +77,14 @@ class Outflow(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def outflow_of(c: Floats, head: float) -> Outflow:
-    """The outflow that the constants say."""
+    """The outflow for the given constants."""
     slope, gain_slope, pace = c[SLOPE] / 50.0, c[GAIN_SLOPE] / 50.0, math.exp(0.5 * c[ASYM])
     return Outflow(slope, c[LEAK], c[ROOT], head, c[CAP], gain_slope, c[SPEED], pace, 1.0 / pace)
 
 
 @njit(cache=True, error_model="numpy")
 def outflow(x: float, o: Outflow) -> tuple[float, float]:
-    """Outflow at level x [% PV] and its derivative, for the plain, the rooted and the bent vessel."""
+    """Outflow at level x [% PV] and its derivative, for the linear, the square-root and the curved vessel."""
     if o.root != 0.0:
         root = math.sqrt(max(1.0 + x / o.head, 1e-3))
         return 2.0 * o.head * (root - 1.0), 1.0 / root
@@ -102,17 +102,17 @@ def scheduled(x: float, slope: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def share_filled(rise: float, time: float) -> float:
-    """Rise of a level over its net feed after some time [time constants], of an outflow with that derivative
+    """Rise of a level divided by its net feed after some time [time constants], for an outflow with that derivative
     (exponential step)."""
     z = rise * time
-    if z < SHORT:  # to sixteen digits, without the exponential that most of the time would go to
+    if z < SHORT:  # to sixteen digits, without the slow exponential
         return time * (1.0 + z * (C1 + z * (C2 + z * (C3 + z * (C4 + z * (C5 + z * C6))))))
     return (1.0 - math.exp(-z)) / rise
 
 
 @njit(cache=True, error_model="numpy")
 def filled(x: float, feed: float, time: float, o: Outflow) -> float:
-    """Level after some time [time constants] of constant feed (exact where the vessel is linear)."""
+    """Level after some time [time constants] of constant feed (exact for a linear vessel)."""
     out, rise = outflow(x, o)
     over = max(x - o.cap, 0.0)
     if over > 0.0:
@@ -125,7 +125,7 @@ def filled(x: float, feed: float, time: float, o: Outflow) -> float:
 
 @njit(cache=True, error_model="numpy")
 def shares_filled(o: Outflow, times: tuple[float, float]) -> Floats:
-    """The same of a linear outflow, shape (2, 2, 2): by part of a sample, rising or falling, under or over a cap."""
+    """The same for a linear outflow, shape (2, 2, 2): part of a sample, rising or falling, below or above a cap."""
     out = np.zeros((2, 2, 2))
     for half in range(2):
         for falling in range(2):
@@ -138,7 +138,7 @@ def shares_filled(o: Outflow, times: tuple[float, float]) -> Floats:
 
 @njit(cache=True, error_model="numpy")
 def risen(x: float, feed: float, o: Outflow, rises: Floats, half: int) -> float:
-    """What `filled` gives of a linear outflow, by its shares (`shares_filled`)."""
+    """Result of `filled` for a linear outflow, from its shares (`shares_filled`)."""
     net, over = feed - o.leak * x, 0
     if x > o.cap:
         net, over = net - WEIR * (x - o.cap), 1
@@ -159,10 +159,10 @@ def kept(c: Floats, parts: tuple[float, float]) -> tuple[Floats, Floats]:
 def poured(
     level: float, feed: float, left: float, mean: float, cap: tuple[float, float], held_over: float
 ) -> tuple[float, float]:
-    """Level of the vessel before the last one, after a while of constant feed, and the mean that leaves it meanwhile.
+    """Level of the vessel before the last one after a time of constant feed, and its mean outflow meanwhile.
 
-    All in % PV of feed at rest. left, mean : of `held`; cap : level over which it spills, and the share [-] of what
-    it spills that falls into the next vessel; held_over : its time constant over that while [-].
+    All in % PV of feed at rest. left, mean : of `held`; cap : level above which it overflows, and the share [-] of
+    the overflow that enters the next vessel; held_over : its time constant divided by that time [-].
     """
     after = feed + (level - feed) * left
     out = feed + (level - feed) * mean
@@ -173,7 +173,7 @@ def poured(
 
 @njit(cache=True, error_model="numpy")
 def parted(c: Floats, dt_s: float) -> tuple[int, tuple[float, float]]:
-    """The dead time's whole samples, and the two parts of a sample that its fraction makes [s]."""
+    """The dead time's whole samples, and the two parts of a sample split by its fraction [s]."""
     if c[PIPE] != 0.0:
         return 0, (0.0, dt_s)
     delay = int(c[L] / dt_s)
@@ -181,18 +181,18 @@ def parted(c: Floats, dt_s: float) -> tuple[int, tuple[float, float]]:
     return delay, (part, dt_s - part)
 
 
-# A sample has two parts, before and after the dead time's fraction; what is the same in each is worked out once, into
-# locals: for all that a compiler knows the loop might write entries of c.
+# A sample has two parts, before and after the dead time's fraction; values equal in both are computed once,
+# into locals: the compiler cannot exclude that the loop writes to c.
 @njit(cache=True, error_model="numpy")
 def vessel_span(
     span: tuple[int, int], m: Memory, drive: tuple[Floats, Floats, Floats], c: Floats, dt_s: float, base: float,
     head: float, out: Floats,
 ) -> Memory:  # fmt: skip
-    """PV's deviation [% PV] over samples span[0] (included) to span[1] (excluded), put into `out`, shape (n,).
+    """Write PV's deviation [% PV] over samples span[0] (included) to span[1] (excluded) to `out`, shape (n,).
 
-    m : the vessel's memory before the span; returned as it is behind. drive : flow during each sample, load at the
-    inlet [% OP] and relative gain, shape (n,) each, known as far as the span goes; base : the flow that counts as
-    zero; head : level deviation at which a rooted vessel would be empty, with its sign turned.
+    m : the vessel's memory before the span; the memory after it is returned. drive : flow during each sample, load at
+    the inlet [% OP] and relative gain, shape (n,) each, known up to the end of the span; base : the flow that counts
+    as zero; head : level deviation at which a square-root vessel would be empty, sign reversed.
     """
     flow, act, gain = drive
     x, mode, z2, z3 = m
@@ -228,7 +228,7 @@ def vessel_span(
 
 @njit(cache=True, error_model="numpy")
 def at_start(first: float, c: Floats, base: float) -> Memory:
-    """The vessel's memory before the first sample: at the first flow [% OP], but for what is begun elsewhere."""
+    """The vessel's memory before the first sample: at the first flow [% OP], except for states with another start."""
     feed = c[K] * (first - base) + c[BIAS]
     return c[START], c[START], min(feed + c[BEGUN], c[UPPER_CAP]), feed
 
@@ -246,7 +246,7 @@ def vessel(
 
 @njit(cache=True, error_model="numpy")
 def plain_vessel(flow: Floats, act: Floats, c: Floats, dt_s: float, base: float) -> Floats:
-    """The same, shape (n,), where nothing but K, T, L, bias and start is set: exact and several times faster."""
+    """The same, shape (n,), where only K, T, L, bias and start are set: exact and several times faster."""
     n, lag = flow.size, unit_lag(c[T], c[L], dt_s)
     gain, bias = c[K], c[BIAS]
     out = np.empty(n)

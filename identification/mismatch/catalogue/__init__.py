@@ -1,4 +1,4 @@
-"""The catalogue of what a plain loop may lack: one file an effect, each with its EFFECT, read from this folder."""
+"""The catalogue of effects that a baseline model may omit: one file per effect with its EFFECT, read from here."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ EFFECTS: Mapping[str, Effect] = _read()
 """All effects by name."""
 bring(tuple(act for e in EFFECTS.values() for act in e.acts))
 CANDIDATES: tuple[Variant, ...] = tuple(v for e in EFFECTS.values() for v in e.candidates)
-"""Everything that may be added to the plain loop."""
+"""All candidate additions to the baseline model."""
 RECORDER_FAULTS: tuple[Fault, ...] = tuple(
     sorted((e for e in EFFECTS.values() if isinstance(e, Fault) and e.find), key=lambda e: e.order)
 )
-"""What is looked for in the trends, in this order."""
+"""Faults that are searched for in the trends, in this order."""
 
 
 def fault(name: str) -> Fault:
-    """The recorder's or controller's effect of that name."""
+    """The recorder or controller effect with that name."""
     found = EFFECTS[name]
     assert isinstance(found, Fault)
     return found

@@ -1,4 +1,4 @@
-"""Backlash: after each turn of OP the stem waits until the play is taken up."""
+"""Backlash: after each OP reversal the stem does not move until the backlash is taken up."""
 
 from identification.mismatch.effect import Block, Effect, Friction, Param, Slot, Variant, each
 from identification.mismatch.pictures import stem_over_op

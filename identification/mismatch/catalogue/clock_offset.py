@@ -1,4 +1,4 @@
-"""PV stamped by another clock than OP."""
+"""PV has time stamps from another clock than OP."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from identification.mismatch.pictures import WINDOW, Picture, biggest_move, rebu
 
 
 def other_clock(found: Finding, s: Recording, _: Floats) -> Picture | None:
-    """OP about its biggest move, rebuilt with PV as stamped and with its clock set right; None without settings."""
+    """OP about its biggest move, recomputed with PV as stamped and with corrected clock; None without settings."""
     if s.sp is None or s.stated is None:
         return None
     part = biggest_move(s.sp if float(np.ptp(s.sp)) > 0 else s.op, WINDOW // 4, s.usable)

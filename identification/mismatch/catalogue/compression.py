@@ -1,4 +1,4 @@
-"""A historian that keeps few points and draws straight lines between them."""
+"""A historian that keeps few points and interpolates linearly between them."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from identification.mismatch.recording import straight, straightened
 
 
 def straight_segments(s: Recording) -> Finding | None:
-    """Straight segments whose breaks stand on no grid (swinging door and the like)."""
+    """Straight segments whose breaks are on no grid (swinging door and similar)."""
     limits = s.limits.recorder
     if not straightened(s.pv, limits.straight, limits):
         return None
@@ -17,7 +17,7 @@ def straight_segments(s: Recording) -> Finding | None:
 
 
 def straight_lines(found: Finding, s: Recording, _: Floats) -> Picture:
-    """The busiest stretch of a compressed trend, with the samples that lie on straight lines."""
+    """The busiest stretch of a compressed trend, with the samples on straight lines."""
     part = busiest(s.pv, WINDOW)
     time, x, marked = np.arange(part.start, part.stop) * s.dt_s, s.pv[part], found.where[part]
     curves = (Drawn("points", time[marked], x[marked]), Drawn("recorded", time, x))

@@ -1,4 +1,4 @@
-"""A controller that stands still while the error is small."""
+"""A controller whose OP is constant while the error is small."""
 
 import numpy as np
 
@@ -6,11 +6,11 @@ from identification.mismatch.effect import Block, Fault, Finding, Floats, Record
 from identification.mismatch.pictures import Axis, Drawn, Picture
 
 GAPS_SHOWN, GAP_CLASSES, FEWEST_IN_CLASS = 4.0, 32, 5
-"""Errors up to so many gaps are drawn, in so many classes of size, each of at least so many samples."""
+"""Errors are drawn up to this many gaps, in this many size classes, each of at least this many samples."""
 
 
 def gap_profile(found: Finding, s: Recording, _: Floats) -> Picture | None:
-    """How often OP stands still, over the size of the error, with the gap's end; None without SP."""
+    """Share of constant OP over the size of the error, with the gap's end; None without SP."""
     if s.sp is None:
         return None
     width = found.values["gap_pct"]

@@ -1,4 +1,4 @@
-"""Something beside the control law moves OP or holds it: tracking, overrides, a hand."""
+"""Something other than the control law moves or holds OP: tracking, overrides, an operator."""
 
 from identification.mismatch.effect import Block, Fault, within
 from identification.mismatch.pictures import by_stated_law

@@ -1,4 +1,4 @@
-"""A controller that runs with other settings than stated."""
+"""A controller whose settings differ from the stated ones."""
 
 from identification.controller.check import StatedSettings
 from identification.mismatch.effect import Block, Fault, Finding, Floats, Recording, within
@@ -6,7 +6,7 @@ from identification.mismatch.pictures import Picture, busiest, law_window, rebui
 
 
 def other_settings(found: Finding, s: Recording, _: Floats) -> Picture | None:
-    """OP over its busiest stretch, rebuilt by the settings found and by those stated; None without SP or settings."""
+    """OP over its busiest stretch, recomputed by identified and stated settings; None without SP or settings."""
     if s.sp is None or s.stated is None:
         return None
     part, e = busiest(s.op, law_window(s, s.stated.ti), s.usable), s.sp - s.pv

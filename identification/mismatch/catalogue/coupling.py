@@ -1,4 +1,4 @@
-"""Another loop of the export that moves this one, through a gain and a lag."""
+"""Another loop of the export that acts on this one through a gain and a lag."""
 
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant
 from identification.mismatch.pictures import load_over_time

@@ -1,4 +1,4 @@
-"""A dead time that shrinks when the flow grows: transport through a pipe."""
+"""A dead time that decreases with increasing flow: transport through a pipe."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ SHARE = Param(Slot.PIPE, "flow_share", "", -0.5, 3.0, title="Share of delay in f
 
 
 def delay_over_flow(d: Drawing) -> Picture:
-    """Dead time over flow (OP), at a flow that stays."""
+    """Dead time over flow (OP), at constant flow."""
     op, about = op_range(d.inputs), max(d.inputs.middle, 1e-3)
 
     def read(c: Floats) -> Floats:

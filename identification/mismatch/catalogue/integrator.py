@@ -1,11 +1,11 @@
-"""A process that integrates: its gain over time constant is all there is to know."""
+"""An integrating process: only its gain over time constant is defined."""
 
 from identification.mismatch.effect import Block, Effect, Floats, Slot, Variant
 from identification.mismatch.pictures import pv_response
 
 
 def from_settling(c: Floats) -> None:
-    """Turn a settling loop's parameters, in place, into the integrator of the same slope: unit gain, T over gain."""
+    """Convert a settling loop's parameters, in place, to the integrator of the same slope: unit gain, T over gain."""
     c[Slot.T] /= max(abs(c[Slot.K]), 1e-6)
     c[Slot.K], c[Slot.BIAS] = 1.0, 0.0
 

@@ -1,4 +1,4 @@
-"""A share of each move that acts the other way, faster or slower than the rest."""
+"""A share of each move that acts in the opposite direction, faster or slower than the rest."""
 
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant
 from identification.mismatch.pictures import pv_response

@@ -1,4 +1,4 @@
-"""A sine that enters at the process's inlet."""
+"""A sinusoidal load at the inlet of the process."""
 
 import math
 

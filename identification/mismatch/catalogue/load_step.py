@@ -1,4 +1,4 @@
-"""Load that comes in as up to three steps at the process's inlet."""
+"""A load of up to three steps at the inlet of the process."""
 
 from identification.limits import LIMITS
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant
@@ -13,7 +13,7 @@ FREE = tuple(
 
 
 def steps_over_time(d: Drawing) -> Picture:
-    """The load, with the places of its steps."""
+    """The load, with its steps marked."""
     acting = [k for i, k in enumerate(d.inputs.step_at[:STEPS]) if d.best[int(Slot.STEP) + i] != 0]
     return course_picture(d, LOAD, load, places=tuple(float(k * d.inputs.dt_s) for k in acting))
 

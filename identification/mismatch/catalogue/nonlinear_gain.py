@@ -1,4 +1,4 @@
-"""A process gain that changes with PV, by its outflow or by its inflow, with or without the speed."""
+"""A process gain that depends on PV, by its outflow or its inflow, with or without a change of speed."""
 
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant, each
 from identification.mismatch.pictures import gain_over_pv

@@ -1,4 +1,4 @@
-"""A vessel that spills over above a level."""
+"""A vessel that overflows above a level."""
 
 import numpy as np
 
@@ -21,11 +21,11 @@ STARTS: tuple[Start, ...] = tuple(
     for s in (0.3, 0.8)
 )
 MORE = 0.3
-"""How far beyond the range recorded the picture goes, in that range."""
+"""Extent of the picture beyond the recorded range, relative to that range."""
 
 
 def at_rest(free: Floats, inputs: ModelInputs, c: Floats) -> Floats:
-    """PV at rest under the feed that would bring a vessel without overflow to `free`, shape (n,) each [% PV]."""
+    """PV at rest for the feed that would bring a vessel without overflow to `free`, shape (n,) each [% PV]."""
     head, x, upper = outflow_head(inputs, c), free - inputs.level, c[Slot.UPPER_CAP] - inputs.level
     rooted = c[Slot.ROOT] > 0
     feed = 2.0 * head * (np.sqrt(np.maximum(1.0 + x / head, 0.0)) - 1.0) if rooted else x
@@ -37,7 +37,7 @@ def at_rest(free: Floats, inputs: ModelInputs, c: Floats) -> Floats:
 
 
 def pv_over_free(d: Drawing) -> Picture:
-    """PV over what an unbounded vessel would show."""
+    """PV over the PV of a vessel without overflow."""
     low_pv, high_pv = d.inputs.pv_range
     free = np.linspace(low_pv, high_pv + MORE * (high_pv - low_pv), POINTS)
     axes = Axis("PV of a vessel without overflow", "%"), Axis("PV", "%")

@@ -1,4 +1,4 @@
-"""A position loop of second order that rests within a dead band of its aim."""
+"""A second-order position loop that rests within a dead band about its target."""
 
 from identification.mismatch.effect import Block, Effect, Friction, Param, Slot, Variant
 from identification.mismatch.pictures import stem_response

@@ -1,4 +1,4 @@
-"""A transmitter or its card that knows few values."""
+"""A transmitter or input card with few distinct values."""
 
 import numpy as np
 
@@ -8,11 +8,11 @@ from identification.mismatch.pictures import PV, Picture, comb
 from identification.mismatch.recording import STEP, level_gaps
 
 STEPS_SHOWN = 24
-"""Steps of a coarse sensor that are drawn."""
+"""Number of steps of a coarse sensor that are drawn."""
 
 
 def coarse_grid(s: Recording) -> Finding | None:
-    """Values on a grid coarser than a historian's, the coarser where percent is of the recorded range."""
+    """Values on a grid coarser than a historian's; the threshold is larger where percent is of the recorded range."""
     gaps, limits = level_gaps(s.pv), s.limits.recorder
     least = limits.grid_step if s.ranged else limits.grid_step_of_range
     if gaps.size == 0 or gaps.size * limits.grid_samples > s.pv.size or float(gaps.mean()) < least:
@@ -23,9 +23,9 @@ def coarse_grid(s: Recording) -> Finding | None:
 
 
 def grid_unit(pv: Floats, limits: RecorderLimits) -> float:
-    """The step of values [% PV]: their mean distance where PV dwells, so that none between is left out.
+    """The step of values [% PV]: their mean distance where PV stays longest, so that no value between is missing.
 
-    A finer rounding over a converter's steps makes some longer and some shorter, and the mean is theirs.
+    A finer rounding of a converter's steps makes some longer and some shorter; the mean is the converter's.
     """
     levels, counts = np.unique(pv, return_counts=True)
     often = counts >= max(limits.dwells * pv.size / levels.size, limits.dwell_samples)
@@ -35,7 +35,7 @@ def grid_unit(pv: Floats, limits: RecorderLimits) -> float:
 
 
 def grid(found: Finding, s: Recording, _: Floats) -> Picture:
-    """How often each value of PV occurs within some steps of a coarse sensor."""
+    """Number of occurrences of each PV value within some steps of a coarse sensor."""
     middle = float(np.median(s.pv))
     near = s.pv[np.abs(s.pv - middle) <= 0.5 * STEPS_SHOWN * found.values["step_pct"]]
     return comb(PV, *np.unique(near, return_counts=True))

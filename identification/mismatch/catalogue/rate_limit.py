@@ -1,4 +1,4 @@
-"""A stem that moves no faster than so much a second."""
+"""A stem with a limited speed."""
 
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant, each
 from identification.mismatch.pictures import stem_response, step_size

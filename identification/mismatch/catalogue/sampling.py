@@ -1,4 +1,4 @@
-"""Polling that scatters: values stand at other times than their stamps say."""
+"""Irregular polling: the true times of values differ from their stamps."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ HISTOGRAM = 160
 
 
 def scattered_stamps(s: Recording) -> Finding | None:
-    """Stamps that scatter about a uniform clock by more than logging does, gaps left out."""
+    """Stamps that scatter about a uniform clock more than logging explains, without gaps."""
     spacing = np.diff(s.stamp_s) / s.dt_s
     spacing = spacing[(spacing > 0.02) & (spacing < 1.98)]
     jitter = float(np.std(spacing)) / np.sqrt(2.0) if spacing.size > 10 else 0.0
@@ -21,8 +21,8 @@ def scattered_stamps(s: Recording) -> Finding | None:
 
 
 def _is_slight(jitter_s: float, s: Recording) -> bool:
-    """Whether a scatter [s] is a small part of the process's time constant, in a recording in which no stated
-    controller acts on each sample."""
+    """Whether a scatter [s] is a small part of the process time constant, in a recording without a stated controller
+    that acts on each sample."""
     if s.stated is not None or float(np.ptp(s.op)) == 0.0:
         return False
     process = simulated_best(s.pv - s.pv.mean(), s.op, s.usable, s.dt_s)
@@ -30,7 +30,7 @@ def _is_slight(jitter_s: float, s: Recording) -> bool:
 
 
 def spacings(found: Finding, s: Recording, _: Floats) -> Picture:
-    """How often each spacing of two stamps occurs."""
+    """Number of occurrences of each spacing of two stamps."""
     spacing = np.diff(s.stamp_s)
     count, edge = np.histogram(spacing[(spacing > 0) & (spacing < 2 * s.dt_s)], HISTOGRAM)
     return comb(Axis("time between samples", "s"), 0.5 * (edge[1:] + edge[:-1]), count)

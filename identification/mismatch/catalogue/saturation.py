@@ -1,4 +1,4 @@
-"""A valve that does nothing more beyond a position: a stop, a hand valve, a pump at its end."""
+"""A valve without further effect beyond a position: a stop, a hand valve, a pump at its limit."""
 
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant, each
 from identification.mismatch.pictures import flow_over_op

@@ -1,4 +1,4 @@
-"""One lag more, or two: between valve and process, or in the transmitter, which the data cannot tell."""
+"""One or two additional lags, between valve and process or in the transmitter; the data cannot distinguish these."""
 
 from identification.mismatch.effect import Block, Effect, Param, Slot, Start, Variant, each
 from identification.mismatch.pictures import pv_response

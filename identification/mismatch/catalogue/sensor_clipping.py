@@ -1,4 +1,4 @@
-"""A transmitter whose range ends before the process does."""
+"""A transmitter whose range is smaller than that of the process."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from identification.mismatch.pictures import PV, TIME, WINDOW, Drawn, Picture, a
 
 
 def clipped(s: Recording) -> Finding | None:
-    """PV standing at exactly its highest or lowest value far more often than at those next to it."""
+    """PV at exactly its highest or lowest value far more often than at the adjacent values."""
     levels, counts = np.unique(s.pv, return_counts=True)
     best, limits = None, s.limits.recorder
     if levels.size < limits.clip_values:
@@ -21,13 +21,13 @@ def clipped(s: Recording) -> Finding | None:
 
 
 def end_of_range(found: Finding, s: Recording) -> dict[str, Estimate]:
-    """The end, which is known to a step of the recording [% PV]."""
+    """The end of the range, known to a step of the recording [% PV]."""
     step = float(np.median(np.diff(np.unique(s.pv))))
     return {"clip_pct": exact(found.values["clip_pct"], "% PV", step)}
 
 
 def range_end(found: Finding, s: Recording, free: Floats) -> Picture:
-    """The stretch in which PV stands at its end longest, with the model that goes on."""
+    """The longest stretch of PV at its range end, with the unclipped model."""
     part = around(found.where, WINDOW)
     time = np.arange(part.start, part.stop) * s.dt_s
     end = np.full(time.size, found.values["clip_pct"])

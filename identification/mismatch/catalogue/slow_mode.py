@@ -1,4 +1,4 @@
-"""A share of each move that arrives with a time constant of its own, much later."""
+"""A share of each move that arrives much later, with its own time constant."""
 
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant
 from identification.mismatch.pictures import pv_response

@@ -1,4 +1,4 @@
-"""A second valve that takes over above a point, after a dead zone and perhaps a lag."""
+"""A second valve that takes over above a point, after a dead zone and optionally a lag."""
 
 from identification.mismatch.effect import Block, Effect, Param, Slot, Start, Variant
 from identification.mismatch.pictures import flow_over_op

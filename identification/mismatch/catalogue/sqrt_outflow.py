@@ -1,4 +1,4 @@
-"""A vessel whose outflow grows with the root of its level."""
+"""A vessel whose outflow is proportional to the square root of its level."""
 
 from identification.limits import LIMITS
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant, each

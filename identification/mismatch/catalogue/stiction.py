@@ -1,4 +1,4 @@
-"""Stiction: the stem holds through the stickband, then jumps; behind the jump it rests, halts, slides or swings."""
+"""Stiction: the stem holds through the stickband, then jumps; after the jump it rests, halts, slides or swings."""
 
 from identification.estimation.descent import reaching
 from identification.limits import INTERVALS
@@ -11,12 +11,12 @@ BAND = Param(Slot.STICKBAND, "stickband_pct", "% OP", 1e-4, 2.0, "op", True, tit
 TIME = Param(Slot.STEM_T, "stem_time_s", "s", 0.02, 2.0, "dt", True, title="Stem's natural time")
 JUMP = Param(Slot.JUMP, "slip_jump_pct", "% OP", 1e-5, 2.0, "op", True, title="Slip jump")
 BANDS = (0.01, 0.03, 0.08, 0.2, 0.5)
-"""Stickbands that the search begins with, in OP's range."""
+"""Stickbands at which the search begins, relative to OP's range."""
 
 
 def as_friction_leaves_it(own: Parameters) -> dict[str, Estimate]:
-    """All within what true friction does to them: it differs from slip to slip, and a slip more or less moves all
-    that follow, so the likelihood's own pit is much narrower than what is known."""
+    """Widen all intervals by the scatter of real friction. It differs from slip to slip, and one slip more or less
+    changes all later ones, so the likelihood's optimum is much narrower than the true uncertainty."""
     band, jump, time = own[BAND.name], own[JUMP.name], own.get(TIME.name)
     most = band.value * INTERVALS.least_band
     told = {

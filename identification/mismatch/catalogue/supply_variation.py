@@ -1,4 +1,4 @@
-"""A supply to the valve that wanders slowly and changes gain and bias together."""
+"""A valve supply that varies slowly and changes gain and bias together."""
 
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant
 from identification.mismatch.pictures import Axis, course_picture
@@ -9,7 +9,7 @@ AT_REST = Param(Slot.HEAD_BIAS, "flow_at_rest_pct", "% OP", -60.0, 60.0, title="
 KNOT = tuple(Param(int(Slot.HEAD) + i, f"head_{i + 1}", "", -2.0, 2.0, hidden=True) for i in range(KNOTS))
 SUPPLY = Axis("supply", "% of its mean")
 ADDED = 1e4
-"""Flow at rest [% OP] beside which a course that is added has no part in the gain; ours."""
+"""Flow at rest [% OP] for which an added course does not affect the gain; ours."""
 
 EFFECT = Effect(
     name="supply-variation",

@@ -1,4 +1,4 @@
-"""A trim whose gain changes along the stroke: local gain exp(curve (z - middle)/100)."""
+"""A trim whose gain varies over the stroke: local gain exp(curve (z - middle)/100)."""
 
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant, each
 from identification.mismatch.pictures import flow_over_op
