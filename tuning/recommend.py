@@ -27,6 +27,7 @@ from tuning.rules import effective_delay, simc
 from tuning.search import (
     Bench,
     Candidate,
+    Case,
     bench,
     mean_error,
     rejection,
@@ -100,6 +101,7 @@ def recommend(
     error: float | None = None,
     halfway: bool = False,
     seen: ObservedRinging | None = None,
+    alike: Sequence[Case] = (),
 ) -> Proposal:
     """The proposal for one loop: identified process and valve with the present controller.
 
@@ -108,7 +110,8 @@ def recommend(
     ValueError where it is not finite; None, or too short a load (tuning.limits): steps at the valve; error, the
     recorded average absolute error [% PV], because the simulation of a barely stable loop is too inaccurate, None:
     simulated; halfway, whether the dead time of a ringing loop is uncertain, so that a first step is proposed; seen,
-    the observed ringing of such a loop, None: that of the model.
+    the observed ringing of such a loop, None: that of the model; alike, as in tuning.search.bench:
+    settings must be no worse on these either.
     """
     _check(cause, load)
     if cause not in (Cause.VALVE, Cause.TUNING):
@@ -120,7 +123,7 @@ def recommend(
         cases = None if load is None else _cases(loop, uncertainty, load, error)
         return _tight(loop, uncertainty, cases, seen or _alone(loop), limits, halfway)
     load = None if load is None or load.size < limits.least_steps else load
-    return _valve(loop, uncertainty, load, limits)
+    return _valve(loop, uncertainty, load, limits, alike)
 
 
 def _tight(
@@ -260,7 +263,9 @@ def _simc_settings(
     return found
 
 
-def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: TuningLimits) -> Proposal:
+def _valve(
+    loop: Loop, others: Sequence[Loop], load: Floats | None, limits: TuningLimits, alike: Sequence[Case]
+) -> Proposal:
     """Settings with the least travel and error within the limits, for a loop with backlash or stick-slip."""
     if band(loop.valve) <= 0.0:
         return Proposal(Action.UNDECIDED, WHY["no_size"])
@@ -270,7 +275,7 @@ def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
         return Proposal(Action.REPAIR_VALVE, WHY["sticks_on_short_lag"].format(**known), before=before)
     if load is None:
         load = standard_load(loop, limits.most_steps)
-    table = bench(loop, others, load, limits)
+    table = bench(loop, others, load, limits, alike)
     now = maximum_sensitivity(loop)
     if table.travel[0] <= 0.0:
         why = WHY["no_travel"].format(fault=fault)

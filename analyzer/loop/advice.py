@@ -12,7 +12,7 @@ from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
 from analyzer.loop.decisions import Action, Cause, Due, Fault, MissingData, Requirement, RequirementKind
 from analyzer.loop.fitness import too_thin
-from analyzer.loop.identified import cautious, load_of, recorded_error, tuned, uncertain
+from analyzer.loop.identified import alike, cautious, load_of, recorded_error, tuned, uncertain
 from analyzer.loop.oscillation import counting
 from analyzer.loop.quality import Prepared
 from analyzer.loop.ringing import between_samples
@@ -23,6 +23,7 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import sentences
 from analyzer.words.units import beside_settings, number, of_controller
+from identification.estimation.between_samples import scans_per_row
 from identification.estimation.window import Fit
 from identification.limits import FIT
 from identification.models import Loop, Pid
@@ -30,7 +31,7 @@ from identification.record import Floats
 from tuning.frequency_response import integral_s, is_stable
 from tuning.limit_cycle import Cycle, confirm
 from tuning.recommend import WITHOUT_SETTINGS, Proposal, recommend
-from tuning.search import rounded
+from tuning.search import Case, rounded
 
 SAID = sentences("settings")
 """What is said of settings that are given, or that are not."""
@@ -60,13 +61,14 @@ class Advice:
 
 @dataclass(frozen=True, slots=True)
 class Proposed:
-    """A proposal, the loop and load [% PV] that it was sought on, None where none was sought, and what else the loop
-    may be."""
+    """A proposal, the loop and load [% PV] that it was sought on, None where none was sought, what else the loop
+    may be, and the loops alike of tuning.search.bench."""
 
     proposal: Proposal
     loop: Loop | None = None
     load: Floats | None = None
     others: tuple[Loop, ...] = ()
+    alike: tuple[Case, ...] = ()
 
 
 def model_of(verdict: Verdict, controller: Pid) -> Loop:
@@ -106,7 +108,7 @@ def advise(
     beside = None
     if proposed.loop is not None and proposed.load is not None:
         known = proposed.loop, proposed.load, held or proposal.new, oscillation.period_s, pv_span
-        beside = compared(*known, config.tuning, proposed.others)
+        beside = compared(*known, config.tuning, proposed.others, proposed.alike)
     return replace(_as_advice(proposal, spec, pv_span), compared=beside)
 
 
@@ -307,7 +309,11 @@ def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Con
         if apart is not None:
             differs = SAID["off_by"].format(*apart) if apart[1] > 0.0 else SAID["no_cycle"]
             return Proposed(Proposal(Action.UNDECIDED, SAID["disagrees"].format(differs)))
-    return Proposed(recommend(sought, verdict.cause, others, load, config.tuning), sought, load, others)
+    same: tuple[Case, ...] = ()
+    if period_s is not None and scans_per_row(loop.controller, fit.window.row_s) > 1:
+        same = alike(fit, sought, period_s)
+    found = recommend(sought, verdict.cause, others, load, config.tuning, alike=same)
+    return Proposed(found, sought, load, others, same)
 
 
 def _as_advice(proposal: Proposal, spec: LoopSpec, pv_span: float) -> Advice:

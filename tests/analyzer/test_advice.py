@@ -15,7 +15,7 @@ from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.cause import NO_CAUSE, not_assessed
 from analyzer.loop.conclusion import concluded
 from analyzer.loop.decisions import MissingData, Requirement, RequirementKind
-from analyzer.loop.identified import lag_factor, load_of, scan_noise, tuned, uncertain
+from analyzer.loop.identified import alike, lag_factor, load_of, scan_noise, tuned, uncertain
 from analyzer.loop.oscillation import Oscillations
 from analyzer.loop.quality import prepare
 from analyzer.loop.witness import witness
@@ -23,6 +23,7 @@ from analyzer.store.rows import night_row
 from identification.estimation.window import Window
 from identification.models import Backlash, Fopdt, Integrator, Pid
 from proofs.plant import CONFIG, START_S, Sketch, prepared, series, simulate, spec
+from tuning.describing import describe
 from tuning.frequency_response import maximum_sensitivity
 from tuning.limits import LIMITS
 
@@ -299,3 +300,28 @@ def test_a_calm_loop_witnesses_no_width_that_its_stretches_do_not_bear_out(pipe)
     assert "slope" in said
     assert "width" not in said
     assert max(said["profile"]) == 0.0
+
+
+def test_loops_that_a_cycle_cannot_tell_apart_have_its_loop_gain(pipe):
+    """The product of process and describing function at the cycle is that of the fitted loop, for a process that
+    integrates, behind a valve as wide and a wider one; the load is what each leaves of the same record."""
+    fit, period_s = pipe.verdict.fit, pipe.oscillations.first.period_s
+    loop = sought_for(pipe.verdict, PIPE.controller, CONFIG.advice)[0]
+    late = 0.25 * period_s  # an integrator and a wider valve take their phase from the dead time
+    fit = replace(fit, dead_time_s=fit.dead_time_s + late)
+    loop = replace(loop, process=replace(loop.process, dead_time_s=loop.process.dead_time_s + late))
+    swing, omega = 0.5 * fit.window.cycle_range, 2.0 * math.pi / period_s
+
+    def product(one):
+        p = one.process
+        lag = p.gain * np.exp(-1j * omega * p.dead_time_s) / (1.0 + 1j * omega * p.time_constant_s)
+        return lag * describe(one.valve, swing)
+
+    found = alike(fit, loop, period_s)
+    widths = [one.valve.width for one, _ in found]
+    assert widths[0] == fit.valve.stickband
+    assert widths[1] > 1.05 * widths[0]
+    for one, load in found:
+        assert one.process.time_constant_s > 5.0 * period_s
+        assert product(one) == pytest.approx(product(loop), rel=1e-6)
+        assert load.std() > 0.0

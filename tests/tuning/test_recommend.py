@@ -376,3 +376,16 @@ def test_a_first_step_is_a_mirror_under_the_other_sign():
         found.append(tuning.recommend.recommend(tame, "tuning", seen=seen).new)
     assert found[0] is not None
     assert (found[0].kp, found[0].ti_s) == (-found[1].kp, found[1].ti_s)
+
+
+def test_settings_are_no_worse_on_a_loop_that_the_record_cannot_tell_apart():
+    """On an integrator and its slow load the settings for a lag raise the error, unless that loop is tried too."""
+    rng = np.random.default_rng(7)
+    lag = Loop(Fopdt(0.4, 165, 31), Pid(8.9, 70), Backlash(4.7))
+    level = replace(lag, process=Fopdt(7.5, 2800, 17), valve=Backlash(5.4))
+    fast, slow = (load(rng, 12000, size, corner, 0.02) for corner, size in ((60.0, 0.3), (3000.0, 1.5)))
+    alone = recommend(lag, "valve", (), load=fast).new
+    tried = recommend(lag, "valve", (), load=fast, alike=[(level, slow)]).new
+    before, *after = (figures(level, pid, slow)[1] for pid in (lag.controller, alone, tried))
+    assert after[0] > 1.15 * before
+    assert after[1] < before
