@@ -176,7 +176,8 @@ def case(
     series = snapped(series, spec.pv or "")
     whole = prepare(spec, series, config.quality)
     taught = learned(spec, series, whole, config, beside=ops_beside(spec, specs, series, whole, config))
-    coarse = whole if most is None or len(whole.record) <= most else coarser(whole, taught, config)
+    by_hand = taught if controller(spec, whole.scale.span) is None else in_manual(taught)
+    coarse = whole if most is None or len(whole.record) <= most else coarser(whole, by_hand, config)
     prepared, shortened = telling_stretch(as_given(coarse), most)
     if coarse is not whole:
         stated = f"each {coarse.record.dt_s:.3g} s: its experiments need no more."
@@ -207,6 +208,14 @@ def case(
     others = tuple(x[: len(thin.record) * factor : factor] for x in others)
     subject = subject_of(spec, thin, stamps[::factor], (verdict, period_s), others, config)
     return Case(spec, thin, subject, f"{shortened} {said}".strip(), taught)
+
+
+def in_manual(taught: Learned | None) -> Learned | None:
+    """What experiments in manual tell, None where there are none: in automatic a known controller acts between the
+    samples of a coarser record."""
+    if taught is None or taught.model is None or taught.model.used[0].experiment.course.closed:
+        return None
+    return taught
 
 
 def coarser(whole: Prepared, taught: Learned | None, config: Config) -> Prepared:

@@ -111,11 +111,11 @@ def learned(
     even = prepared if beside else on_even_clock(spec, series, prepared, config)
     if even is not prepared:
         found = found_in(spec, even, series, config)
-    models, untold = [], []
+    models, untold, stated = [], [], controller_of(spec, even)
     wanted = [x for x in sorted(found, key=lambda x: -x.size) if closed or not x.course.closed]
     for x in wanted[: EXPERIMENTS.most if closed else EXPERIMENTS.most_a_night]:
         try:
-            models.append(modelled(even.record, x, beside))
+            models.append(_the_right_way(modelled(even.record, x, beside), stated))
         except NotAssessedError as error:
             untold.append((x, str(error)))
         except (ArithmeticError, ValueError) as error:  # a fit that runs away costs the loop nothing else
@@ -128,6 +128,15 @@ def learned(
     first = whole.used[0].experiment
     seen = controlled(even.record.span(first.first, first.last)) if first.course.closed else None
     return Learned(found, even, tuple(models), whole, _settings(whole, spec, even), tuple(untold), seen)
+
+
+def _the_right_way(model: Modelled, stated: Pid | None) -> Modelled:
+    """The model; NotAssessedError for one of an experiment in automatic that goes against the stated controller: such
+    a loop would run away, so a load has moved PV."""
+    closed = model.experiment.course.closed
+    if closed and stated is not None and stated.kp * model.process.slope < 0.0:
+        raise NotAssessedError("the fitted process goes against its controller: a load moved PV meanwhile")
+    return model
 
 
 def controlled(part: LoopRecord) -> Controlled:

@@ -168,3 +168,29 @@ def test_a_warm_up_has_a_heater_s_sign():
     assert e["gain"].low > 0
     assert 200.0 < e["lags_s"].value < 330.0
     assert e["second_lag_s"].value == pytest.approx(25.0, rel=0.2)
+
+
+def test_a_model_against_the_controller_tells_nothing(tmp_path):
+    """Set point steps of a loop whose stated controller acts the other way give no model."""
+    rng, y, integral = np.random.default_rng(5), 0.0, 0.0
+    sp = np.repeat([50.0, 55.0, 48.0, 53.0], 900)
+    pv, op = np.empty(sp.size), np.full(sp.size, 40.0)
+    for k in range(sp.size):
+        pv[k] = 50.0 + y + 0.02 * rng.normal()
+        integral += (sp[k] - pv[k]) / 60.0
+        op[k] = 40.0 + 0.8 * (sp[k] - pv[k] + integral)
+        y += (1.2 * (op[max(k - 5, 0)] - 40.0) - y) / 60.0
+    stamps = pd.date_range("2026-05-04 08:00", periods=sp.size, freq="s")
+    frame = pd.DataFrame({"timestamp": stamps, "T1.PV": pv, "T1.SP": sp, "T1.OP": op})
+    frame.to_csv(tmp_path / "steps.csv", index=False)
+
+    def model(kp):
+        (tmp_path / "loops.csv").write_text(f"loop,kp,ti,pv_lo,pv_hi\nT1,{kp},60,0,100\n")
+        plant = opened(asked_of([tmp_path / "steps.csv"], tmp_path / "loops.csv", None, Config()))
+        one = plant.last_night(plant.loops[0])
+        return learned(one.spec, plant.trends(one.spec.tags, one.night), one.prepared, plant.config)
+
+    right, wrong = model(0.8), model(-0.8)
+    assert right.model.estimates["gain"].value == pytest.approx(1.2, rel=0.1)
+    assert wrong.model is None
+    assert "against its controller" in wrong.untold[0][1]
