@@ -174,7 +174,7 @@ TIMES = ("%Y-%m-%d", *(f"%Y-%m-%d{between}%H:%M{end}" for between in "T " for en
 
 def finding(command: Command) -> Command:
     """--find-loops, for commands that take their loops from the export without a loops.csv."""
-    said = "Without --loops: look for loops in the data too, where the tags' names tell none."
+    said = "Without --loops: look for loops in the data too, where the tags' names show none."
     return click.option("--find-loops", "finding", is_flag=True, help=said)(command)
 
 
@@ -337,7 +337,7 @@ def trying() -> Iterator[Callable[[str], None]]:
     watched, begun = sys.stderr.isatty(), time.monotonic()
     said_s = begun
     if not watched:
-        click.echo("explain: reading the export, fitting the plain loop", err=True)
+        click.echo("explain: reading the export, fitting the baseline model", err=True)
 
     def tell(name: str) -> None:
         nonlocal said_s
