@@ -177,9 +177,9 @@ def outcome(found: LoopComparison) -> str:
         reasons=reasons,
     )
     if found.reasons and reached is not Grade.INCOMPARABLE:
-        text += f"; this is on equal load, for the weeks are not comparable as measured: {reasons}"
+        text += f"; this is on equal load because the weeks are not comparable as measured: {reasons}"
     if found.reference is not None and found.reference.of:
-        text += f"; what {found.reference.loops} unchanged loops of its area did is taken off"
+        text += f"; what {found.reference.loops} unchanged loops of its area did is subtracted"
     if found.source_loop:
         text += f"; the cause lies in the neighbour {found.source_loop}, whose oscillation it follows"
     return text

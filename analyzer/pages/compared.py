@@ -48,7 +48,7 @@ def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
         offers = "; ".join(
             _offers(c, [f"{n}: {_priced(c, n)}" for n in OFFERED if n in c.shown], "a repaired valve", unit)
         )
-        said = "No settings are recommended: none wins on all that the loop may be without a price."
+        said = "No settings are recommended: none is better at no cost on all possible loops."
         return f"{said} {f'To choose between: {offers}.' if offers else ''}"
     scale, ratio = c.pv_span / 100.0, _times(new, now)
     travel, error = (
@@ -61,7 +61,7 @@ def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
     )
     if ratio is None:
         return f"{text}."
-    so = "; the price is that" if ratio > PAGES.worse else ", and"
+    so = "; the cost is that" if ratio > PAGES.worse else ", and"
     return f"{text}{so} the error that a lasting load leaves sums up to {number(ratio)} times as much."
 
 
@@ -71,7 +71,7 @@ def choices(c: Comparison, spec: LoopSpec) -> list[str]:
     unit = spec.pv_unit or "PV"
     told = [f"{name}: {_typed(c, name, spec)}: {_priced(c, name)}" for name in named]
     lines = _offers(c, told, REPAIRED, unit)
-    return ["to choose between, on all that the loop may be:", *(f"  {x}" for x in lines)] if lines else []
+    return ["to choose between, on all possible loops:", *(f"  {x}" for x in lines)] if lines else []
 
 
 def _offers(c: Comparison, settings: list[str], repair: str, unit: str) -> list[str]:
@@ -171,7 +171,7 @@ def travel_field(
     moves, rest : what travels, and the text for settings at rest.
     """
     swings = f"limit cycle, the darker the more {moves} travels"
-    keys = (("swings", swings), ("calm", f"comes to rest{rest}"), ("unstable", "unstable"))
+    keys = (("swings", swings), ("calm", f"no limit cycle{rest}"), ("unstable", "unstable"))
     cells = np.abs(found.kp), found.ti_s, 3600.0 * found.travel, found.rests, found.unstable
     return parts.Field("travel-map", title, "Kp [%/%]", "Ti [s]", *cells, tuple(places), keys)
 
@@ -209,7 +209,7 @@ def field(c: Comparison) -> parts.Field | None:
     places = [_place(abs(t.controller.kp), t.controller.ti_s, t) for t in known]
     rest = "" if is_play(c.loop.valve) else " (seldom with stick-slip)"
     title = "Travel by describing function, without load"
-    caption = "Kp in percent of OP over percent of PV, whatever unit the controller has."
+    caption = "Kp in percent of OP over percent of PV, independently of the controller's unit."
     return replace(travel_field(c.travel, places, title, "the stem", rest), caption=caption)
 
 
@@ -293,5 +293,5 @@ def settings_page(loop: str, night: str, c: Comparison, spec: LoopSpec) -> parts
         parts.Section("Try settings", (parts.Text((said["hint"],)), tried)),
         parts.Section("What the settings are, for experts", (named,), closed=True),
     )
-    subtitle = f"settings compared and tried on night {night}"
+    subtitle = f"settings compared and simulated on night {night}"
     return parts.Page(f"{slug(loop)}-settings", f"{loop}: settings", subtitle, sections)

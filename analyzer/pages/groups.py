@@ -120,7 +120,7 @@ def sentence(g: GroupView) -> str:
         loop, pct = g.source["loop"], g.source["source_pct"]
         tail = f"it starts at {loop} ({pct:.0f} %)"
     else:
-        tail = f"it starts at one of {_candidates(g)}, or outside what is recorded ({g.unseen_pct:.0f} %)"
+        tail = f"it starts at one of {_candidates(g)}, or outside the recorded loops ({g.unseen_pct:.0f} %)"
     return f"{head}; {tail}; without it the others' average errors fall by {number(g.gain_pct)} % of span together"
 
 

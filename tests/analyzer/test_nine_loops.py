@@ -218,7 +218,7 @@ def test_a_healthy_loop_is_left_alone(walked: Walked) -> None:
     assert (row["cause"], row["valve_fault"], row["action"]) == ("none", "none", "none")
     assert HEALTHY not in walked.summary
     assert "Worn valve" not in page
-    assert "Chance of a worn valve" in page
+    assert "Probability of a worn valve" in page
 
 
 def test_one_width_on_a_page(walked: Walked) -> None:
