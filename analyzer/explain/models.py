@@ -68,7 +68,7 @@ def checked(data: Mapping[str, Any], path: Path) -> None:
         if name in scale and not scale[name] > 0:
             raise refused(f"{name} is {scale[name]:g}", "a span above 0")
     if not held.get("CLIP_LO", -most) < held.get("CLIP_HI", most) or held.get("RATE", 1.0) <= 0:
-        raise refused("limits that nothing fits between", "CLIP_LO below CLIP_HI, RATE above 0")
+        raise refused("limits without a range between them", "CLIP_LO below CLIP_HI, RATE above 0")
     if data.get("version", VERSION) != VERSION:
         seen = f"a model of version {str(data['version'])[:20]}"
         raise refused(seen, f"version {VERSION}", "save it again with this triage")
@@ -142,7 +142,7 @@ def wrong_units(own: Floats, found: Mapping[str, float]) -> str:
         if within(own[Slot.T] / lag_s, ends):
             size = f"{own[Slot.T]:.3g} s against {lag_s:.3g} s"
             said.append(
-                f"its time constant, {size} found, looks like {unit} taken for seconds or the reverse"
+                f"its time constant, {size} found, looks like {unit} instead of seconds or the reverse"
             )
     return "; ".join(said)
 

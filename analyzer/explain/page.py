@@ -23,10 +23,10 @@ def explanation_page(e: Explained, zone: str = UTC_NAME) -> Page:
             _section("What it is", *_verdict_blocks(e)),
             _section("Recording and simulation", *drawings.drawn_trends(e)),
             _section("What was found", drawings.found_plot(e), words.parameters(data), words.moved(data)),
-            _section("Where the misfit lives", *_where_blocks(data), drawings.misfit_panels(e)),
+            _section("Where the misfit is", *_where_blocks(data), drawings.misfit_panels(e)),
             _section("How well it fits", words.misfits(data, _fit_note(e)), words.others(data)),
             _section("What it could also be", words.alternatives(data)),
-            _section("All that was tried", words.tried(e.found.first, e.found.accepted), closed=named),
+            _section("All candidates", words.tried(e.found.first, e.found.accepted), closed=named),
             _section("Does the controller do what is stated?", *_controller_blocks(e), closed=True),
         )
     spec = e.case.spec

@@ -281,7 +281,7 @@ def test_clock_running_backwards(tmp_path, order):
     told(asked("run", tmp_path / "export.csv"), 0)
     said = told(asked("check", tmp_path / "export.csv"), 0)
     expected = {
-        "newest first": "newest first and are turned round",
+        "newest first": "newest first and are reversed",
         "shuffled": "samples were out of order",
         "an hour twice": "samples repeat a stamp",
     }

@@ -79,7 +79,7 @@ def test_check_and_tune_tell_the_experiment(bump):
     arguments = bump / "bump.csv", "--loops", bump / "loops.csv"
     checked = said("check", *arguments)
     assert "experiment 2026-05-04 08:00 to" in checked
-    assert "fit for a model from its experiments alone" in checked
+    assert "fit only for a model from its experiments" in checked
     tuned = said("tune", *arguments, "--loop", "T1")
     assert "SIMC with tau_c = dead time: kp" in tuned
     assert "not identified by the experiment: the process outside OP 38 to 45 %" in tuned

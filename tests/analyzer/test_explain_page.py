@@ -35,7 +35,7 @@ def test_each_kind_of_answer_has_a_whole_page(kind: str) -> None:
     page = pages.explanation_page(e)
     titles = [s.title for s in page.sections]
     assert titles[:2] == ["What it is", "Recording and simulation"]
-    assert {"Where the misfit lives", "How well it fits"} <= set(titles)
+    assert {"Where the misfit is", "How well it fits"} <= set(titles)
     assert any(isinstance(b, Trend) for b in blocks(page))
     assert any(isinstance(b, Panels) for b in blocks(page))
     text = render(page, True)
