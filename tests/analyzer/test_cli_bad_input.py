@@ -110,7 +110,7 @@ def test_a_column_that_stands_twice(tmp_path, command):
     """Two columns of one name are told by name."""
     text = frame().to_csv(index=False).replace("FIC1.OP", "FIC1.PV", 1)
     (tmp_path / "export.csv").write_text(text)
-    assert "column 'FIC1.PV' stands twice" in one_line(asked(command, tmp_path / "export.csv"))
+    assert "column 'FIC1.PV' occurs twice" in one_line(asked(command, tmp_path / "export.csv"))
 
 
 @pytest.mark.parametrize("command", COMMANDS)

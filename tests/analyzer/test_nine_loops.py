@@ -208,7 +208,7 @@ def test_op_at_its_limit_is_an_action(walked: Walked) -> None:
     row = walked.rows[LIMITED]
     assert (row["cause"], row["action"]) == ("none", "check limit")
     assert f"Find out why OP of {LIMITED} is at its limit" in flat(walked.summary)
-    assert "rests at its limit" in walked.do(LIMITED)
+    assert "OP is at its limit" in walked.do(LIMITED)
     assert "undecided" not in walked.page(LIMITED) + "\n".join(walked.tuned[LIMITED]["text"])
 
 

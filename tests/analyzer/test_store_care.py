@@ -183,7 +183,7 @@ def test_what_is_left_over_is_found_and_pruned(store: Store) -> None:
     for path in (old, young):
         path.write_bytes(b"x")
     os.utime(old, (time.time() - 2 * 86_400,) * 2)
-    assert sum("left over" in p.seen for p in problems(store)) == 2
+    assert sum("remains of a process" in p.seen for p in problems(store)) == 2
     assert asked("store", "prune", store.path, "--keep", "400d").exit_code == 0
     assert (old.exists(), young.exists()) == (False, True)
 
