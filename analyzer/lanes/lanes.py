@@ -74,7 +74,7 @@ def _lasting(found: Finding) -> str:
     text = f"PV stays {found.number('lasting_error_pct'):.3g} % of span {_side(found)} SP"
     if _offset(found):
         return f"{text}, as expected without integral action"
-    odd = "though the loop is in automatic and OP off its limits; do tags and ranges belong together?"
+    odd = "although the loop is in automatic and OP off its limits; check tags and ranges"
     return text if Lane.AT_LIMIT in found.lanes else f"{text} {odd}"
 
 

@@ -62,7 +62,7 @@ def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
     if ratio is None:
         return f"{text}."
     so = "; the cost is that" if ratio > PAGES.worse else ", and"
-    return f"{text}{so} the error that a lasting load leaves sums up to {number(ratio)} times as much."
+    return f"{text}{so} the integrated error after a lasting load is {number(ratio)} times as large."
 
 
 def choices(c: Comparison, spec: LoopSpec) -> list[str]:
@@ -103,9 +103,7 @@ def _priced(c: Comparison, name: str) -> str:
     """Gains and losses of settings, on the worst of all loops consistent with the data, and on a load step."""
     found = c.everywhere[name]
     travel, error = map(_against_now_pct, (found.worst_travel, found.worst_error))
-    return (
-        f"stem travel {travel}, error {error} at worst, a load step goes {number(c.peaks[name])} times as far"
-    )
+    return f"stem travel {travel}, error {error} at worst, a load step peaks {number(c.peaks[name])} times as high"
 
 
 def _against_now_pct(ratio: float) -> str:
@@ -191,12 +189,10 @@ def price(c: Comparison, unit: str) -> parts.Plot | None:
     error, travel = np.array(found, float).reshape(-1, 2).T
     at = np.array([(p.x, p.y) for p in places], float).reshape(-1, 2)
     lines = (
-        parts.Line(
-            "none of the robust ones beats these", scale * now.error * error, now.stem_travel * travel
-        ),
+        parts.Line("no robust settings are better", scale * now.error * error, now.stem_travel * travel),
         parts.Line("compared", at[:, 0], at[:, 1], joined=False),
     )
-    title = "What each costs: the lower and the further left, the better"
+    title = "Error and stem travel of each: lower left is better"
     axes = f"average absolute error [{unit}]", "stem travel [%/h]"
     return parts.Plot("price", title, *axes, lines, reach=(0.0,), places=places)
 

@@ -218,7 +218,7 @@ def graph(g: GroupView) -> parts.Graph:
     left = len(g.rows) - len(shown)
     caption = "From left to right as coherence falls; lags are behind the likeliest source."
     caption += f" {left} more not drawn." if left else ""
-    return parts.Graph("way", "Where it starts and whom it moves", nodes, arrows, caption)
+    return parts.Graph("way", "Source and followers", nodes, arrows, caption)
 
 
 def heat_map(g: GroupView) -> parts.HeatMap | None:

@@ -89,7 +89,7 @@ def _advice(now: Belief, row: Row) -> str | None:
             f"{number(min(x))} to {number(max(x))}" for x in ([p.kp for p in pairs], [p.ti for p in pairs])
         )
         unit, held = row["ti_unit"] or "s", t.pair.night
-        spread = f"{len(pairs)} nights advise Kp {kp} and Ti {ti} {unit}; that of {held} is held."
+        spread = f"{len(pairs)} nights advise Kp {kp} and Ti {ti} {unit}; that of {held} is kept."
     return " ".join(filter(None, (t.pair.advice, spread)))
 
 

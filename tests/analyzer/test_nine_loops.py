@@ -227,7 +227,7 @@ def test_one_width_on_a_page(walked: Walked) -> None:
     row, page = walked.rows[WORN], walked.page(WORN)
     assert (row["cause"], row["valve_fault"]) == ("valve", "backlash")
     assert "stick-slip" not in "\n".join(walked.tuned[WORN]["text"]) + page
-    told = re.findall(r"(?:backlash|play of|all nights: ?)\D{0,3}([\d.]+) %", page)
+    told = re.findall(r"(?:backlash of|backlash|all nights: ?)\D{0,3}([\d.]+) %", page)
     widths = [float(x) for x in told]
     assert len(widths) >= 2
     assert max(widths) <= 1.03 * min(widths)
