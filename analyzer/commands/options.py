@@ -72,7 +72,7 @@ def what_went_wrong(error: Exception) -> str | None:
         )
     if isinstance(error, OSError):
         remedy = (
-            "free space and give the same command again" if is_full(error) else "check path and permissions"
+            "make room and give the same command again" if is_full(error) else "check path and permissions"
         )
         return f"{one_line(what_failed(error))}; {remedy}"
     if refused(error):
