@@ -1,13 +1,15 @@
-"""Plain English in the project's pages: python .ci/prose.py [FOLDER]
+"""Plain English in the project's pages and in the texts that the program prints: python .ci/prose.py [FOLDER]
 
-Prints one line for each banned phrase, each long sentence and a README that is too long, and exits with 1 if there
-is one. Code blocks, inline code, links' addresses and figures are not read.
+Prints one line for each banned phrase, each long sentence of a page and a README that is too long, and exits with 1
+if there is one. Code blocks, inline code, links' addresses and figures are not read; of TOML files the values are.
 """
 
 import re
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 PAGES = (
     "README.md",
@@ -19,6 +21,17 @@ PAGES = (
 )
 GENERATED = {"columns.md"}
 """docs/columns.py writes it from analyzer/columns.toml."""
+
+TEXTS = (
+    "analyzer/columns.toml",
+    "analyzer/pages/*.toml",
+    "analyzer/words/*.toml",
+    "identification/mismatch/words.toml",
+    "tuning/reasons.toml",
+    "*/limits.toml",
+)
+IDENTIFIER = "key"
+"""The key of a TOML table whose value is not printed."""
 
 SENTENCE_WORDS = 25
 """ASD-STE100 (Simplified Technical English) allows 25 in descriptions; code in back quotes is one word."""
@@ -103,12 +116,18 @@ def blocks(text: str) -> Iterator[tuple[int, str]]:
             held += f"{line}\n"
 
 
+def banned(text: str) -> Iterator[tuple[int, str]]:
+    """Position and report of each banned phrase of a text."""
+    for pattern, instead in BANNED.items():
+        for found in re.finditer(rf"\b(?:{pattern})\b", text, re.IGNORECASE):
+            yield found.start(), f"'{found.group()}'; write: {instead}"
+
+
 def findings(text: str) -> Iterator[tuple[int, str]]:
     """Line and report of each banned phrase and of each long sentence of a page."""
     for start, block in blocks(text):
-        for pattern, instead in BANNED.items():
-            for found in re.finditer(rf"\b(?:{pattern})\b", block.replace("\n", " "), re.IGNORECASE):
-                yield start + block.count("\n", 0, found.start()), f"'{found.group()}'; write: {instead}"
+        for position, what in banned(block.replace("\n", " ")):
+            yield start + block.count("\n", 0, position), what
         at = 0
         for end in (*(m.end() for m in SENTENCE_END.finditer(block)), len(block)):
             words = [word for word in block[at:end].split() if re.search(r"\w", word)]
@@ -118,8 +137,26 @@ def findings(text: str) -> Iterator[tuple[int, str]]:
             at = end
 
 
+def values(part: Any, name: str = "") -> Iterator[tuple[str, str]]:
+    """Dotted name and text of each string in the values of a TOML file."""
+    if isinstance(part, str):
+        yield name, " ".join(part.split())
+    elif isinstance(part, dict | list):
+        for key, value in part.items() if isinstance(part, dict) else enumerate(part):
+            if key != IDENTIFIER:
+                yield from values(value, f"{name}.{key}".strip("."))
+
+
+def printed(root: Path) -> Iterator[str]:
+    """A line for each banned phrase in the texts that the program prints."""
+    for pattern in TEXTS:
+        for file in sorted(root.glob(pattern)):
+            for name, text in values(tomllib.loads(file.read_text(encoding="utf-8"))):
+                yield from (f"{file.relative_to(root)}: {name}: {what}" for _, what in banned(text))
+
+
 def main(root: Path) -> int:
-    """Print the findings of all pages; 1 if there are any."""
+    """Print the findings of all pages and texts; 1 if there are any."""
     lines = [
         f"{page.relative_to(root)}:{line}: {what}"
         for page, text in pages(root)
@@ -128,6 +165,7 @@ def main(root: Path) -> int:
     words = len((root / "README.md").read_text(encoding="utf-8").split())
     if words > README_WORDS:
         lines.append(f"README.md:1: {words} words; at most {README_WORDS}")
+    lines.extend(printed(root))
     print("".join(f"{line}\n" for line in lines), end="")
     return int(bool(lines))
 

@@ -66,16 +66,16 @@ def check(asked: Asked) -> None:
 @click.option("--top", type=click.IntRange(1), help="Number of loops shown.")
 @options.NIGHT
 @click.option("--ascending", is_flag=True, help="Smallest first.")
-@click.option("--area", help="Loops of this area alone.")
+@click.option("--area", help="Only loops of this area.")
 @click.option(
     "--lane",
     type=click.Choice([lane.replace(" ", "-") for lane in Lane]),
     callback=lambda _ctx, _param, value: None if value is None else Lane(value.replace("-", " ")),
-    help="Loops of this lane alone, by its figure.",
+    help="Only loops of this lane, by its figure.",
 )
 @click.option("--groups", is_flag=True, help="Loops that share an oscillation, and where each starts.")
-@click.option("--all", "everything", is_flag=True, help="Loops that notes hide from the table, too.")
-@click.option("--wide", is_flag=True, help="All columns of the table, however narrow the terminal.")
+@click.option("--all", "everything", is_flag=True, help="Also loops that notes hide from the table.")
+@click.option("--wide", is_flag=True, help="All columns of the table, also in a narrow terminal.")
 @options.formats("table", "csv", "json", "markdown", text="Output format.")
 def rank(
     store: Path, top: int | None, groups: bool, everything: bool, wide: bool, form: str, **by: Any
@@ -105,7 +105,7 @@ def rank(
 @options.of_loop("The loop to tune.")
 @options.DECIDED
 @options.formats("text", "json")
-@click.option("--out", type=options.FOLDER, help="Directory for pictures, and a page to try settings on.")
+@click.option("--out", type=options.FOLDER, help="Directory for pictures, and a page to simulate settings.")
 def tune(asked: Asked, tag: str, store: Path | None, form: str, out: Path | None) -> None:
     """One loop: the night's decision, model, predicted limit cycle, new Kp and Ti, forecast, travel map.
 

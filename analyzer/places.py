@@ -208,7 +208,7 @@ def answering(url: Path) -> Iterator[None]:
             raise
         why = " ".join(str(error).split())[:200] or type(error).__name__
         if is_outage(error):
-            raise OutageError(f"{url}: {why}", "a storage that answers", "try again later") from error
+            raise OutageError(f"{url}: {why}", "a storage that responds", "try again later") from error
         wanted = "an object, a bucket and credentials that the storage knows"
         raise InputError(f"{url}: {why}", wanted, "check URL, endpoint and credentials") from error
 

@@ -9,19 +9,19 @@ HEAD = """# Columns of the results
 Every column is declared once, in `analyzer/columns.toml`; rows, the store's types, lists and pages come from
 there, and so does this page (`python docs/columns.py > docs/columns.md`).
 
-Numbers are 64-bit floats; an empty cell is what is not known. Percent of span is of PV's range, percent of OP of
-OP's. Columns marked h stand in the table of hours too.
+Numbers are 64-bit floats; an empty cell is an unknown value. Percent of span is of PV's range, percent of OP of
+OP's. Columns marked h are also in the table of hours.
 """
 PARTS = {
     "ranking": "The ranking: `triage rank`, names and order a contract",
     "listed": "Further columns of `triage rank --format csv` and `json`",
     "noted": "Notes, last in `triage rank --format csv` and `json`",
     "stored": "Further columns of the store: `nights/*.parquet`, a row a loop",
-    "hour": "Of the hours alone: `hours/*.parquet`, a row a loop and hour",
+    "hour": "Only for hours: `hours/*.parquet`, a row a loop and hour",
     "group": "Groups that share an oscillation: `groups/*.parquet`, a row a loop and group",
     "group_list": "Groups as listed: `triage rank --groups --format csv` and `json`, a row a group",
-    "compared": "Settings compared: `compared/*.parquet`, a row a loop for which they were sought, newest night",
-    "believed": "Beliefs: `beliefs/*.parquet`, a row a loop and night, beside what of the ranking rests on nights",
+    "compared": "Settings compared: `compared/*.parquet`, a row a loop with a comparison, newest night",
+    "believed": "Beliefs: `beliefs/*.parquet`, a row a loop and night, with the ranking by all nights",
     "explanation": "Explanations: `explained/*.parquet`, a row a loop that was explained",
 }
 TITLES = ("column", "holds", "title", "unit", "from", "h", "meaning")

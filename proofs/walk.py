@@ -83,9 +83,9 @@ def of_explain(asked: tuple[str, ...], row: dict[str, Any], store: str) -> Itera
         yield f"explain: {', '.join(sorted(named))} where the night has valve_fault {row['valve_fault']}"
     if found["moved"]:
         plain, better = held_out(found)
-        claimed = "improved loop" in "\n".join(answer_lines(found))
+        claimed = "improved model" in "\n".join(answer_lines(found))
         if claimed and better >= plain:
-            yield f"explain: an improved loop whose held-out error rises from {plain:.4g} to {better:.4g}"
+            yield f"explain: an improved model whose held-out error rises from {plain:.4g} to {better:.4g}"
 
 
 def of_page(page: Page, row: dict[str, Any]) -> Iterator[str]:

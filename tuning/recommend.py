@@ -377,7 +377,9 @@ def fault_told(loop: Loop) -> str:
     """Text for a valve fault with its size."""
     width = band(loop.valve)
     return (
-        f"play of {width:.2g} %" if is_play(loop.valve) else f"stick-slip with a stickband of {width:.2g} %"
+        f"backlash of {width:.2g} %"
+        if is_play(loop.valve)
+        else f"stick-slip with a stickband of {width:.2g} %"
     )
 
 
@@ -415,5 +417,5 @@ def _why_calmer(best: Candidate, before: Confirmed, after: Confirmed, ms_before:
 def _nothing_better(loop: Loop, before: Confirmed, considered: bool) -> str:
     """Reason for no settings for a loop with a faulty valve."""
     known = {"fault": fault_told(loop), "cycle": swings(before.cycle)}
-    kind = "play" if isinstance(loop.valve, Backlash) else "stick-slip"
+    kind = "backlash" if isinstance(loop.valve, Backlash) else "stick-slip"
     return WHY["none_worth_it" if considered else "none_kept"].format(kind=kind, **known)

@@ -97,9 +97,9 @@ def unfounded(store: Store, config: Config) -> list[Problem]:
                     wrong.add(name)
     except (InputError, NotNowError):
         return []
-    remedy = "'triage store beliefs' makes them anew"
+    remedy = "'triage store beliefs' computes them again"
     paths = [store.file("beliefs", night) for night in sorted(wrong)]
-    return [Problem(f"{path}: not what the nights say", remedy) for path in paths]
+    return [Problem(f"{path}: inconsistent with the nights", remedy) for path in paths]
 
 
 def _write_all(store: Store, names: Sequence[str], before: str | None, config: Config) -> list[str]:

@@ -35,13 +35,13 @@ if TYPE_CHECKING:
 @click.command()
 @export_options
 @of_loop("Loop to explain.")
-@click.option("--model", type=FILE, help="Your own saved model: judged beside the refitted one.")
+@click.option("--model", type=FILE, help="Your own saved model, compared with the refitted one.")
 @DECIDED
 @click.option(
     "--held-out",
     multiple=True,
     type=PLACE,
-    help="Another recording of the loop, on which the explanation is proven; may be given again.",
+    help="Another recording of the loop that tests the explanation; may be repeated.",
 )
 @click.option("--save-model", type=FILE, help="Write the model found, for `simulate`.")
 @formats("text", "json", "html", "markdown", text="Output format; html is one file that needs no network.")

@@ -71,7 +71,9 @@ def what_went_wrong(error: Exception) -> str | None:
             f"{one_line(str(error))}; check URL, endpoint and credentials of the storage, or try again later"
         )
     if isinstance(error, OSError):
-        remedy = "make room and say it again" if is_full(error) else "check path and permissions"
+        remedy = (
+            "make room and give the same command again" if is_full(error) else "check path and permissions"
+        )
         return f"{one_line(what_failed(error))}; {remedy}"
     if refused(error):
         said = one_line(f"{type(error).__name__}: {error}")
@@ -127,7 +129,7 @@ class Folder(click.ParamType):
         if path.is_file():
             raise InputError(f"--out {path}: a file", "a folder, or none yet", "give a folder")
         if (path / "store.json").exists() or (path / "nights").is_dir():
-            raise InputError(f"--out {path}: a store", "a folder for pages alone", "give another folder")
+            raise InputError(f"--out {path}: a store", "a folder only for pages", "give another folder")
         return path
 
 
@@ -149,7 +151,7 @@ def opened_store(path: Path) -> Store:
 
 
 DECIDED = click.option(
-    "--store", type=PLACE, help="Store whose nights decide; default: the last night of the export alone."
+    "--store", type=PLACE, help="Store whose nights decide; default: only the last night of the export."
 )
 
 
@@ -174,7 +176,7 @@ TIMES = ("%Y-%m-%d", *(f"%Y-%m-%d{between}%H:%M{end}" for between in "T " for en
 
 def finding(command: Command) -> Command:
     """--find-loops, for commands that take their loops from the export without a loops.csv."""
-    said = "Without --loops: look for loops in the data too, where the tags' names tell none."
+    said = "Without --loops: look for loops in the data too, where the tags' names show none."
     return click.option("--find-loops", "finding", is_flag=True, help=said)(command)
 
 
@@ -254,7 +256,7 @@ def age_told(night: str, zone: str) -> str:
     days = (date.fromisoformat(date_of(time.time(), zone)) - date.fromisoformat(night)).days
     if days <= PAGES.old_d:
         return ""
-    return f"Night {night} is {days} days old: look whether the newest export was read."
+    return f"Night {night} is {days} days old: check that the newest export was read."
 
 
 Report = Callable[[int, int], None]
@@ -337,7 +339,7 @@ def trying() -> Iterator[Callable[[str], None]]:
     watched, begun = sys.stderr.isatty(), time.monotonic()
     said_s = begun
     if not watched:
-        click.echo("explain: reading the export, fitting the plain loop", err=True)
+        click.echo("explain: reading the export, fitting the baseline model", err=True)
 
     def tell(name: str) -> None:
         nonlocal said_s

@@ -158,7 +158,7 @@ def _changes(
     type=click.IntRange(0),
     help="Loops with a page, the worst first.",
 )
-@click.option("--loop", "tag", help="The pages of this loop alone; those that stand there stay.")
+@click.option("--loop", "tag", help="Only the pages of this loop; existing pages stay.")
 @into_folder("Style and scripts in each page itself.")
 def pages(
     store: Path, night: str | None, top: int, tag: str | None, form: str, single_file: bool, out: Path

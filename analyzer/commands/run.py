@@ -130,15 +130,15 @@ def stoppable() -> Iterator[None]:
 )
 @click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
 @click.option(
-    "--scheduler", help="Dask scheduler, tcp://HOST:PORT, whose workers do the loops instead of --jobs."
+    "--scheduler", help="Dask scheduler, tcp://HOST:PORT, whose workers compute the loops instead of --jobs."
 )
-@click.option("--resume", is_flag=True, help="Go on with a run that was stopped.")
-@click.option("--replace", "replacing", is_flag=True, help="Forget what the store has of these nights first.")
+@click.option("--resume", is_flag=True, help="Continue a run that was stopped.")
+@click.option("--replace", "replacing", is_flag=True, help="First delete these nights from the store.")
 @click.option(
     "--log",
     "log_file",
     type=click.Path(dir_okay=False, path_type=Path),
-    help="File to which a line is appended for each thing that happened.",
+    help="File to which each event is appended as a line.",
 )
 @click.option("--explain", "explaining", is_flag=True, help="Explain the last night's flagged loops as well.")
 def run(asked: Asked, store: Path, log_file: Path | None, explaining: bool, **how: Any) -> None:
@@ -193,7 +193,7 @@ def _for_all_workers(asked: Asked, store: Path, scheduler: str | None) -> Asked:
     if scheduler is None:
         return asked
     if not is_remote(store) and not store.is_absolute():
-        seen = f"--store {store} with --scheduler: each worker would write a store of its own"
+        seen = f"--store {store} with --scheduler: each worker would write its own store"
         raise InputError(
             seen, "an absolute path, or a URL, that all machines share", f"say {store.resolve()}"
         )
@@ -208,7 +208,7 @@ def _may_answer_again(error: Exception, places: Sequence[Path]) -> bool:
 
 
 def _go_on(store: Path) -> str:
-    return f"what is done is kept in {store}: go on with the same command and --resume"
+    return f"finished work is kept in {store}: continue with the same command and --resume"
 
 
 def _run_night(

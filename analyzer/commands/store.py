@@ -74,7 +74,7 @@ def check_store(path: Path, config: Path | None) -> None:
 @click.argument("path", metavar="STORE", type=PLACE)
 @click.option("--keep", required=True, help="How long nights are kept, before the latest: 400d, 60w, 2y.")
 @click.option("--keep-trends", help="How long trends and hours are kept. Default: as long as nights.")
-@click.option("--dry-run", is_flag=True, help="Only say what would be deleted.")
+@click.option("--dry-run", is_flag=True, help="Only report what would be deleted.")
 def prune(path: Path, keep: str, keep_trends: str | None, dry_run: bool) -> None:
     """Delete nights older than some time before the latest, and files of terminated processes. Notes are kept.
 
@@ -114,7 +114,7 @@ def beliefs(path: Path, config: Path | None) -> None:
         lost = settle_anew(kept, read_config(config))
     for line in lost:
         click.echo(line)
-    click.echo(f"{path}: beliefs of {len(kept.nights())} nights made anew")
+    click.echo(f"{path}: beliefs of {len(kept.nights())} nights computed again")
     sys.exit(SOME_LOST if lost else 0)
 
 
@@ -122,15 +122,15 @@ def beliefs(path: Path, config: Path | None) -> None:
 @STORE
 @click.argument("loop")
 @click.argument("text", required=False)
-@click.option("--owner", help="Who looks after it. Default: the user of this computer.")
+@click.option("--owner", help="Who is responsible. Default: the user of this computer.")
 @click.option(
     "--hide-until",
     type=click.DateTime(("%Y-%m-%d",)),
     metavar="DATE",
     help="Leave the loop out of lists until this night.",
 )
-@click.option("--state", type=click.Choice(STATES), help="How far the work has come.")
-@click.option("--due", type=click.DateTime(("%Y-%m-%d",)), metavar="DATE", help="When it is to be done.")
+@click.option("--state", type=click.Choice(STATES), help="State of the work.")
+@click.option("--due", type=click.DateTime(("%Y-%m-%d",)), metavar="DATE", help="Due date of the work.")
 def note(
     store: Path,
     loop: str,

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 @click.command(name="test-plan")
 @export_options
 @of_loop("The loop to test.")
-@click.option("--store", type=PLACE, help="Store whose nights tell what is known of the loop.")
+@click.option("--store", type=PLACE, help="Store whose nights describe the loop.")
 def test_plan(asked: Asked, tag: str, store: Path | None) -> None:
     """The step test for the unknown parameters of a loop: size, levels, times, and expected precision.
 

@@ -262,7 +262,7 @@ def reasons_of_load(
         found.append(f"different load: {b / a:.2g} times as large after")
     a, b = (sum(n.from_outside for n in side) / len(side) for side in sides)
     if abs(b - a) > limits.outside_share:
-        found.append(f"a cycle from outside in {100 * a:.0f} % of nights before, {100 * b:.0f} % after")
+        found.append(f"an external oscillation in {100 * a:.0f} % of nights before, {100 * b:.0f} % after")
     return found
 
 

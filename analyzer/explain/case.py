@@ -188,7 +188,7 @@ def case(
     if not prepared.op_known:
         raise NotAssessedError(f"{spec.loop}: needs OP, has none")
     if float(np.ptp(r.op)) == 0 or float(np.ptp(r.pv)) == 0:
-        raise NotAssessedError(f"{spec.loop}: needs OP and PV that move, one of them stands still")
+        raise NotAssessedError(f"{spec.loop}: needs OP and PV that move, one of them is constant")
     lacks = pv_that_jumps(r, config.explain.recorder) or at_limits(r, config.quality)
     if lacks is not None:
         raise NotAssessedError(f"{spec.loop}: {lacks}")

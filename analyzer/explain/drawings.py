@@ -96,7 +96,7 @@ def trend(
     spans = tuple((r.start_s + a, r.start_s + b) for a, b in e.said.where.get("spans", []))
     whole = sum(b - a for a, b in spans) > NEARLY_ALL * usable.size * r.dt_s
     time = r.start_s + (part.start + edges) * r.dt_s
-    panels = ("PV [% of span]", "left over [%]", "OP [%]")
+    panels = ("PV [% of span]", "residual [%]", "OP [%]")
     name, title, said = words
     return Trend(name, title, time, gap, tuple(bands), panels, (), said, () if whole else spans)
 
@@ -162,7 +162,7 @@ def note_of(f: Feature | None) -> str:
     """Whether the misfit depends on a feature, as a note below its plot; empty if it was not tested."""
     if f is None:
         return ""
-    return f"Carries the misfit (chance {max(f.p, 0.01):.2g})." if f.carries else "Does not carry the misfit."
+    return f"Significant (p-value {max(f.p, 0.01):.2g})." if f.carries else "Not significant."
 
 
 def spectrum_plot(e: Explained) -> Plot:
@@ -170,7 +170,7 @@ def spectrum_plot(e: Explained) -> Plot:
     pv, dt_s = recorded_pv(e), e.case.subject.dt_s
     left = {k: pv - x for k, x in simulations(e).items() if k != "brought"}
     lines = tuple(Line(SHORT[k], *spectrum(x, dt_s), kind=k) for k, x in left.items())
-    words = "misfit-spectrum", "Spectrum of what is left", "period [s]", "% PV per octave"
+    words = "misfit-spectrum", "Spectrum of the residual", "period [s]", "% PV per octave"
     return Plot(*words, lines, (), NOTES["spectrum"], (), "x")
 
 

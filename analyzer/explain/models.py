@@ -26,7 +26,7 @@ HUNDRED = (60.0, 160.0)
 """Ratios of two gains that indicate percent against fractions; ours: a refit moves a gain by less."""
 TIMES = (((40.0, 90.0), "minutes"), ((2400.0, 5400.0), "hours"))
 """Ratios of two time constants that indicate minutes, or hours, against seconds."""
-SAVED, ANEW = "a model saved by `triage explain`", "save it anew"
+SAVED, ANEW = "a model saved by `triage explain`", "save it again"
 RUNS = "a model that can be run on this recording"
 SCALE = ("pv_low", "pv_span", "op_low", "op_span")
 
@@ -54,7 +54,7 @@ def read_model(path: Path, loop: str) -> dict[str, Any]:
 def checked(data: Mapping[str, Any], path: Path) -> None:
     """Raise InputError if a number of a model is invalid."""
 
-    def refused(seen: str, expected: str, todo: str = "save the model anew") -> InputError:
+    def refused(seen: str, expected: str, todo: str = "save the model again") -> InputError:
         return InputError(f"{path}: {seen}", expected, todo)
 
     held, scale = (data[k] if isinstance(data.get(k), dict) else {} for k in ("constants", "scale"))
@@ -62,16 +62,16 @@ def checked(data: Mapping[str, Any], path: Path) -> None:
     for name, value in {**held, **placed, **scale}.items():
         number = not isinstance(value, bool) and isinstance(value, int | float)
         if not number or not abs(value) <= most:  # false of NaN
-            wanted, todo = f"a number of at most {most:g} in size", "correct it or save the model anew"
+            wanted, todo = f"a number of at most {most:g} in size", "correct it or save the model again"
             raise refused(f"{name} is {str(value)[:40]}", wanted, todo)
     for name in ("pv_span", "op_span"):
         if name in scale and not scale[name] > 0:
             raise refused(f"{name} is {scale[name]:g}", "a span above 0")
     if not held.get("CLIP_LO", -most) < held.get("CLIP_HI", most) or held.get("RATE", 1.0) <= 0:
-        raise refused("limits that nothing fits between", "CLIP_LO below CLIP_HI, RATE above 0")
+        raise refused("limits without a range between them", "CLIP_LO below CLIP_HI, RATE above 0")
     if data.get("version", VERSION) != VERSION:
         seen = f"a model of version {str(data['version'])[:20]}"
-        raise refused(seen, f"version {VERSION}", "save it anew with this triage")
+        raise refused(seen, f"version {VERSION}", "save it again with this triage")
     constants(dict(data))
 
 
@@ -102,9 +102,9 @@ def judged(data: Mapping[str, Any], found: Explanation, s: Recording, more: str 
     cut = int((1.0 - s.limits.proof.held_out) * s.pv.size)
     window, (plain, better) = found.proven.window, found.proven.overall
     own = misfit(s.pv, out, window).rmse
-    said = f"Your model leaves {own:.3g} % of span rms, the plain loop fitted anew {plain.rmse:.3g} %"
+    said = f"Your model leaves {own:.3g} % of span rms, the baseline model fitted again {plain.rmse:.3g} %"
     if found.accepted:
-        said += f", the improved loop {better.rmse:.3g} %"
+        said += f", the improved model {better.rmse:.3g} %"
     units = "" if unanswered(found) else wrong_units(constants(dict(data)), restored(found.plain.model.c))
     verdict = "" if units else against_plain(own, plain.rmse, s.limits.proof.as_good)
     note = "; ".join(x for x in (said, verdict, units, more) if x) + "."
@@ -115,9 +115,9 @@ def judged(data: Mapping[str, Any], found: Explanation, s: Recording, more: str 
 def against_plain(own: float, plain: float, as_good: float) -> str:
     """Comparison of a model with the refitted baseline model, from both misfits."""
     if own > as_good * plain:
-        return "it does worse than the plain loop can"
+        return "it is worse than the baseline model"
     better = own * as_good < plain
-    return "it does better than the plain loop can" if better else "it does as well as the plain loop"
+    return "it is better than the baseline model" if better else "it is as good as the baseline model"
 
 
 def within(ratio: float, ends: tuple[float, float]) -> bool:
@@ -142,7 +142,7 @@ def wrong_units(own: Floats, found: Mapping[str, float]) -> str:
         if within(own[Slot.T] / lag_s, ends):
             size = f"{own[Slot.T]:.3g} s against {lag_s:.3g} s"
             said.append(
-                f"its time constant, {size} found, looks like {unit} taken for seconds or the reverse"
+                f"its time constant, {size} found, looks like {unit} instead of seconds or the reverse"
             )
     return "; ".join(said)
 
@@ -195,10 +195,10 @@ def simulated(c: Case, data: dict[str, Any], stamps: Floats, closed: bool) -> tu
         else:
             pv = carried(data, op, pv, r.dt_s)
     except (ZeroDivisionError, OverflowError, FloatingPointError) as error:
-        raise InputError(f"{c.spec.loop}: {error}", RUNS, "save the model anew") from error
+        raise InputError(f"{c.spec.loop}: {error}", RUNS, "save the model again") from error
     most = EXPLAIN.runaway_pct
     if not (np.abs(pv).max() <= most and np.abs(op).max() <= most):  # false of NaN
-        raise InputError(f"{c.spec.loop}: PV or OP runs away", RUNS, "save the model anew")
+        raise InputError(f"{c.spec.loop}: PV or OP runs away", RUNS, "save the model again")
     at = r.start_s + r.time_s
     pv_at = np.interp(stamps, at, scale.low + pv * scale.span / 100.0)
     return pv_at, np.interp(stamps, at, scale.op_low + op * scale.op_span / 100.0)

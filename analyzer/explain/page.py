@@ -23,10 +23,10 @@ def explanation_page(e: Explained, zone: str = UTC_NAME) -> Page:
             _section("What it is", *_verdict_blocks(e)),
             _section("Recording and simulation", *drawings.drawn_trends(e)),
             _section("What was found", drawings.found_plot(e), words.parameters(data), words.moved(data)),
-            _section("Where the misfit lives", *_where_blocks(data), drawings.misfit_panels(e)),
+            _section("Where the misfit is", *_where_blocks(data), drawings.misfit_panels(e)),
             _section("How well it fits", words.misfits(data, _fit_note(e)), words.others(data)),
             _section("What it could also be", words.alternatives(data)),
-            _section("All that was tried", words.tried(e.found.first, e.found.accepted), closed=named),
+            _section("All candidates", words.tried(e.found.first, e.found.accepted), closed=named),
             _section("Does the controller do what is stated?", *_controller_blocks(e), closed=True),
         )
     spec = e.case.spec
@@ -51,7 +51,7 @@ def abstention(data: Data) -> Page:
     """The page of a loop whose recording cannot be explained at all."""
     text = Text((data["reason"][:1].upper() + data["reason"][1:] + ".",), "lead")
     name = f"{slug(data['loop'])}-explained"
-    return Page(name, f"{data['loop']}: not told", "", (Section("What is missing", (text,)),))
+    return Page(name, f"{data['loop']}: not explained", "", (Section("What is missing", (text,)),))
 
 
 def _recorded_line(e: Explained, zone: str) -> str:
@@ -63,7 +63,7 @@ def _recorded_line(e: Explained, zone: str) -> str:
 def _footer(e: Explained) -> str:
     s = e.case.prepared.scale
     unit = f" {e.case.spec.pv_unit}" if e.case.spec.pv_unit else ""
-    how = "of the recorded range, for none is stated, " if s.recorded else ""
+    how = "of the recorded range because none is stated, " if s.recorded else ""
     pv = f"{number_text(s.low)} to {number_text(s.low + s.span)}{unit}"
     op = f"{number_text(s.op_low)} to {number_text(s.op_low + s.op_span)}"
     return f"Percent of PV are {how}{pv}; percent of OP of {op}. Intervals are 90 %."
@@ -80,14 +80,14 @@ def _verdict_blocks(e: Explained) -> tuple[Block | None, ...]:
 
 def _tiles(e: Explained) -> list[tuple[str, str, str]]:
     d, (plain, _) = e.data, e.found.proven.overall
-    seat = "where to look first" if d["verdict"] == "unexplained" else "where it sits"
+    seat = "where to look first" if d["verdict"] == "unexplained" else "block of the effect"
     tiles = [(d["block"], seat, "")] if d["block"] != "none" else []
     if e.found.accepted and words.improves(d):
         both, where = " → ".join(map(rms, words.held_out(d))), "in its band, " if d["fit"]["in_band"] else ""
-        tiles.append((both, f"rms misfit on held-out data, {where}plain and improved", "better"))
+        tiles.append((both, f"rms misfit on held-out data, {where}baseline and improved", "better"))
     else:
         rest = ": load and noise" if d["verdict"] == "none" else ""
-        tiles.append((rms(plain.rmse), f"rms misfit of the plain simulation{rest}", ""))
+        tiles.append((rms(plain.rmse), f"rms misfit of the baseline model{rest}", ""))
     held = next((x["held_out_share"] for x in d["effects"] if x["held_out_share"] is not None), None)
     if held is not None and not words.no_better(d):
         tiles.append((share(held), "of the misfit on held-out data removed", "better"))

@@ -21,7 +21,7 @@ Rows = Sequence[Sequence[str]]
 def answer_lines(data: Mapping[str, Any]) -> list[str]:
     """The contract's answer as lines of text."""
     fit = data["fit"]
-    head = f"{data['loop']}: {title(data['verdict']) if fit else 'not told'}"
+    head = f"{data['loop']}: {title(data['verdict']) if fit else 'not explained'}"
     block = f" ({data['block']})" if data["block"] != "none" else ""
     night = data.get("night")
     out = [*wrap(decided(data), WIDTH), ""] if night else []
@@ -37,15 +37,15 @@ def answer_lines(data: Mapping[str, Any]) -> list[str]:
     simulations = _headed(("", "fitted", "fit %", "held out", "fit %"), _texts(words.misfits(data)))
     out += _part("Misfit, rms in % of span", [(*row, "") for row in simulations], (1, 2, 3, 4))
     others = [(name, plain, "→", *rest) for name, plain, *rest in _texts(words.others(data))]
-    held_out = _headed(("", "plain", "", "improved", "removed"), others)
+    held_out = _headed(("", "baseline", "", "improved", "removed"), others)
     out += _part("On the recordings held out", held_out, (1, 3, 4))
     brought = fit.get("brought", {}).get("note", "")
     for sentence in filter(None, (words.no_better(data), *remarks(fit), brought)):
         out += ["", *wrap(sentence, WIDTH)]
     out += _part("Where", _where_rows(data))
     moved = [(name, before, "→", after, unit) for name, before, after, _, unit in _texts(words.moved(data))]
-    out += _part("The plain loop's constants moved", moved, (1, 3))
-    return out + _part("Could also be, and what would tell", _texts(words.alternatives(data)))
+    out += _part("Changed constants of the baseline model", moved, (1, 3))
+    return out + _part("Alternatives, and the test that distinguishes them", _texts(words.alternatives(data)))
 
 
 def _part(name: str, rows: Rows, numeric: Sequence[int] = ()) -> list[str]:
@@ -94,6 +94,6 @@ def _where_rows(data: Mapping[str, Any]) -> Rows:
             (name if name.isupper() else name[:1].lower() + name[1:], at)
             for name, at in places(data["where"])
         ),
-        *((name, f"{how} (chance {p})") for name, p, carries, how in features if carries == "yes"),
-        *([("not tied to", rest)] if rest else []),
+        *((name, f"{how} (p-value {p})") for name, p, carries, how in features if carries == "yes"),
+        *([("not significant", rest)] if rest else []),
     ]

@@ -145,7 +145,9 @@ def moved(data: Data) -> Table:
     )
     most = max((abs(b / a - 1) if a else 0.0 for a, b in known.values()), default=0.0)
     note = NOTES["kept" if most < EXPLAIN.hardly else "bent"]
-    return Table("moved", "How the plain loop's constants moved", page_columns("constants_moved"), rows, note)
+    return Table(
+        "moved", "Changed constants of the baseline model", page_columns("constants_moved"), rows, note
+    )
 
 
 def misfits(data: Data, note: str = "") -> Table:
@@ -223,7 +225,7 @@ def tried(first: tuple[Candidate, ...], taken: tuple[Candidate, ...]) -> Table:
 def _standing(c: Candidate, taken: set[str]) -> str:
     if c.name in taken:
         return "taken"
-    return "does not pay" if c.penalised <= 0 else "less, or not proven"
+    return "gain below the penalty" if c.penalised <= 0 else "less gain, or not proven"
 
 
 def beside_night(row: Mapping[str, Any], verdict: str, block: str) -> str:

@@ -140,7 +140,7 @@ def found_told(rows: Sequence[Row]) -> tuple[str, ...]:
     other = [row.spec.loop for row in seen if not row.sure]
     few = ", ".join(other[:MOST_NAMES]) + (" ..." if len(other) > MOST_NAMES else "")
     left = (
-        f"{len(other)} loops are less sure and left out ({few}); 'triage loops' writes what speaks for them"
+        f"{len(other)} loops are less sure and left out ({few}); 'triage loops' writes the evidence for them"
     )
     return (*sure, left) if other else sure
 
@@ -186,8 +186,8 @@ def _row(held: Sampled, pair: FoundPair, outputs: dict[bytes, str], beside: dict
     says += f"{100 * pair.runner_up / max(pair.weight, 1e-9):.0f} % as like"
     says += "" if pair.sp is None else f"; {spec.sp} is where PV is held"
     says += f"; {spec.op} moves at once when {spec.sp} does" if pair.answers else ""
-    says += f"; {spec.position} stands where {spec.op} does" if spec.position else ""
-    says += f"; {spec.op} stands still in one value of {spec.mode} alone" if spec.mode else ""
+    says += f"; {spec.position} has the value of {spec.op}" if spec.position else ""
+    says += f"; {spec.op} is constant only in one value of {spec.mode}" if spec.mode else ""
     return Row(replace(spec, **_shown(held, pair)), "data", pair.sure_pct, says)
 
 

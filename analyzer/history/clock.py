@@ -46,8 +46,8 @@ class TimeScale:
         return said + another if self in SINCE_START.values() else said
 
 
-MISSING_HOUR = "samples stand in the hour that the time zone leaves out in spring and are left out"
-REPEATED_HOUR = "samples stand in the hour that the time zone repeats in autumn; told apart by their order"
+MISSING_HOUR = "samples are in the hour that the time zone skips in spring and are left out"
+REPEATED_HOUR = "samples are in the hour that the time zone repeats in autumn; distinguished by their order"
 SCALES = tuple(TimeScale(**scale) for scale in WORDS["scales"])
 SINCE_START = {unit: TimeScale(**scale) for unit, scale in WORDS["since_start"].items()}
 """Clocks that count from the start, by the unit in the column's name."""

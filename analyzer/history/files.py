@@ -264,11 +264,11 @@ def _check_size(path: Path, size: int, written: int, folder: Path) -> None:
     packed = path.stat().st_size
     if size > max(HISTORY.unpacked_times * packed, HISTORY.unpacked_bytes):
         seen = f"{path}: {packed} bytes that unpack to more than {size / 1e6:.0f} MB"
-        remedy = "unpack it where there is room, and name what comes out"
+        remedy = "unpack it where there is space, and name the result"
         raise InputError(seen, f"at most {HISTORY.unpacked_times:g} times as much", remedy)
     room = shutil.disk_usage(folder).free + written
     if size > HISTORY.unpacked_bytes and size > HISTORY.disk_share * room:
-        remedy = "unpack it elsewhere and name what comes out"
+        remedy = "unpack it elsewhere and name the result"
         raise InputError(f"{path}: no room to unpack it", "free disk", remedy)
 
 
@@ -293,7 +293,7 @@ def sheets_as_text(path: Path, folder: Path) -> list[Path]:
         if not known and type(error).__name__ != "PanicException":
             raise
         seen = f"{path}: cannot be read as a workbook ({_why(error)})"
-        remedy = "open it and save it anew, without a password, or as CSV"
+        remedy = "open it and save it again, without a password, or as CSV"
         raise InputError(seen, "a whole workbook", remedy) from error
     if not found:
         seen = f"{path}: no sheet with a table"

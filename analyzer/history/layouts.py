@@ -199,7 +199,7 @@ def open_wide(table: Table, options: ReadOptions) -> Source:
     partner, said = quality_columns(table, free, options.stated)
     values_in = [i for i in free if i not in partner.values()]
     if not values_in or not _any_number(table, values_in):
-        seen = f"{table.path}: no values beside the time column '{table.names[clock.columns[0]]}'"
+        seen = f"{table.path}: no values next to the time column '{table.names[clock.columns[0]]}'"
         raise InputError(seen, "a column of values for each tag, named as the tag", "export the tags' values")
     names = [table.names[i] for i in values_in]
     check_once(table.path, names)

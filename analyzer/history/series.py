@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from analyzer.limits import HISTORY
 
-NEWEST_FIRST = "series run newest first and are turned round"
+NEWEST_FIRST = "series run newest first and are reversed"
 REPEATED = "samples repeat a stamp; the last one counts"
 CONTRADICTED = "samples contradict another file at the same stamp; the later file counts"
 UNORDERED = "samples were out of order"

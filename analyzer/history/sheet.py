@@ -81,7 +81,7 @@ def read_through(
         if rows + left_out < HISTORY.whole_share * lines - 1:
             more, others_left_out, found = _as_far_as_numbers_go(replace(sheet, unquoted=True), read)
             if more > rows + left_out:
-                left_out, notes = others_left_out, ["a quote is not closed: quotes are taken as they stand"]
+                left_out, notes = others_left_out, ["a quote is not closed: quotes are read as characters"]
             else:
                 found = _as_far_as_numbers_go(sheet, read)[2]
     except (UnicodeError, pa.ArrowInvalid) as error:

@@ -78,7 +78,7 @@ def _require_dense(path: Path, found: Spread) -> None:
     if span > HISTORY.spanned_cells and span > HISTORY.spanned_times * found.cells:
         far = f"{column_letters(found.far[1])}{found.far[0]}"
         seen = f"{path}, {found.name}: {found.cells} cells that span {span}, as far as cell {far}"
-        remedy = f"delete what stands alone far from the table, such as {far}, or save it as CSV"
+        remedy = f"delete isolated cells far from the table, such as {far}, or save it as CSV"
         raise InputError(seen, "a table without stray cells", remedy)
 
 

@@ -152,7 +152,7 @@ def stated_column(path: Path, names: Sequence[str], stated: str, kind: str) -> i
     """
     if stated not in names:
         seen = f"{path}: no column '{stated}' among {', '.join(names[:8])}"
-        expected = f"the name of the {kind} column as it stands in the header"
+        expected = f"the name of the {kind} column as written in the header"
         raise InputError(seen, expected, f"correct --{kind}-column")
     return names.index(stated)
 
@@ -161,7 +161,7 @@ def check_once(path: Path, names: Sequence[str]) -> None:
     """Raise InputError for duplicate column names, because their tag is ambiguous."""
     name, count = max(Counter(names).items(), key=lambda item: item[1], default=("", 1))
     if count > 1:
-        raise InputError(f"{path}: column '{name}' stands twice", "each tag once", "rename or remove one")
+        raise InputError(f"{path}: column '{name}' occurs twice", "each tag once", "rename or remove one")
 
 
 def is_text(kind: pa.DataType) -> bool:

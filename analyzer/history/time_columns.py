@@ -213,7 +213,7 @@ def _with_short_year(parts: stamps.Fields, pointed: bool) -> DateOrder | None:
     if "year" not in possible:
         return None
     if len(possible) == 1:
-        return DateOrder("year", "else the stamps would lie ahead of us")
+        return DateOrder("year", "otherwise the stamps would be in the future")
     leaps = {first: float(np.max(np.abs(np.diff(found)), initial=0.0)) for first, found in possible.items()}
     latest = {first: found.max() for first, found in possible.items() if leaps[first] == min(leaps.values())}
     year = latest.pop("year", None)
@@ -227,7 +227,7 @@ def _with_short_year(parts: stamps.Fields, pointed: bool) -> DateOrder | None:
         first = next(iter(latest))
     else:
         return None
-    why = "the year may stand in front or behind; state --date-format if it is not so"
+    why = "the year may be first or last; state --date-format if this is wrong"
     return DateOrder(first, why, sure=False)
 
 
@@ -250,7 +250,7 @@ def _in_zone(table: Table, clock: Clock, name: str) -> Clock:
     text = str(head[0].as_py()) if clock.local and is_text(head.type) and len(head) else ""
     zone = stamps.named_zone(name) or stamps.named_zone(text) or clock.timezone
     offset_s, several = stamps.header_zone(name, zone)
-    doubt = f", for '{several}' means several zones; state --timezone" if several else ""
+    doubt = f", because '{several}' means several zones; state --timezone" if several else ""
     clock = replace(clock, offset_s=offset_s, timezone=zone, doubt=doubt)
     if not clock.local or offset_s is not None or zone is None or is_fixed(zone):
         return clock

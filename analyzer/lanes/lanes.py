@@ -57,9 +57,9 @@ def _offset(found: Finding) -> bool:
 def _at_limit(found: Finding) -> str:
     mean = found.known.get("op_mean_pct")
     side = "" if not isinstance(mean, float) else " lower" if mean < 50 else " upper"
-    text = f"OP rests at its{side} limit for {found.number('at_limits_pct'):.0f} % of the time"
+    text = f"OP is at its{side} limit for {found.number('at_limits_pct'):.0f} % of the time"
     from_end_to_end = found.cause is Cause.TUNING  # then the valve is not undersized
-    return text if from_end_to_end else f"{text}; look at the valve's size and at what feeds it"
+    return text if from_end_to_end else f"{text}; check the valve's size and its supply"
 
 
 def _side(found: Finding) -> str:
@@ -73,8 +73,8 @@ def _side(found: Finding) -> str:
 def _lasting(found: Finding) -> str:
     text = f"PV stays {found.number('lasting_error_pct'):.3g} % of span {_side(found)} SP"
     if _offset(found):
-        return f"{text}, as a controller without integral action leaves it"
-    odd = "though the loop is in automatic and OP off its limits; do tags and ranges belong together?"
+        return f"{text}, as expected without integral action"
+    odd = "although the loop is in automatic and OP off its limits; check tags and ranges"
     return text if Lane.AT_LIMIT in found.lanes else f"{text} {odd}"
 
 
@@ -102,7 +102,7 @@ def _winds_up(found: Finding) -> str:
 
 
 def _frozen(found: Finding) -> str:
-    return f"PV stands still for {found.number('frozen_pct'):.0f} % of the time while OP moves: frozen"
+    return f"PV is constant for {found.number('frozen_pct'):.0f} % of the time while OP moves: frozen"
 
 
 def _travels(found: Finding) -> str:

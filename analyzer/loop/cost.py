@@ -15,7 +15,7 @@ OF_RANGE = frozenset(
 )
 """Columns in percent of that range, or that count it, which compare between loops only where it is stated."""
 MARK = "*"
-OF_RECORDED = "percent of the recorded range, for loops.csv states none: compares with no other loop"
+OF_RECORDED = "percent of the recorded range, loops.csv states none: not comparable with other loops"
 """What the mark means."""
 
 

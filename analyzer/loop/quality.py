@@ -306,7 +306,7 @@ def _described(
     if record.sp_estimated:
         notes.append("no SP recorded: estimated as the median of PV")
     if not op_known:
-        notes.append("no OP recorded: no cause can be told")
+        notes.append("no OP recorded: no cause can be identified")
     op_scaled = not op_known or (op_in_range(record.op, limits) and not in_ma)
     if not op_scaled:
         notes.append(str(op_range(scale, record.op)))

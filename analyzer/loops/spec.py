@@ -212,7 +212,7 @@ def _check_header(path: Path, header: Sequence[str]) -> None:
         raise InputError(seen, "a column 'loop'", "add it")
     twice = [name for name, count in Counter(header).items() if count > 1 and name]
     if twice:
-        raise InputError(f"{path}: column '{twice[0]}' stands twice", "each column once", "remove one")
+        raise InputError(f"{path}: column '{twice[0]}' occurs twice", "each column once", "remove one")
 
 
 def _spec(where: str, cells: Mapping[str, str], zone: str, day_first: bool | None) -> LoopSpec:

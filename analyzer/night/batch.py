@@ -141,7 +141,7 @@ def is_same(path: Path, run: Identity) -> bool:
     if not same:
         seen = f"the run that was stopped read {begun}, this one reads {run['export']} ({run['loops']} loops)"
         expected = "--resume with the same EXPORT, --loops, --changes, --since, --until, --config and version"
-        remedy = "give them again, or leave out --resume to give up what the stopped run had done"
+        remedy = "give them again, or leave out --resume to discard the stopped run"
         raise InputError(seen, expected, remedy)
     return True
 
@@ -250,7 +250,7 @@ def _require_one_clock(store: Store, zone: str, replaced: Sequence[str]) -> None
         kept = store.stated_zone(stay[-1:])
     if kept is not None and kept != zone:
         seen = f"--timezone {zone}: the nights of {store.path} are of {kept}"
-        raise InputError(seen, "one clock in one store", f"say --timezone {kept}, or give another --store")
+        raise InputError(seen, "one clock in one store", f"state --timezone {kept}, or give another --store")
 
 
 def _require_kept(store: Store, night: str, key: str) -> None:

@@ -23,7 +23,7 @@ from analyzer.night.opened import guarded
 from analyzer.words.experiments import found_lines
 from identification.errors import TriageError
 
-ALONE = "fit for a model from its experiments alone"
+ALONE = "fit only for a model from its experiments"
 MOST_NAMES = 5
 """Maximum number of loops listed in a line."""
 
@@ -46,7 +46,7 @@ def _fit_for(lacking: Requirement | None, spec: LoopSpec, prepared: Prepared, co
         unseen = unseen if recorded is None else hidden(prepared.record, found, recorded, config)
         stated = recorded or stated
     if unseen is not None:
-        return f"fit for its figures alone: {unseen}"
+        return f"fit only for its figures: {unseen}"
     unfit = unfit_for_cause(prepared, None, config)
     if unfit is not None:
         return f"fit for oscillation and assessments; not for the cause: {unfit}"

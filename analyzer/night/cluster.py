@@ -20,7 +20,7 @@ from analyzer.night.workers import Executor, R, T, WorkerDeath
 from identification.errors import InputError
 
 GO_ON = (
-    "what is done is kept in the store: start the scheduler and workers, then the same command with --resume"
+    "finished work is kept in the store: start the scheduler and workers, then the same command with --resume"
 )
 WHY = "ended several workers of the cluster"
 
@@ -46,7 +46,7 @@ class Cluster(Executor[T, R]):
             asked = {"timeout": CLUSTER.answer_s, "set_as_default": False}
             self._client: Any = Client(self._address, **asked)
         except (OSError, ValueError, TimeoutError) as error:
-            seen = f"--scheduler {self._address}: no scheduler answers"
+            seen = f"--scheduler {self._address}: no scheduler responds"
             expected = "the address that 'dask scheduler' prints"
             raise InputError(seen, expected, "start it, or correct it") from error
         # one line below reports what ended the run
@@ -91,7 +91,7 @@ class Cluster(Executor[T, R]):
                 idle_s = time.monotonic()
             said = seen
             if time.monotonic() - idle_s > CLUSTER.given_up_s:
-                raise InputError(f"--scheduler {self._address}: {seen}", "workers that answer", GO_ON)
+                raise InputError(f"--scheduler {self._address}: {seen}", "workers that respond", GO_ON)
 
     def _who_works(self) -> str:
         """Why the cluster does not work; '' if it has workers."""
@@ -99,7 +99,7 @@ class Cluster(Executor[T, R]):
             asked = {"callback_timeout": CLUSTER.answer_s}
             workers = self._client.sync(self._client.scheduler.ncores, **asked)
         except (TimeoutError, OSError, ValueError):
-            return "the scheduler does not answer"
+            return "the scheduler does not respond"
         return "" if workers else "no workers, 'dask worker' starts one"
 
     @contextmanager
@@ -112,6 +112,6 @@ class Cluster(Executor[T, R]):
         except (CancelledError, CommClosedError) as error:
             seen, expected = (
                 f"--scheduler {self._address}: lost in mid-run",
-                "a scheduler that lives until the run ends",
+                "a scheduler that runs until the run ends",
             )
             raise InputError(seen, expected, GO_ON) from error

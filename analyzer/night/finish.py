@@ -188,7 +188,7 @@ def _joining_told(
     """Notes on a night that already existed."""
     said = []
     if beside:
-        said.append(f"night {night}: {len(beside)} loops of an earlier run are kept beside these")
+        said.append(f"night {night}: {len(beside)} loops of an earlier run are also kept")
     for loop in sorted(kept):
         said.append(
             f"{loop}: the store has {_good_h(old[loop]):.1f} good hours of night {night}, this export "

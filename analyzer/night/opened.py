@@ -48,9 +48,7 @@ def opened(asked: Asked) -> Plant:
         specs, notes = match(stated, source.tags)
         own = unknown_columns(stated)
         if own:
-            kept = (
-                f"{asked.loops}: columns {', '.join(own)} mean nothing here and are kept as the plant's own"
-            )
+            kept = f"{asked.loops}: columns {', '.join(own)} have no meaning here and are kept as the plant's own"
             notes = (kept, *notes)
     specs, currents = in_milliamperes(source, specs)
     notes = (*notes, *currents, *_of_no_loop(asked.changes, specs))
@@ -77,7 +75,9 @@ def in_milliamperes(
         _lies_within(source, str(s.op), HISTORY.ma_low, HISTORY.ma_high) for s in looked_at
     ):
         return specs, ()
-    said = f"OP of {len(unstated)} loops lies between 4 and 20, like mA: nothing is told in % of OP; state "
+    said = (
+        f"OP of {len(unstated)} loops lies between 4 and 20, like mA: nothing is reported in % of OP; state "
+    )
     marked = tuple(replace(s, in_ma=True) if s in unstated else s for s in specs)
     return marked, (f"{said}op_lo 4 and op_hi 20 in loops.csv, or 0 and 100 where it is percent",)
 
@@ -95,7 +95,7 @@ def _of_no_loop(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> t
     """A note on changes of loops that are not read."""
     strange = sorted({change.loop for change in changes} - {spec.loop for spec in specs})
     more = f" and {len(strange) - MOST_NAMES} more" if len(strange) > MOST_NAMES else ""
-    text = f"{', '.join(strange[:MOST_NAMES])}{more}: no such loop is read; these changes are left aside"
+    text = f"{', '.join(strange[:MOST_NAMES])}{more}: no such loop is read; these changes are ignored"
     return (f"--changes: {text}: correct the name",) if strange else ()
 
 

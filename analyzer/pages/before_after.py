@@ -130,7 +130,7 @@ def _evidence(
     recorded = any(r["travel_of"] == "stem" for r in rows)
     was_other, is_other = (_works_with_others(rows, span) for span in spans)
     if was_other or is_other:  # nothing can be simulated
-        sham = "OP does not follow the new settings: they were not typed in"
+        sham = "OP does not follow the new settings: they were not entered"
         return Evidence(() if was_other else (sham,), stem_recorded=recorded)
     if weeks is None:
         return Evidence(stem_recorded=recorded)
@@ -177,9 +177,9 @@ def outcome(found: LoopComparison) -> str:
         reasons=reasons,
     )
     if found.reasons and reached is not Grade.INCOMPARABLE:
-        text += f"; this is on equal load, for the weeks are not comparable as measured: {reasons}"
+        text += f"; this is on equal load because the weeks are not comparable as measured: {reasons}"
     if found.reference is not None and found.reference.of:
-        text += f"; what {found.reference.loops} unchanged loops of its area did is taken off"
+        text += f"; the change of {found.reference.loops} unchanged loops of its area is subtracted"
     if found.source_loop:
         text += f"; the cause lies in the neighbour {found.source_loop}, whose oscillation it follows"
     return text

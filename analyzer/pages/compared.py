@@ -48,7 +48,7 @@ def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
         offers = "; ".join(
             _offers(c, [f"{n}: {_priced(c, n)}" for n in OFFERED if n in c.shown], "a repaired valve", unit)
         )
-        said = "No settings are recommended: none wins on all that the loop may be without a price."
+        said = "No settings are recommended: none is better at no cost on all possible loops."
         return f"{said} {f'To choose between: {offers}.' if offers else ''}"
     scale, ratio = c.pv_span / 100.0, _times(new, now)
     travel, error = (
@@ -61,8 +61,8 @@ def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
     )
     if ratio is None:
         return f"{text}."
-    so = "; the price is that" if ratio > PAGES.worse else ", and"
-    return f"{text}{so} the error that a lasting load leaves sums up to {number(ratio)} times as much."
+    so = "; the cost is that" if ratio > PAGES.worse else ", and"
+    return f"{text}{so} the integrated error after a lasting load is {number(ratio)} times as large."
 
 
 def choices(c: Comparison, spec: LoopSpec) -> list[str]:
@@ -71,7 +71,7 @@ def choices(c: Comparison, spec: LoopSpec) -> list[str]:
     unit = spec.pv_unit or "PV"
     told = [f"{name}: {_typed(c, name, spec)}: {_priced(c, name)}" for name in named]
     lines = _offers(c, told, REPAIRED, unit)
-    return ["to choose between, on all that the loop may be:", *(f"  {x}" for x in lines)] if lines else []
+    return ["to choose between, on all possible loops:", *(f"  {x}" for x in lines)] if lines else []
 
 
 def _offers(c: Comparison, settings: list[str], repair: str, unit: str) -> list[str]:
@@ -103,9 +103,7 @@ def _priced(c: Comparison, name: str) -> str:
     """Gains and losses of settings, on the worst of all loops consistent with the data, and on a load step."""
     found = c.everywhere[name]
     travel, error = map(_against_now_pct, (found.worst_travel, found.worst_error))
-    return (
-        f"stem travel {travel}, error {error} at worst, a load step goes {number(c.peaks[name])} times as far"
-    )
+    return f"stem travel {travel}, error {error} at worst, a load step peaks {number(c.peaks[name])} times as high"
 
 
 def _against_now_pct(ratio: float) -> str:
@@ -171,7 +169,7 @@ def travel_field(
     moves, rest : what travels, and the text for settings at rest.
     """
     swings = f"limit cycle, the darker the more {moves} travels"
-    keys = (("swings", swings), ("calm", f"comes to rest{rest}"), ("unstable", "unstable"))
+    keys = (("swings", swings), ("calm", f"no limit cycle{rest}"), ("unstable", "unstable"))
     cells = np.abs(found.kp), found.ti_s, 3600.0 * found.travel, found.rests, found.unstable
     return parts.Field("travel-map", title, "Kp [%/%]", "Ti [s]", *cells, tuple(places), keys)
 
@@ -191,12 +189,10 @@ def price(c: Comparison, unit: str) -> parts.Plot | None:
     error, travel = np.array(found, float).reshape(-1, 2).T
     at = np.array([(p.x, p.y) for p in places], float).reshape(-1, 2)
     lines = (
-        parts.Line(
-            "none of the robust ones beats these", scale * now.error * error, now.stem_travel * travel
-        ),
+        parts.Line("no robust settings are better", scale * now.error * error, now.stem_travel * travel),
         parts.Line("compared", at[:, 0], at[:, 1], joined=False),
     )
-    title = "What each costs: the lower and the further left, the better"
+    title = "Error and stem travel of each: lower left is better"
     axes = f"average absolute error [{unit}]", "stem travel [%/h]"
     return parts.Plot("price", title, *axes, lines, reach=(0.0,), places=places)
 
@@ -209,7 +205,7 @@ def field(c: Comparison) -> parts.Field | None:
     places = [_place(abs(t.controller.kp), t.controller.ti_s, t) for t in known]
     rest = "" if is_play(c.loop.valve) else " (seldom with stick-slip)"
     title = "Travel by describing function, without load"
-    caption = "Kp in percent of OP over percent of PV, whatever unit the controller has."
+    caption = "Kp in percent of OP over percent of PV, independently of the controller's unit."
     return replace(travel_field(c.travel, places, title, "the stem", rest), caption=caption)
 
 
@@ -293,5 +289,5 @@ def settings_page(loop: str, night: str, c: Comparison, spec: LoopSpec) -> parts
         parts.Section("Try settings", (parts.Text((said["hint"],)), tried)),
         parts.Section("What the settings are, for experts", (named,), closed=True),
     )
-    subtitle = f"settings compared and tried on night {night}"
+    subtitle = f"settings compared and simulated on night {night}"
     return parts.Page(f"{slug(loop)}-settings", f"{loop}: settings", subtitle, sections)

@@ -120,7 +120,7 @@ def sentence(g: GroupView) -> str:
         loop, pct = g.source["loop"], g.source["source_pct"]
         tail = f"it starts at {loop} ({pct:.0f} %)"
     else:
-        tail = f"it starts at one of {_candidates(g)}, or outside what is recorded ({g.unseen_pct:.0f} %)"
+        tail = f"it starts at one of {_candidates(g)}, or outside the recorded loops ({g.unseen_pct:.0f} %)"
     return f"{head}; {tail}; without it the others' average errors fall by {number(g.gain_pct)} % of span together"
 
 
@@ -218,7 +218,7 @@ def graph(g: GroupView) -> parts.Graph:
     left = len(g.rows) - len(shown)
     caption = "From left to right as coherence falls; lags are behind the likeliest source."
     caption += f" {left} more not drawn." if left else ""
-    return parts.Graph("way", "Where it starts and whom it moves", nodes, arrows, caption)
+    return parts.Graph("way", "Source and followers", nodes, arrows, caption)
 
 
 def heat_map(g: GroupView) -> parts.HeatMap | None:

@@ -152,16 +152,16 @@ def _facts(row: Row, thin: Thinned | None) -> parts.Facts:
 def _believed(row: Row) -> parts.Facts:
     """Joint results of the nights, and their number."""
     nights = words.with_noun(int(row["believed_nights"]), "night")
-    out = [("The verdict rests on", f"{nights} since {row['believed_since']}")]
+    out = [("The verdict is based on", f"{nights} since {row['believed_since']}")]
     if row["worn_nights"]:
         certain = f", certain since {row['certain_since']}" if row["certain_since"] else ""
         sure = "> 99" if row["worn_pct"] > PAGES.most_sure_pct else f"{row['worn_pct']:.0f}"
-        out.append(("Chance of a worn valve", f"{sure} %{certain}"))
+        out.append(("Probability of a worn valve", f"{sure} %{certain}"))
     if row["certain_since"] and row["width_pct"] is not None:
         ends = f"{number(row['width_low_pct'])} … {number(row['width_high_pct'])}"
         out.append(("Backlash or stickband, all nights", f"{number(row['width_pct'])} % of OP ({ends})"))
     if row["wear_pct_per_month"] is not None:
-        out.append(("It wears", wear_text(row)))
+        out.append(("Wear", wear_text(row)))
     return parts.Facts(tuple(out))
 
 
@@ -171,7 +171,9 @@ def _explained_section(found: Row | None, row: Row) -> parts.Section | None:
         return None
     together = beside_night(row, found["verdict"], found["block"])
     said = (f"{title(found['verdict']).capitalize()}: {found['reason']}", check(found))
-    return parts.Section("What the plain loop lacks", (parts.Text((*said, together) if together else said),))
+    return parts.Section(
+        "Physics missing in the baseline model", (parts.Text((*said, together) if together else said),)
+    )
 
 
 def _evidence_section(row: Row) -> parts.Section:
@@ -191,7 +193,7 @@ def _evidence_section(row: Row) -> parts.Section:
         parts.Text(lead(more).paragraphs) if more else None,
         page_table("evidence", rows) if rows else parts.Text(("No sign of a fault.",)),
         known if known.items else None,
-        parts.Text((f"The advice rests on this: {row['advice']}",)) if row["advice"] else None,
+        parts.Text((f"Basis of the advice: {row['advice']}",)) if row["advice"] else None,
         parts.Text((f"About the data: {row['notes']}.",), "note") if row["notes"] else None,
     )
     return parts.Section("Evidence, for experts", blocks, closed=True)

@@ -28,7 +28,7 @@ LEAST_BUCKETS = 2.5
 """Minimum buckets per period in a decimated trend [-]; below 2 it is aliased (Nyquist)."""
 SHOWN_PERIODS = 8.0
 """Length of the autocorrelation shown [periods]."""
-STANDS = "OP moves, the stem stands"
+STANDS = "OP moves, the stem does not"
 Course = tuple[Floats, Floats, slice]
 """A line's horizontal and vertical values, shape (n,) each, and the part of it in which the stem is at rest."""
 
@@ -61,9 +61,7 @@ def trend_block(
     shaded = thin.spans(thin.manual | thin.frozen)
     if shaded:
         said = [
-            text
-            for text, mask in (("in manual", thin.manual), ("PV stands still", thin.frozen))
-            if mask.any()
+            text for text, mask in (("in manual", thin.manual), ("PV constant", thin.frozen)) if mask.any()
         ]
         caption = f"Shaded: {' or '.join(said)}. {caption}"
     signals, seen = tuple(bands), tuple(marks)
@@ -91,7 +89,9 @@ def pv_over_op(thin: Thinned, row: Row) -> Plot:
     told = ~(part.gap | part.frozen)
     pv, op = scale.of(part.middle("pv")[told]), part.middle("op")[told]
     line = Line("PV over OP", op, pv, joined=close is not None)
-    caption = "A cloud along a line: a sound valve. An ellipse or a parallelogram: lag, play or stick-slip."
+    caption = (
+        "A cloud along a line: an ideal valve. An ellipse or a parallelogram: lag, backlash or stick-slip."
+    )
     title = "PV over OP, " + ("the last ten periods" if close else "the last night")
     reach = _least_ends(float(np.median(pv)) if pv.size else 0.0, scale)
     return Plot("pv-op", title, "OP [%]", f"PV [{scale.label}]", (line,), (), caption, reach=reach)
@@ -126,7 +126,7 @@ def _correlation(error: Floats, step: float, period_s: float | None) -> Plot:
     lag = np.arange(found.size, dtype=float)[:most] * (step / 60.0)
     marks = (Mark(period_s / 60.0, duration(period_s)),) if period_s else ()
     line = Line("autocorrelation", lag, found[:most])
-    caption = "A sustained oscillation keeps its height from period to period; noise dies away."
+    caption = "A sustained oscillation keeps its height from period to period; noise decays."
     return Plot("autocorrelation", "Autocorrelation of the error", "lag [min]", "–", (line,), marks, caption)
 
 
@@ -150,17 +150,17 @@ def turn_panels(row: Row, scale: PvScale) -> Panels | None:
     if not kept:
         return None
     delay = f", PV {kept['dead_s']:.3g} s later" if kept["dead_s"] > 0 else ""
-    pv, minutes = f"PV [{scale.label}]", "min since OP's turn"
+    pv, minutes = f"PV [{scale.label}]", "min since OP's reversal"
     halves = [_half_cycle(h, scale, kept["step_s"]) for h in kept["halves"]]
     op_lines, pv_lines, plane = map(_laid_over, zip(*halves, strict=True))
     reach = _least_ends(float(np.median(plane[0].y)), scale)
     plots = (
-        Plot("turns-op", "OP since its turn", minutes, "OP [%]", op_lines, reach=(0.0, 0.0)),
-        Plot("turns-pv", "PV since OP's turn", minutes, pv, pv_lines, reach=(0.0, 0.0)),
+        Plot("turns-op", "OP since its reversal", minutes, "OP [%]", op_lines, reach=(0.0, 0.0)),
+        Plot("turns-pv", "PV since OP's reversal", minutes, pv, pv_lines, reach=(0.0, 0.0)),
         Plot("turns-plane", f"PV over OP{delay}", "OP [%]", pv, plane, reach=reach),
     )
-    said = texts("half_cycles").get(row["cause"], "Half-cycles laid over one another.")
-    title = f"The last {len(kept['halves'])} half-cycles, from each turn of OP (falling ones turned over)"
+    said = texts("half_cycles").get(row["cause"], "Half-cycles, superimposed.")
+    title = f"The last {len(kept['halves'])} half-cycles, from each OP reversal (falling ones inverted)"
     return Panels("turns", title, plots, said)
 
 
@@ -179,7 +179,7 @@ def _half_cycle(kept: Row, scale: PvScale, step_s: float) -> tuple[Course, Cours
 def _laid_over(paths: Sequence[Course]) -> tuple[Line, ...]:
     """Superimposed paths, with the part of the stem at rest on top."""
     stuck = [Line(STANDS, x[part], y[part], kind="stuck") for x, y, part in paths if x[part].size > 1]
-    return (*(Line("since the turn", x, y) for x, y, _ in paths), *stuck)
+    return (*(Line("since the reversal", x, y) for x, y, _ in paths), *stuck)
 
 
 def answered_moves(row: Row) -> Plot | None:

@@ -84,7 +84,7 @@ def side_by_side(store: Store, night: ShownNight) -> Page:
         for loop in night.paged
         if loop in trends and trends[loop].time_s.size > 1
     )
-    caption = "Each loop in its own unit. Zoom or move one, and all go with it; the address keeps the choice."
+    caption = "Each loop in its own unit. Zoom or move one, and all follow; the address keeps the choice."
     section = Section("Side by side", (Beside("beside", "Loops, up to six", blocks, caption),))
     return Page(BESIDE, "Loops side by side", f"the night of {night.name}", (section,), (ALL_LOOPS,))
 

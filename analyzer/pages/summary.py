@@ -17,7 +17,7 @@ from analyzer.words.orders import order
 from analyzer.words.units import changed_settings
 from reports.pages import Block, Cell, Page, Section, Table, Text, section, there
 
-CALM = "No loop needs a touch this morning."
+CALM = "No loop needs action this morning."
 
 
 def listed(names: Sequence[str]) -> str:
@@ -59,7 +59,9 @@ def _of_group(source: words.Row, others: Sequence[str]) -> str:
     if source["action"] == Action.RETUNE:
         return f"Type new settings into {name}: {moved}."
     if source["cause"] == Cause.LOAD:
-        return f"Find what moves {name} every {words.duration(source['period_s'])} from outside: {moved}."
+        return (
+            f"Find the external disturbance of {name}, every {words.duration(source['period_s'])}: {moved}."
+        )
     return f"Look at {name} first: {moved}."
 
 

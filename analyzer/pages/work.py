@@ -33,7 +33,7 @@ READ = ("loop", "status", "oscillating_pct", *FIGURES)
 def valve_test(row: Row) -> str:
     """The stroke test of a faulty valve in a few words; its order gives the procedure."""
     step, answer = stroke(row)
-    return f"steps of {step} %: {answer}" if answer else "steps of 5 %: PV, or the stem, does not answer"
+    return f"steps of {step} %: {answer}" if answer else "steps of 5 %: PV, or the stem, does not respond"
 
 
 def wearing(night: ShownNight) -> Table:
@@ -108,7 +108,7 @@ def said_since(work: Work, both: Sides) -> str:
     still, was = (sum(oscillates(r) for r in side) for side in (both.since, both.before))
     text = with_noun(len(both.since), "night")
     if was and not still:
-        text += ": cured, oscillates in none"
+        text += ": no longer oscillates"
     elif was or still:
         text += f": oscillates in {still}, before in {was} of {len(both.before)}"
     changes = [(both.means(column), name) for column, name in FIGURES.items() if column != "loss"]
@@ -160,7 +160,7 @@ def work_page(store: Store, night: ShownNight) -> Page:
         return work.state in FINISHED, work.due or "9999", -work.since_s, row["loop"]
 
     rows = sorted((r for r in night.rows if r["loop"] in works), key=urgency)
-    note = f"Since: nights after the day of the note, beside the {PAGES.before_work} before it."
+    note = f"Since: nights after the day of the note, next to the {PAGES.before_work} before it."
     empty = Text(('Nothing is noted: triage note STORE LOOP "..." --state open --due DATE.',))
     sections = there(
         section(f"Won since {night.name[:7]}-01", won(night, works, parted)),

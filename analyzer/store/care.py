@@ -17,7 +17,7 @@ from reports.whole_file import SUFFIX
 
 NEVER = "1900-01-01"
 """A day before all nights."""
-AGAIN = "restore it from a backup, or delete it and run its night anew"
+AGAIN = "restore it from a backup, or delete it and run its night again"
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +47,10 @@ def problems(store: Store) -> Iterator[Problem]:
     lines = notes.broken(store.path)
     if lines:
         seen = f"{store.path / notes.FILE}: {lines} lines are no notes"
-        yield Problem(seen, "nothing: they are passed over")
+        yield Problem(seen, "nothing: they are ignored")
     for night in store.begun():
         seen = f"{store.path / 'parts' / night}: a run that was begun and not finished"
-        yield Problem(seen, "run it again with --resume; without, the next run starts anew")
+        yield Problem(seen, "run it again with --resume; without it the next run starts again")
 
 
 def _version(store: Store) -> Iterator[Problem]:
@@ -67,7 +67,7 @@ def _version(store: Store) -> Iterator[Problem]:
 def _wrong(path: Path, whole: set[str]) -> Problem | None:
     """Fault of a file among the nights of a table, if any."""
     if path.suffix == SUFFIX:
-        seen = f"{path}: left over from a process that died"
+        seen = f"{path}: remains of a process that died"
         return Problem(seen, "'triage store prune' deletes it after a day")
     if path.suffix == ".damaged":
         return Problem(f"{path}: a damaged table that a run has set aside", "delete it when nobody needs it")

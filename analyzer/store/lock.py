@@ -190,7 +190,7 @@ def _require_unsigned(store: Path) -> bool:
         return True
     if isinstance(alive_s, int | float) and time.time() - alive_s < STORE.dead_s:
         left = max(math.ceil((STORE.dead_s + alive_s - time.time()) / 60.0), 1)
-        raise _in_use(store, f"; if it died, its hold ends in {left} min, then --resume goes on with it")
+        raise _in_use(store, f"; if it died, its hold ends in {left} min, then --resume continues it")
     return bool(known)
 
 

@@ -81,7 +81,7 @@ def new(
     """A note with the present time. Raises InputError where the text is empty."""
     told, by = " ".join(visible(text).split()), visible(user() if owner is None else owner)
     if not told:
-        remedy = 'say it: triage note STORE LOOP "..."'
+        remedy = 'state it: triage note STORE LOOP "..."'
         raise InputError(f"an empty note on {loop}", "what was seen or done", remedy)
     return Note(loop, time.time(), told, by, hidden_until, state, due)
 

@@ -48,7 +48,7 @@ VERSION_FILE = "store.json"
 MAKE_ONE = "run 'triage run EXPORT --store DIR' first"
 OWN = frozenset({"parts", "run.lock", "run.owner.json", "notes.jsonl", "lost+found"})
 """Allowed contents of a new store, besides names that begin with a point."""
-GO_ON = "go on with the same command and --resume"
+GO_ON = "continue with the same command and --resume"
 """Advice for incomplete pieces of a night."""
 
 
@@ -195,7 +195,7 @@ class Store:
                 path = self.file(table.name, night)
                 aside = path.with_name(f"{path.name}.{secrets.token_hex(4)}.damaged")
                 path.rename(aside)
-                said.append(f"{error.seen}; set aside as {aside.name}, and written anew")
+                said.append(f"{error.seen}; set aside as {aside.name}, and written again")
         return said
 
     def forget_explained(self, night: str, loops: Sequence[str] | None) -> None:
@@ -263,7 +263,7 @@ class Store:
 
     def gone(self, piece: Path) -> DamagedError:
         """Error for a missing piece of a run."""
-        seen = f"{piece}: this piece of the night is gone"
+        seen = f"{piece}: this piece of the night is missing"
         expected = "a store that nobody else changes, and that all workers see"
         return DamagedError(seen, expected, GO_ON)
 
@@ -283,9 +283,9 @@ class Store:
                 raise not_now(path, error) from error
             right, nights = json.dumps({"schema": SCHEMA}), self.nights()
             ends = " to ".join(dict.fromkeys((*nights[:1], *nights[-1:])))
-            stand = f"the tables of {len(nights)} nights, {ends}, stand as they were"
+            stand = f"the tables of {len(nights)} nights, {ends}, are unchanged"
             seen = f"{path}: damaged, and nothing else: {stand if nights else 'no night is in the store'}"
-            raise InputError(seen, right, f"write {right} into it and go on") from error
+            raise InputError(seen, right, f"write {right} into it and continue") from error
 
     def require_known(self) -> None:
         """Raise InputError where a newer version of this program wrote the store."""

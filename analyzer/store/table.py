@@ -66,7 +66,7 @@ ROWS_AT_ONCE = 65_536
 """Rows of a table per part."""
 WRITTEN = "a table that 'triage run' wrote"
 REMEDY = (
-    "'triage store check' names all such: restore them from a backup, or delete them and run the night anew"
+    "'triage store check' names all such: restore them from a backup, or delete them and run the night again"
 )
 
 

@@ -89,7 +89,7 @@ def _advice(now: Belief, row: Row) -> str | None:
             f"{number(min(x))} to {number(max(x))}" for x in ([p.kp for p in pairs], [p.ti for p in pairs])
         )
         unit, held = row["ti_unit"] or "s", t.pair.night
-        spread = f"{len(pairs)} nights advise Kp {kp} and Ti {ti} {unit}; that of {held} is held."
+        spread = f"{len(pairs)} nights advise Kp {kp} and Ti {ti} {unit}; that of {held} is kept."
     return " ".join(filter(None, (t.pair.advice, spread)))
 
 
@@ -148,9 +148,9 @@ def _together(now: Belief, row: Row) -> str:
     nights = f"{now.cycle.nights} nights since {now.cycle.since}"
     if t.source is not None:
         return f"{cycle}: follows {t.source} in most of {nights}; fix that loop first"
-    beside = "; the valve is worn all the same" if t.fault in IS else ""
+    beside = "; the valve is also worn" if t.fault in IS else ""
     said = {
-        Cause.VALVE: f": the valve makes it, by {nights}" if cycles else "",
+        Cause.VALVE: f": caused by the valve, by {nights}" if cycles else "",
         Cause.TUNING: f": tuned too tight, by {nights}",
         Cause.LOAD: f": external disturbance, by {nights}{beside}",
         Cause.UNDECIDED: f"; cause undecided: {nights} do not agree",
@@ -201,10 +201,10 @@ def _fault_news(before: Belief, now: Belief) -> tuple[str, str] | None:
     if now.valve.certain and not before.valve.certain:
         return f"{width_text(now)}: confirmed by {now.valve.nights} nights", "worse"
     if before.valve.certain and not now.valve.certain:
-        return "no fault of the valve is seen any more", "better"
+        return "no valve fault is found any more", "better"
     then, cause = before.told.cause, now.told.cause
     if then in CAUSES and cause in CAUSES and then is not cause:
-        return f"the cause is now told as {cause} (was {then})", "unclear"
+        return f"the reported cause is now {cause} (was {then})", "unclear"
     pairs = before.told.pair, now.told.pair
     settled = before.remedy.settled and now.cycle.since == before.cycle.since
     if settled and None not in pairs and pairs[0] != pairs[1]:

@@ -54,14 +54,14 @@ def decided(data: Mapping[str, Any]) -> str:
     row = data.get("night")
     if row is None:
         return ""
-    cause = row["cause"] or "not told"
+    cause = row["cause"] or "not reported"
     said = f"The night of {row['night']} found: cause {cause}{_fault(row)}; {row['reason'] or 'no reason'}."
     return f"{said} Action: {row['action'] or 'none'}{_due(row)}. {_sentence(row['do'])}".strip()
 
 
 def decision_lines(row: Row) -> list[str]:
     """Cause, fault and action with their evidence, one line each."""
-    at = f"{row['loop']}, night {row['night']}: cause {row['cause'] or 'not told'}{_surely(row)}"
+    at = f"{row['loop']}, night {row['night']}: cause {row['cause'] or 'not reported'}{_surely(row)}"
     lines = [at + _fault(row), f"action: {row['action'] or 'none'}{_due(row)}"]
     if _do(row):
         lines.append(f"do: {_do(row)}")

@@ -26,7 +26,7 @@ TITLES: Mapping[str, str] = {
     "dead_time_s": "dead time",
     "zero_s": "inverse response",
     "backlash_pct": "backlash",
-    "drift_pct_per_h": "drift of PV, told apart",
+    "drift_pct_per_h": "drift of PV, separated",
 }
 """Constants in words, in reporting order."""
 
@@ -106,7 +106,7 @@ def lines(of: Learned, spec: LoopSpec, present: Pid | None, zone: str) -> Iterat
     """All results of a loop's experiments."""
     yield from found_lines(of, zone)
     for x, why in of.untold:
-        yield f"  tells no model ({name_of(x)}): {why}"
+        yield f"  gives no model ({name_of(x)}): {why}"
     yield from lone_lines(of, zone)
     if of.model is None:
         return
@@ -124,7 +124,7 @@ def lines(of: Learned, spec: LoopSpec, present: Pid | None, zone: str) -> Iterat
     yield from controller_lines(of)
     yield from settings_lines(of, spec, present)
     for text in left_open(of):
-        yield f"  the experiment does not tell: {text}"
+        yield f"  not identified by the experiment: {text}"
 
 
 def controller_lines(of: Learned) -> Iterator[str]:
@@ -147,7 +147,7 @@ def lone_lines(of: Learned, zone: str) -> Iterator[str]:
     for m in of.models:
         for name, times in (("PV", m.lone_pv), ("OP", m.lone_op)):
             for at in times:
-                yield f"left out: one {name} sample that stands alone at {stamp(start_s + at, zone)}"
+                yield f"excluded: one isolated {name} sample at {stamp(start_s + at, zone)}"
 
 
 def left_open(of: Learned) -> tuple[str, ...]:

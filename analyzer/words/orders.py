@@ -72,9 +72,9 @@ RETUNED = {Cause.VALVE: "retune worn", Cause.NONE: "retune sluggish", Cause.TUNI
 
 
 EXPECTED = {
-    Cause.VALVE: "the cycle comes to rest, by simulation, though the valve stays as it is",
-    Cause.NONE: "PV comes back to its set point several times sooner, and OP moves more",
-    Cause.TUNING: "the swing is smaller, and dies away sooner after a disturbance",
+    Cause.VALVE: "the cycle stops in simulation with the valve as it is",
+    Cause.NONE: "PV returns to its set point several times faster, and OP moves more",
+    Cause.TUNING: "the oscillation is smaller and decays sooner after a disturbance",
 }
 """Effect of new settings on a loop without a predicted cycle, by the cause."""
 
@@ -90,7 +90,7 @@ def _expected(row: Row) -> str:
     if None not in (row.get("expected_period_s"), row.get("expected_pv_amplitude_pct")):
         swing = f"{row['expected_pv_amplitude_pct']:.2g} % of span"
         return f"a cycle of {duration(row['expected_period_s'])} and {swing}: the valve stays as it is"
-    return EXPECTED.get(row["cause"], "PV answers the set point as the model of the experiment does")
+    return EXPECTED.get(row["cause"], "PV responds to the set point like the model of the experiment")
 
 
 def order(row: Row) -> tuple[tuple[str, str], ...]:

@@ -77,7 +77,7 @@ def _whole(found: Finding) -> str:
     if found.swing is None:
         if experiment:
             return joined(
-                experiment, found.remedy.text, f"nothing else is told: {lacking}" if lacking else None
+                experiment, found.remedy.text, f"nothing else is reported: {lacking}" if lacking else None
             )
         return f"not assessed: {found.remedy.text or lacking}"
     names = ", ".join(found.moves[:MOST_NAMES]) + (" ..." if len(found.moves) > MOST_NAMES else "")
@@ -140,7 +140,7 @@ def _strongest(found: Finding, most: int, *first: SignKind) -> str:
 def below_first(below: Finding, tie: str = "master") -> str:
     """Why a master has no advice of its own."""
     sign = Sign(Cause.LOAD, 1.0, SignKind.OF_BELOW, (below.loop, below.cause, tie))
-    return f"{sign_text(sign)}: mend that first, then look again."
+    return f"{sign_text(sign)}: repair that first, then look again."
 
 
 def joined(*clauses: str | None) -> str:

@@ -85,7 +85,7 @@ def modelled(record: LoopRecord, x: Experiment, beside: Sequence[Floats] = ()) -
     found, nat = _candidates(part, x, others)
     best, mean = found[0], averaged(found, x.course.closed)
     if nat < EXPERIMENTS.answers or NINETY * mean.spread.log_gain > EXPERIMENTS.most_gain:
-        raise NotAssessedError(f"PV does not answer OP beyond its noise in this {x.course}")
+        raise NotAssessedError(f"PV does not respond to OP beyond its noise in this {x.course}")
     trial, start_s = best.trial, x.first * record.dt_s
     blocks = trial.op.reshape(-1, trial.factor).mean(axis=1)
     return Modelled(

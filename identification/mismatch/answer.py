@@ -67,7 +67,7 @@ def answer(found: Explanation, s: Recording) -> Answer:
     at = located_in(found.p, found.best if found.left > 0 else found.plain, s)
     verdict, block = verdict_of(found, effects, lacking, bool(silent), at)
     if lacking and (verdict, block) == ("unexplained", "none"):
-        note = f"Not told: {lacking}."
+        note = f"Not identified: {lacking}."
     if effects:
         one_move = words.TOLD["one_move"] if found.unproven else open_gain_note(found, effects)
         caution = lacking or one_move

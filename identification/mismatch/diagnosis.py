@@ -65,7 +65,7 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
     inputs, usable = inputs_of(replace(s, pv=pv)), without_spikes(s.pv, s.usable, s.limits.recorder)
     clip = transmitter_end(recorder, pv)
     plain_loop = partial(prepared, inputs, pv - inputs.level, usable, brought, clip, s.limits)
-    tell("plain loop")
+    tell("baseline model")
     p, plain = plain_loop()
     found = Explanation(
         p,

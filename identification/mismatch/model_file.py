@@ -63,7 +63,7 @@ def constants(data: dict[str, Any]) -> Floats:
             c[place[name]] = float(value)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(
-            f"a model without {error}", "a file that `triage explain --save-model` wrote", "save it anew"
+            f"a model without {error}", "a file that `triage explain --save-model` wrote", "save it again"
         ) from error
     if not (c[Slot.T] > 0 and c[Slot.L] >= 0 and np.isfinite([c[Slot.T], c[Slot.L], c[Slot.K]]).all()):
         raise InputError(

@@ -72,7 +72,7 @@ def cycles_told(found: Explanation) -> str:
     """A sentence on the faulty valve that the cycles show."""
     seen = found.cycles
     assert seen is not None
-    between = "turns of OP" if seen.cycling else "moves of the stem"
+    between = "OP reversals" if seen.cycling else "moves of the stem"
     text = TOLD["cycles"].format(share=100 * seen.agreeing, stretches=seen.stretches, between=between)
     return text if found.proven.carries else f"{text} {TOLD['strays']}"
 
@@ -121,9 +121,9 @@ def place(feature: Mapping[str, Any]) -> str:
 def located_sentence(where: Mapping[str, Any]) -> str:
     """Location of the misfit in one sentence; empty if unknown."""
     features = where.get("features", [])
-    carrying = [place(f) for f in features if f["carries"]]
+    carrying = [place(f) if is_along(f) else f"located at {place(f)}" for f in features if f["carries"]]
     if carrying:
-        return f"Where it lives: {'; '.join(carrying[:3])}."
+        return f"Residual {'; '.join(carrying[:3])}."
     return TOLD["tied_to_nothing"] if features else ""
 
 

@@ -178,7 +178,7 @@ MISTAKES = (
     Mistake("dates written in two ways in one file", _mixed_dates, 0, "night 2026-03-02"),
     Mistake("a line of the historian above the header", _preamble, 0, "1 of 1 loops assessed"),
     Mistake("the export is packed as 7z", _packed, 2, "a 7z archive"),
-    Mistake("a workbook that is cut short", _xlsx, 2, "open it and save it anew"),
+    Mistake("a workbook that is cut short", _xlsx, 2, "open it and save it again"),
     Mistake("loops.csv given as the export", _loops_as_export, 2, "no time column"),
     Mistake("rank before run", _rank_before_run, 2, "run 'triage run EXPORT --store DIR' first"),
     Mistake("a time zone that does not exist", _wrong_zone, 2, "an IANA name such as Europe/Helsinki"),

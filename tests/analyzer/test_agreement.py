@@ -13,11 +13,11 @@ from analyzer.explain.words import TOLD, agreement
         ("valve", "backlash", "backlash", "valve", "agree"),
         ("valve", "undecided", "stiction", "valve", "agree"),
         ("valve", "backlash", "positioner", "valve", TOLD["beside_verdict"]["stroke"]),
-        ("valve", "stiction", "none", "none", "does not bear it out"),
-        ("valve", "stiction", "second-lag", "process", "does not bear it out"),
-        ("valve", "backlash", "quantization", "sensor", "neither bears out nor contradicts"),
-        ("load", "none", "backlash", "valve", "does not hold it"),
-        ("none", "none", "valve-characteristic", "valve", "does not hold it"),
+        ("valve", "stiction", "none", "none", "does not confirm it"),
+        ("valve", "stiction", "second-lag", "process", "does not confirm it"),
+        ("valve", "backlash", "quantization", "sensor", "neither confirms nor contradicts"),
+        ("load", "none", "backlash", "valve", "does not consider it"),
+        ("none", "none", "valve-characteristic", "valve", "does not consider it"),
     ],
 )
 def test_each_pair_has_its_sentence(cause: str, kind: str, verdict: str, block: str, told: str) -> None:

@@ -56,7 +56,7 @@ def test_right_model_does_as_well(asked: tuple[Explanation, Recording]) -> None:
     """The true model leaves the noise, 0.1 %, as the refitted plain loop does, and no unit is doubted."""
     own = judged(model(), *asked)
     assert own.held_out.rmse == pytest.approx(0.1, rel=0.1)
-    assert "it does as well as the plain loop" in own.note
+    assert "it is as good as the baseline model" in own.note
     assert "off" not in own.note
 
 

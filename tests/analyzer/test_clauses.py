@@ -23,10 +23,7 @@ def test_no_sentence_ends_before_a_semicolon(clauses: list[str | None]) -> None:
 
 def test_names_that_go_on_keep_their_dots() -> None:
     """An ellipsis at the end of a clause is no full stop."""
-    assert (
-        joined("it moves A, B ...", "", "OP rests at its limit.")
-        == "it moves A, B ...; OP rests at its limit"
-    )
+    assert joined("it moves A, B ...", "", "OP is at its limit.") == "it moves A, B ...; OP is at its limit"
 
 
 def test_no_maximum_sensitivity_is_told_of_an_unstable_loop() -> None:

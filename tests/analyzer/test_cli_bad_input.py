@@ -110,7 +110,7 @@ def test_a_column_that_stands_twice(tmp_path, command):
     """Two columns of one name are told by name."""
     text = frame().to_csv(index=False).replace("FIC1.OP", "FIC1.PV", 1)
     (tmp_path / "export.csv").write_text(text)
-    assert "column 'FIC1.PV' stands twice" in one_line(asked(command, tmp_path / "export.csv"))
+    assert "column 'FIC1.PV' occurs twice" in one_line(asked(command, tmp_path / "export.csv"))
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -281,7 +281,7 @@ def test_clock_running_backwards(tmp_path, order):
     told(asked("run", tmp_path / "export.csv"), 0)
     said = told(asked("check", tmp_path / "export.csv"), 0)
     expected = {
-        "newest first": "newest first and are turned round",
+        "newest first": "newest first and are reversed",
         "shuffled": "samples were out of order",
         "an hour twice": "samples repeat a stamp",
     }

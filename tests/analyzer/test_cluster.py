@@ -98,5 +98,5 @@ def test_no_scheduler_is_one_line(export, tmp_path):
     """An address at which nothing answers is told before anything is computed."""
     result = ran(export, tmp_path / "store", "--scheduler", "tcp://127.0.0.1:9")
     assert result.exit_code == 2
-    assert "no scheduler answers" in result.stderr
+    assert "no scheduler responds" in result.stderr
     assert "Traceback" not in result.output

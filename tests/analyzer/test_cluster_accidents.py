@@ -26,7 +26,7 @@ APART = 'mount --make-rprivate / && mount -t tmpfs none "$0" && exec "$@"'
 """A command that sees an empty disk in the place of a folder."""
 
 
-@pytest.mark.parametrize(("hung", "told"), [(False, "no workers"), (True, "the scheduler does not answer")])
+@pytest.mark.parametrize(("hung", "told"), [(False, "no workers"), (True, "the scheduler does not respond")])
 def test_a_cluster_that_does_nothing_is_told_and_left(tmp_path, monkeypatch, capsys, hung, told):
     """Without workers, or with a scheduler that hangs, a line says so and the run ends after the time stated, with
     --resume as what to do."""

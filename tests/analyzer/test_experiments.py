@@ -79,10 +79,10 @@ def test_check_and_tune_tell_the_experiment(bump):
     arguments = bump / "bump.csv", "--loops", bump / "loops.csv"
     checked = said("check", *arguments)
     assert "experiment 2026-05-04 08:00 to" in checked
-    assert "fit for a model from its experiments alone" in checked
+    assert "fit only for a model from its experiments" in checked
     tuned = said("tune", *arguments, "--loop", "T1")
     assert "SIMC with tau_c = dead time: kp" in tuned
-    assert "the experiment does not tell: the process outside of OP 38 to 45 %" in tuned
+    assert "not identified by the experiment: the process outside OP 38 to 45 %" in tuned
 
 
 def test_a_test_plan_names_size_levels_and_times(bump):
@@ -90,7 +90,7 @@ def test_a_test_plan_names_size_levels_and_times(bump):
     plan = said("test-plan", bump / "bump.csv", "--loops", bump / "loops.csv", "--loop", "T1")
     assert "step of OP:" in plan
     assert plan.count("→") == 4
-    assert "the gain within" in plan
+    assert "accuracy of the gain" in plan
 
 
 def test_op_at_zero_before_and_after_a_test_is_no_limit(tmp_path):

@@ -157,7 +157,7 @@ def test_loop_page_shows_the_explanation(store: Store) -> None:
     data = abstained(tag, evil) | {"verdict": "backlash", "block": "valve"}
     keep(store, name, [answer_row(data, name)])
     after = {p.title: p for p in night_pages.pages_of_night(store, name, 8)}
-    title = "What the plain loop lacks"
+    title = "Physics missing in the baseline model"
     assert title not in [s.title for s in before[tag].sections]
     section = next(s for s in after[tag].sections if s.title == title)
     assert isinstance(section.blocks[0], Text)

@@ -35,7 +35,7 @@ def test_each_kind_of_answer_has_a_whole_page(kind: str) -> None:
     page = pages.explanation_page(e)
     titles = [s.title for s in page.sections]
     assert titles[:2] == ["What it is", "Recording and simulation"]
-    assert {"Where the misfit lives", "How well it fits"} <= set(titles)
+    assert {"Where the misfit is", "How well it fits"} <= set(titles)
     assert any(isinstance(b, Trend) for b in blocks(page))
     assert any(isinstance(b, Panels) for b in blocks(page))
     text = render(page, True)
@@ -62,7 +62,7 @@ def test_page_of_play_shows_both_models_and_the_users(tmp_path: Path) -> None:
     size = {k: float(np.std(e.case.subject.pv - x)) for k, x in simulations(e).items()}
     assert size["model"] < size["baseline"] < size["brought"]
     fit = next(t for t in page.tables() if t.name == "fit")
-    assert [row[0].text for row in fit.rows] == ["plain loop", "improved loop", "your model"]
+    assert [row[0].text for row in fit.rows] == ["baseline model", "improved model", "your model"]
     assert "100 times off" in render(page, True)
     written = write_markdown([page], tmp_path)
     assert written[0].read_text().count("![") == len(list((tmp_path / f"{page.name}-pictures").iterdir()))

@@ -238,7 +238,7 @@ def test_a_second_export_of_a_night_adds_its_loops(export, whole, tmp_path):
     assert ran(first, store).exit_code == 0
     told = ran(second, store)
     assert told.exit_code == 0
-    assert "16 loops of an earlier run are kept beside these" in told.stderr
+    assert "16 loops of an earlier run are also kept" in told.stderr
     assert tables(store) == whole
 
 

@@ -62,7 +62,7 @@ def test_three_at_most_by_what_they_gain() -> None:
     ]
     found = first_things(rows)
     assert [text.split(":")[0] for text in found] == [
-        "See why OP of D rests at its limit",
+        "Find out why OP of D is at its limit",
         "Type new settings into A",
         "Check the measurement of C",
     ]
@@ -83,7 +83,7 @@ def test_what_is_not_stated_is_not_compared() -> None:
     rows = [row("A", 9.0, **ask), row("B", 5.0, **ask, kp=None), row("C", 4.0, **ask, ti=None)]
     assert first_things(rows) == (
         "Compare the settings of A with loops.csv: the trends show others.",
-        "State Kp and Ti of B and C in loops.csv, as their controllers have them: new settings wait for that.",
+        "State Kp and Ti of B and C in loops.csv, as their controllers have them: new settings need them.",
     )
 
 
@@ -123,4 +123,4 @@ def test_a_loop_that_swings_from_limit_to_limit_is_not_sent_to_the_valves_size()
     still = row("TIC2", 0.0, action="check limit", lanes="at limit")
     said = first_things([tight, still])
     assert said[0].startswith("Halve the gain of CH3 or go to manual")
-    assert said[1] == "See why OP of TIC2 rests at its limit: valve size, or what feeds it."
+    assert said[1] == "Find out why OP of TIC2 is at its limit: valve size, or its supply."

@@ -105,4 +105,4 @@ def test_a_current_is_no_percent(tmp_path, other, stated, told):
     asked = ["check", str(tmp_path / "x.csv"), "--loops", str(tmp_path / "loops.csv")]
     said = CliRunner().invoke(main, asked, catch_exceptions=False).output
     assert ("like mA" in said) == told
-    assert ("without them nothing is told in % of OP" in said) == told
+    assert ("without them nothing is reported in % of OP" in said) == told

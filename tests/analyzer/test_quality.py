@@ -199,7 +199,7 @@ def test_missing_set_point_is_estimated_and_said():
 
 def test_missing_op_is_said():
     """Without OP the record says that no cause can be told."""
-    assert "no OP recorded: no cause can be told" in ready(op=None).notes
+    assert "no OP recorded: no cause can be identified" in ready(op=None).notes
 
 
 def test_range_not_stated_is_the_recorded_one_and_said():

@@ -40,14 +40,14 @@ def test_its_valve_is_not_blamed(grip: float) -> None:
     assert found.verdict.cause in ("undecided", "none")
     assert found.verdict.needs is not None
     assert found.verdict.needs.lack is MissingData.FINER
-    assert "stands" in str(found.verdict.needs)
+    assert "is constant for" in str(found.verdict.needs)
 
 
 def test_a_sound_sensor_is_not_doubted() -> None:
     """The same loop with a sensor that follows lacks nothing."""
     found = assess(prepared(behind_a_sticking_sensor(0.0, 3)), HEALTHY.controller, CONFIG)
     assert found.verdict.cause == "none"
-    assert found.verdict.needs is None or "stands" not in str(found.verdict.needs)
+    assert found.verdict.needs is None or "is constant for" not in str(found.verdict.needs)
 
 
 def test_held_over_values_of_a_gap_do_not_stand_as_a_sensor_does() -> None:

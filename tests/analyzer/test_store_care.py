@@ -162,7 +162,7 @@ def test_a_damaged_version_tells_of_the_nights(store: Store, text: str) -> None:
     (store.path / store_module.VERSION_FILE).write_text(text)
     result = asked("rank", store.path)
     assert result.exit_code == 2
-    assert "5 nights, 2026-03-02 to 2026-03-06, stand as they were" in result.stderr
+    assert "5 nights, 2026-03-02 to 2026-03-06, are unchanged" in result.stderr
     assert "delete" not in result.stderr
     right = '{"schema": 2}'
     assert f"write {right} into it" in result.stderr
@@ -183,7 +183,7 @@ def test_what_is_left_over_is_found_and_pruned(store: Store) -> None:
     for path in (old, young):
         path.write_bytes(b"x")
     os.utime(old, (time.time() - 2 * 86_400,) * 2)
-    assert sum("left over" in p.seen for p in problems(store)) == 2
+    assert sum("remains of a process" in p.seen for p in problems(store)) == 2
     assert asked("store", "prune", store.path, "--keep", "400d").exit_code == 0
     assert (old.exists(), young.exists()) == (False, True)
 

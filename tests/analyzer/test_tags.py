@@ -88,7 +88,7 @@ def test_a_table_from_a_european_spreadsheet(tmp_path: Path, encoding: str) -> N
         ("loop,ti_unit\nF1,hours\n", ["column 'ti_unit'", "s, min, repeats/min"]),
         ("loop,pv_lo,pv_hi\nF1,100,0\n", ["row 2", "pv_lo 100.0 and pv_hi 0.0", "pv_hi above pv_lo"]),
         ("loop,pv_lo,pv_hi\nF1,0,\n", ["row 2", "both or neither"]),
-        ("loop,kp,kp\nF1,1,2\n", ["'kp' stands twice"]),
+        ("loop,kp,kp\nF1,1,2\n", ["'kp' occurs twice"]),
         ("loop,kp\n,1\n", ["row 2", "no loop name"]),
     ],
 )

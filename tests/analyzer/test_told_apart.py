@@ -33,7 +33,7 @@ def test_a_load_is_told_where_it_is_likely(loaded, pct, cause):
     told = resolve_ambiguity(verdict, made, counting(found.oscillations), CONFIG)
     assert told.cause == cause
     assert (told.needs is not None and told.needs.lack is MissingData.MANUAL_TEST) == (cause == "undecided")
-    assert told.needs is None or f"by {pct:.0f} % alone" in str(told.needs)
+    assert told.needs is None or f"only with {pct:.0f} %" in str(told.needs)
 
 
 def test_no_tuning_is_told_against_its_own_sensitivity(loaded):

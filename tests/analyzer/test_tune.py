@@ -147,7 +147,7 @@ def test_healthy_loop_is_left_alone(tmp_path):
     sound = Sketch("none", (1.4, 90.0, 10.0), 0.8, 120.0, load_std=0.02, noise=0.02)
     out = clean(asked(tmp_path, simulate(sound, 1.0), "0.8,120,0,100"), 0)
     assert "action: none" in out
-    assert "not in trouble" in out
+    assert "No fault found" in out
 
 
 def flat(n: int, **trends: np.ndarray) -> Trends:

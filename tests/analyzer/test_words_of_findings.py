@@ -118,4 +118,4 @@ def test_a_piece_keeps_figures_and_gives_the_same_night() -> None:
     again = finding_of(piece)
     assert (again.signs, again.lacking) == (FOUND.signs, FOUND.lacking)
     assert night_row(again) == night_row(FOUND)
-    assert "needs PV as measured; it stands for 98 % of the samples" in night_row(again)["reason"]
+    assert "needs PV as measured; it is constant for 98 % of the samples" in night_row(again)["reason"]

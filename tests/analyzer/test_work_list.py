@@ -77,8 +77,7 @@ def test_the_nights_since_are_held_against_those_before() -> None:
     ]
     said = said_since(done, both)
     assert (
-        said
-        == "2 nights: cured, oscillates in none, average absolute error \u221250 %, valve travel \u221250 %"
+        said == "2 nights: no longer oscillates, average absolute error \u221250 %, valve travel \u221250 %"
     )
     assert said_since(work_on([Note("A", 1.0, "seen")]), both) == ""
     assert said_since(done, sides(rows[:3], "2026-03-04")) == "no night since"

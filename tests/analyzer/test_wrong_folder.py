@@ -96,7 +96,7 @@ def test_a_store_has_one_clock(kept: Path, tmp_path: Path) -> None:
     before = tables(store)
     told = ran(next_day, store, "--timezone", "Europe/Helsinki")
     assert told.exit_code == 2
-    assert "say --timezone UTC" in told.stderr
+    assert "state --timezone UTC" in told.stderr
     assert tables(store) == before
     assert ran(next_day, store).exit_code == 0
     alone = Path(shutil.copytree(kept, tmp_path / "alone"))

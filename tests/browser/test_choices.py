@@ -19,7 +19,7 @@ def test_loops_chosen_in_the_table_are_laid_on_one_time_axis(browser: Any, folde
     for box in browser.find_elements(By.CSS_SELECTOR, "#worst tbody input[type=checkbox]")[:2]:
         box.click()
     button = browser.find_element(By.CSS_SELECTOR, ".tools[data-for=worst] button")
-    assert button.text == "Lay 2 beside each other"
+    assert button.text == "Show 2 side by side"
     button.click()
     wait(
         browser,

@@ -64,3 +64,31 @@ def test_the_newest_changes_are_checked(tmp_path: Path) -> None:
     ):
         log.write_text(text, encoding="utf-8")
         assert checked(tmp_path).returncode == status
+
+
+def test_printed_texts_are_checked(tmp_path: Path) -> None:
+    """A banned phrase in a value of a TOML file, also over two lines, is found with its name; keys and comments
+    are not read."""
+    (tmp_path / "README.md").write_text(PLAIN, encoding="utf-8")
+    (tmp_path / "tuning").mkdir()
+    for file, text, found in (
+        ("reasons.toml", '# What is told.\n[told]\nplay = "Valve backlash."\n', []),
+        (
+            "reasons.toml",
+            '[valve]\nsize = """The cause hangs \\\n    on it."""\n',
+            ["valve.size: 'hangs on'"],
+        ),
+        (
+            "limits.toml",
+            '[gain.least]\nrange = [1, 2]\nmeaning = "Left over"\n',
+            ["gain.least.meaning: 'Left over'"],
+        ),
+        ("limits.toml", '[[column]]\nkey = "told"\ntitle = "It is told"\n', ["column.0.title: 'told'"]),
+    ):
+        (tmp_path / "tuning" / file).write_text(text, encoding="utf-8")
+        lines = checked(tmp_path).stdout.splitlines()
+        assert len(lines) == len(found), lines
+        assert all(
+            line.startswith(f"tuning/{file}: {part}") for line, part in zip(lines, found, strict=True)
+        ), lines
+        (tmp_path / "tuning" / file).unlink()

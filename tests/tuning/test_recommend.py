@@ -271,7 +271,7 @@ def test_abstentions_say_why():
     """A wrong sign, a valve of unknown size and an unknown cause are refused in words."""
     assert recommend(replace(STUDY, controller=Pid(-1, 10)), "valve").action == "check settings"
     assert "wrong way" in recommend(replace(STUDY, controller=Pid(-1, 10)), "valve").reason
-    assert "size is needed" in recommend(replace(STUDY, valve=None), "valve").reason
+    assert "settings need a size" in recommend(replace(STUDY, valve=None), "valve").reason
     with pytest.raises(ValueError, match="cause is one of"):
         recommend(STUDY, "gremlins")
     with pytest.raises(ValueError, match="1 of its 5000 values"):

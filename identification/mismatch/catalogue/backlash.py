@@ -3,27 +3,28 @@
 from identification.mismatch.effect import Block, Effect, Friction, Param, Slot, Variant, each
 from identification.mismatch.pictures import stem_over_op
 
-PLAY = Param(Slot.STICKBAND, "backlash_pct", "% OP", 1e-4, 2.0, "op", True, title="Play, full width")
+PLAY = Param(Slot.STICKBAND, "backlash_pct", "% OP", 1e-4, 2.0, "op", True, title="Backlash, full width")
 
 EFFECT = Effect(
     name="backlash",
     block=Block.VALVE,
-    sentence="After each turn of OP the valve waits through a play of {backlash_pct}: check the linkage.",
+    sentence="After each OP reversal the valve waits through a backlash of {backlash_pct}: check the linkage.",
     check="Look at linkage, actuator and positioner feedback; stroke the valve both ways in small steps.",
     tests={
         "stiction": (
-            "A slow ramp of OP in manual, then back: after the turn play lets PV go gently, stiction in jumps."
+            "A slow ramp of OP in manual, then back: after the reversal PV starts gently with backlash, "
+            "in jumps with stiction."
         ),
         "positioner": (
-            "A slow ramp of OP and back, with the stem recorded: a dead band holds at every stop, "
-            "play after turns."
+            "A slow ramp of OP and back, with the stem recorded: a dead band acts at every stop, "
+            "backlash after reversals."
         ),
         "second-lag": (
-            "Two steps of OP in the same direction: play holds up the first after a turn alone, a lag"
-            " holds up both."
+            "Two steps of OP in the same direction: backlash delays only the first after a reversal, a lag"
+            " delays both."
         ),
-        "direction-asymmetry": "Two moves on in one direction: play is taken up by the first.",
-        "controller-gap": "Whether OP itself stands still: then it is the controller and not the valve.",
+        "direction-asymmetry": "Two more moves in one direction: the first takes up the backlash.",
+        "controller-gap": "Whether OP itself is constant: then it is the controller and not the valve.",
     },
     friction=Friction.PLAY,
     curve=stem_over_op,

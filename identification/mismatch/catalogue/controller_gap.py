@@ -22,16 +22,16 @@ def gap_profile(found: Finding, s: Recording, _: Floats) -> Picture | None:
     held = count >= FEWEST_IN_CLASS
     middle = 0.5 * (edges[1:] + edges[:-1])
     curve = Drawn("recorded", middle[held], 100.0 * stood[held] / count[held])
-    x, y = Axis("size of SP − PV", "%"), Axis("OP stands still", "% of samples")
+    x, y = Axis("size of SP − PV", "%"), Axis("OP constant", "% of samples")
     return Picture("curve", x, y, (curve,), (width,))
 
 
 EFFECT = Fault(
     name="controller-gap",
     block=Block.CONTROLLER,
-    sentence="The controller stands still while the error is under {gap_pct}.",
+    sentence="The controller does not act while the error is under {gap_pct}.",
     check="Look for a dead band or gap action in the controller's configuration.",
-    caption="A plain controller moves OP at every error; under the gap it stands still.",
+    caption="A controller without a gap moves OP at every error; with a gap it does not act below it.",
     numbers=lambda found, _: {"gap_pct": within(0.2, found.values["gap_pct"], "% PV")},
     titles={"gap_pct": "Gap"},
     drawn=gap_profile,

@@ -33,10 +33,10 @@ def few_periods(d: Drawing) -> Picture:
 EFFECT = Effect(
     name="load-oscillation",
     block=Block.LOAD,
-    sentence="An outside oscillation with a period of {period_s} enters the loop.",
+    sentence="An external oscillation with a period of {period_s} enters the loop.",
     check="Look upstream for a loop or machine that runs at that period.",
     tests={
-        "stiction": "Put the loop in manual: an outside oscillation goes on, a sticking valve's ends.",
+        "stiction": "Put the loop in manual: an external oscillation continues, a sticking valve's ends.",
         "coupling": "The other loop in manual for a few periods.",
     },
     needs="line",

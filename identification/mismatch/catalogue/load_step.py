@@ -22,7 +22,7 @@ EFFECT = Effect(
     name="load-step",
     block=Block.LOAD,
     sentence="A load came in as a step ({size}); neither OP nor SP caused it.",
-    check="Ask what was switched at that time.",
+    check="Find out what was switched at that time.",
     tests={
         "gain-drift": "A step of OP after the event: a load moved the bias, a drift the gain.",
         "controller-logic": "The controller's event log at that time.",

@@ -13,7 +13,7 @@ EFFECT = Effect(
     name="second-lag",
     block=Block.PROCESS,
     sentence="Something adds a lag of {second_lag_s}; the transmitter's damping would look the same.",
-    check="Ask what lies between valve and transmitter; look at the transmitter's damping.",
+    check="Find out what is between valve and transmitter; look at the transmitter's damping.",
     tests={
         "sensor-lag": (
             "Nothing in SP, PV and OP does: a hand-held gauge or the transmitter's damping setting; "
@@ -22,8 +22,8 @@ EFFECT = Effect(
         "inverse-response": "One clean step of OP in manual, sampled at a tenth of the lag or faster.",
         "slow-mode": "A step of OP held for five of the longer time constants.",
         "rate-limit": "A step of OP twice as large: a slewing valve takes twice as long, a lag does not.",
-        "positioner": "A recorded stem position; or steps of OP of several sizes, for a lag scales.",
-        "clock-offset": "The controller: does OP answer PV before PV moves?",
+        "positioner": "A recorded stem position; or steps of OP of several sizes, because a lag scales.",
+        "clock-offset": "The controller: does OP respond to PV before PV moves?",
     },
     indistinguishable=("sensor-lag",),
     curve=lambda d: pv_response(d, faster=Slot.T2),

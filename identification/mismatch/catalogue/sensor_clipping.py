@@ -42,9 +42,9 @@ def range_end(found: Finding, s: Recording, free: Floats) -> Picture:
 EFFECT = Fault(
     name="sensor-clipping",
     block=Block.SENSOR,
-    sentence="PV stops at {clip_pct} while OP goes on: the transmitter's range ends there.",
+    sentence="PV stops at {clip_pct} while OP continues: the transmitter's range ends there.",
     check="Widen the transmitter's range, or keep SP inside it.",
-    caption="PV stands at the end of its range while the model goes on beyond it.",
+    caption="PV stays at the end of its range while the model moves beyond it.",
     order=3,
     find=clipped,
     censors=True,

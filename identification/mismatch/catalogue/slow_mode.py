@@ -10,7 +10,7 @@ EFFECT = Effect(
     name="slow-mode",
     block=Block.PROCESS,
     sentence="A share of {slow_share} of each move arrives late, with a time constant of {slow_time_constant_s}.",
-    check="Ask which mass or recycle warms or fills slowly; tune for the fast part.",
+    check="Find out which mass or recycle warms or fills slowly; tune for the fast part.",
     tests={
         "gain-drift": "Steps of both signs: a slow mode creeps with the step, drift does not know its sign.",
         "load-step": "The same step again: a slow mode comes back with it, a load does not.",

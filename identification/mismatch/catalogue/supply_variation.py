@@ -14,12 +14,12 @@ ADDED = 1e4
 EFFECT = Effect(
     name="supply-variation",
     block=Block.LOAD,
-    sentence="The supply to the valve wanders and changes gain and bias together.",
+    sentence="The supply to the valve varies and changes gain and bias together.",
     check="Look at the supply's pressure or temperature over the same hours.",
     tests={
         "gain-drift": "A longer recording: a supply comes back, fouling does not; other loops show it too.",
         "load-step": "The supply's own pressure or temperature trend.",
-        "coupling": "The supply's own trend beside the other loop's OP.",
+        "coupling": "The supply's own trend next to the other loop's OP.",
     },
     timed=True,
     needs="moves",

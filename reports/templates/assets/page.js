@@ -395,7 +395,7 @@
     const chosen = () => boxes.filter((b) => b.checked).map((b) => encodeURIComponent(b.value));
     function told() {
       const count = chosen().length;
-      button.textContent = count ? "Lay " + count + " beside each other" : "Choose loops to lay beside each other";
+      button.textContent = count ? "Show " + count + " side by side" : "Choose loops to show side by side";
       button.disabled = count < 2 || count > 6;
     }
     button.type = "button";

@@ -66,8 +66,8 @@ def test_one_command_makes_them_anew_and_check_sees_where_they_differ(tmp_path: 
     other = store.read("beliefs", "2026-03-08").slice(0, 0)
     store.write("beliefs", "2026-03-08", other)
     assert [p.seen.rsplit("/", 1)[1] for p in unfounded(store, CONFIG)] == [
-        "2026-03-05.parquet: not what the nights say",
-        "2026-03-08.parquet: not what the nights say",
+        "2026-03-05.parquet: inconsistent with the nights",
+        "2026-03-08.parquet: inconsistent with the nights",
     ]
     settle_anew(store, CONFIG)
     assert believed(store) == first

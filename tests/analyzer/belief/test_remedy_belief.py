@@ -35,7 +35,7 @@ def test_the_spread_between_nights_stands_beside_the_settings() -> None:
     """The advice says what nights have advised, and of which the pair is that is held."""
     rows = [row(k, WORN, ti_new=x, witness=witness(2.0, 60.0)) for k, x in enumerate((400.0, 500.0, 450.0))]
     advice = told(followed(rows)[-1], rows[-1])["advice"]
-    assert advice == "slower 3 nights advise Kp 0.8 to 0.8 and Ti 400 to 500 s; that of 2026-03-04 is held."
+    assert advice == "slower 3 nights advise Kp 0.8 to 0.8 and Ti 400 to 500 s; that of 2026-03-04 is kept."
 
 
 def test_advice_follows_where_the_nights_have_moved_for_good() -> None:

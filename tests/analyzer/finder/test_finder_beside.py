@@ -72,4 +72,4 @@ def test_a_draft_names_them() -> None:
     assert row.sure
     assert (row.spec.pv, row.spec.op, row.spec.sp) == ("T9", "T10", "T8")
     assert (row.spec.position, row.spec.mode) == ("T11", "M")
-    assert "stands still in one value of M alone" in row.says
+    assert "is constant only in one value of M" in row.says

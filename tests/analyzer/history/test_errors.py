@@ -30,9 +30,9 @@ ROW = "2024-11-21 08:00:00"
         (b"1,2,3\n4,5,6\n", ["no header"]),
         (
             f"timestamp,comment\n{ROW},\n".encode().replace(b",comment", b","),
-            ["no values beside", "'timestamp'"],
+            ["no values next to", "'timestamp'"],
         ),
-        (f"timestamp,a,b,a\n{ROW},1,2,3\n".encode(), ["column 'a' stands twice"]),
+        (f"timestamp,a,b,a\n{ROW},1,2,3\n".encode(), ["column 'a' occurs twice"]),
         (b"timestamp,FIC1.PV\n", ["a header and no rows"]),
         (
             b"timestamp,FIC1.PV\nsoon,1\nlater,2\n",

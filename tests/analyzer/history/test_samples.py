@@ -157,7 +157,7 @@ def test_the_hour_that_spring_leaves_out(tmp_path: Path) -> None:
     text = "\n".join(["time,a", *rows]) + "\n"
     export, series = read(tmp_path / "x.csv", text, ReadOptions(timezone="Europe/Berlin"))
     np.testing.assert_array_equal(series.stamp_s, index.as_unit("s").asi8)
-    assert any(note.startswith("1 samples stand in the hour") for note in export.notes)
+    assert any(note.startswith("1 samples are in the hour") for note in export.notes)
 
 
 def test_stamps_with_an_offset_need_no_zone(tmp_path: Path) -> None:

@@ -38,7 +38,7 @@ def test_output_that_pv_does_not_answer_is_an_abstention() -> None:
     rng = np.random.default_rng(3)
     deaf = replace(s, pv=50 + noise(77), op=50 + np.cumsum(rng.normal(0, 0.2, s.pv.size)))
     found = plainly(deaf)
-    assert "needs moves of OP that PV answers" in unanswered(found)
+    assert "needs moves of OP to which PV responds" in unanswered(found)
     said = answer(found, deaf)
     assert (said.verdict, said.block) == ("unexplained", "none")
     assert "without OP the fit is as good" in said.note

@@ -82,7 +82,7 @@ def test_coarse_grid_does_not_hide_a_jump() -> None:
     said = told(recorded(1, 0.3, 0.2, seen_valve()))
     assert said.verdict in ("stiction", "backlash")
     assert [e.name for e in said.effects][-1] == "quantization"
-    assert "stretches between turns of OP" in said.shown
+    assert "stretches between OP reversals" in said.shown
 
 
 def test_grid_alone_is_named_where_the_valve_is_free() -> None:

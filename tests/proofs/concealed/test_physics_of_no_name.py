@@ -25,7 +25,7 @@ def test_gain_that_remembers_is_told_in_words() -> None:
     assert said.outside.name == "gain-with-history"
     assert said.outside.parameters["recall"].value == pytest.approx(1.2, rel=0.2)
     assert said.outside.parameters["recall_s"].value == pytest.approx(900.0, rel=0.2)
-    assert "where PV has been over the last" in reason(said)
+    assert "depends on PV's past over the last" in reason(said)
 
 
 def test_load_that_pv_switches_is_told_in_words() -> None:
