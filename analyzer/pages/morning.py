@@ -108,7 +108,8 @@ def _night_tiles(night: ShownNight) -> Tiles:
     items = [(f"{len(assessed)} of {len(night.rows)}", "loops assessed", "")]
     items.append((str(sum(oscillates(r) for r in assessed)), "oscillate", "worse"))
     items += [(str(causes.count(c)), f"caused by {c}", c) for c in CAUSES]
-    items.append((str(causes.count(Cause.UNDECIDED)), "undecided", "unclear"))
+    unknown = [r for r in assessed if r["cause"] == Cause.UNDECIDED and oscillates(r)]
+    items.append((str(len(unknown)), "undecided", "unclear"))
     return Tiles(tuple(items))
 
 

@@ -70,6 +70,8 @@ def test_a_night_in_manual_with_a_bump_test_has_model_and_settings(bump, tmp_pat
     said("pages", tmp_path / "s", "--out", tmp_path / "p")
     (page,) = (tmp_path / "p").glob("T1-*.html")
     assert "Experiments" in page.read_text()
+    morning = (tmp_path / "p" / "index.html").read_text()
+    assert "<b>0</b> <span>undecided" in " ".join(morning.split()).replace("</b><span>", "</b> <span>")
     beliefs = pd.read_parquet(next((tmp_path / "s").rglob("*beliefs*")))
     assert json.loads(beliefs["constants"][0])["gain"][0] == pytest.approx(1.2, rel=0.05)
 
