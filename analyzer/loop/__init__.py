@@ -1,1 +1,1 @@
-"""One loop over one span: what is fit for use, what oscillates, why, and what to do."""
+"""One loop over one span: usable samples, oscillations, their cause, and the action."""

@@ -1,7 +1,7 @@
-"""Which action is chosen where several are asked for: the one place that says what outranks what.
+"""Choice of the action if several apply: the one place with their order of precedence.
 
-An assessment advises by itself (analyzer/loop/advice.py). What its lanes ask for, the loop that it hangs on, and the
-nights since its settings were changed may each outrank that; analyzer/words/orders.py says what to do.
+An assessment gives its own advice (analyzer/loop/advice.py). Its lanes, the loop that it follows, and the nights
+since its settings were changed may each replace that; analyzer/words/orders.py words the action.
 """
 
 from __future__ import annotations
@@ -14,30 +14,30 @@ from analyzer.loop.decisions import Action, Cause, Due, Finding, Lane, MissingDa
 ACTING = (Action.RETUNE, Action.REPAIR_VALVE)
 """Actions that change a loop."""
 OPEN = (None, Action.NEEDS_DATA, Action.UNDECIDED)
-"""Actions in whose place settings from an experiment are proposed."""
+"""Actions that settings from an experiment replace."""
 FIRST = (Action.CHECK_MEASUREMENT, Action.CHECK_SETTINGS, Action.CHECK_LIMIT)
-"""What is done in the night that finds it: no settings of other nights hold where these are not known."""
+"""Actions taken in the night that finds them: settings of other nights are not valid while these are open."""
 AGAINST = {
     Cause.VALVE: (Action.REPAIR_VALVE, Action.CHECK_SETTINGS),
     Cause.TUNING: (Action.NEEDS_DATA, Action.CHECK_SETTINGS),
 }
-"""What is done against a cause where no settings are, the first unless the nights vote for another of them."""
+"""Actions against a cause if there are no settings, the first unless the nights vote for another of them."""
 NOTHING_SURER = (None, Action.NONE, Action.NEEDS_DATA, Action.CHECK_SETTINGS)
-"""Actions in whose place a doubtful measurement is looked at first: what rests on it is doubtful too."""
+"""Actions that a check of a doubtful measurement replaces: results based on it are doubtful too."""
 NOTHING_ELSE = (Action.NONE, Action.UNDECIDED)
-"""Actions in whose place it is found out what holds OP at its limit."""
+"""Actions that a check of the cause of OP at its limit replaces."""
 OF_LACK = {MissingData.MANUAL_TEST: Action.UNDECIDED, MissingData.SWITCHES: Action.NONE}
-"""What is done about a record that lacks something, where that is not to get more data."""
+"""Actions for missing data other than to get more data."""
 
 
 def for_lack(lack: MissingData | None) -> Action:
-    """What is done about a record that lacks something for an answer or for settings."""
+    """Action for a record with missing data for an answer or for settings."""
     return OF_LACK.get(lack, Action.NEEDS_DATA) if lack is not None else Action.NEEDS_DATA
 
 
 def decided(found: Finding, doubtful: bool) -> Finding:
-    """A finding whose lanes are known, with the action of all that is known of its night; doubtful, whether its lanes
-    ask for a look at the measurement."""
+    """A finding with known lanes, and the action from all data of its night; doubtful, whether its lanes require a
+    check of the measurement."""
     action, lanes = found.remedy.action, found.lanes
     if found.status is Status.NOT_ASSESSED and action is None:
         action = Action.NEEDS_DATA
@@ -60,10 +60,10 @@ def of_nights(
     voted: Action | None,
     settled: Action,
 ) -> tuple[Action | None, Due | None]:
-    """What is done about a loop that cycles, by all nights, and when a repair is due.
+    """Action for a loop that cycles, from all nights, and the due time of a repair.
 
     cause, the one that the nights name; worn, whether its valve is; own, cause, action and due of the night by
-    itself; voted, the action that the nights hold; settled, what is done where they name no cause.
+    itself; voted, the action of the nights' vote; settled, the action if they name no cause.
     """
     own_cause, own_action, own_due = own
     if own_action in FIRST or own_due is Due.SHUTDOWN:
@@ -81,11 +81,11 @@ def of_nights(
 
 
 def of_votes(votes: Mapping[Action, float]) -> Action:
-    """What is done where no cause is named: that which most nights lacked something, or that their signs disagree."""
+    """Action if no cause is named: more data if most nights had missing data, else undecided: signs disagree."""
     lacking, disagreeing = (votes.get(a, 0.0) for a in (Action.NEEDS_DATA, Action.UNDECIDED))
     return Action.NEEDS_DATA if lacking > disagreeing else Action.UNDECIDED
 
 
 def is_urgent(action: Action | None, due: Due | None) -> bool:
-    """Whether a worn valve's loop is to be touched before the next shutdown."""
+    """Whether the loop of a worn valve needs action before the next shutdown."""
     return action is Action.RETUNE or (action is Action.REPAIR_VALVE and due is Due.NOW)

@@ -1,4 +1,4 @@
-"""What to do about a flagged loop: its identified model and settings, handed to the tuning package."""
+"""Advice on a flagged loop: the tuning package's result for its identified model and settings."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ from tuning.recommend import WITHOUT_SETTINGS, Proposal, recommend
 from tuning.search import Case, rounded
 
 SAID = sentences("settings")
-"""What is said of settings that are given, or that are not."""
+"""Sentences about settings that are given, or withheld."""
 
 
 @dataclass(frozen=True, slots=True)
 class Advice:
     """A proposal in the loop's own units.
 
-    action as in the ranking, None where none was sought; reason in words, empty where the finding says it all;
+    action as in the ranking, None if none was searched for; reason in words, empty if the finding is sufficient;
     kp_new and ti_new in the units and form that loops.csv states, None unless action is retune; before and after, the
-    limit cycles that simulation finds at the present and at the new settings, None where there is none; lack, what
-    the record lacks where the action is to get more data; due, when a valve's repair is; compared, present, new and
-    textbook settings on the load, None where no settings were sought.
+    limit cycles in simulation at the present and at the new settings, None if there is none; lack, the missing data
+    if the action is to get more data; due, due time of a valve's repair; compared, present, new and textbook settings
+    on the load, None if no settings were searched for.
     """
 
     action: Action | None
@@ -61,8 +61,8 @@ class Advice:
 
 @dataclass(frozen=True, slots=True)
 class Proposed:
-    """A proposal, the loop and load [% PV] that it was sought on, None where none was sought, what else the loop
-    may be, and the loops alike of tuning.search.bench."""
+    """A proposal, its loop and load [% PV], None if no search was made, the other possible loops, and the loops alike
+    of tuning.search.bench."""
 
     proposal: Proposal
     loop: Loop | None = None
@@ -72,7 +72,7 @@ class Proposed:
 
 
 def model_of(verdict: Verdict, controller: Pid) -> Loop:
-    """The closed loop that a verdict's model and the settings make."""
+    """The closed loop of a verdict's model and the settings."""
     fit = verdict.fit
     if verdict.cause is Cause.VALVE:
         return Loop(fit.process, controller, fit.valve.valve)
@@ -90,14 +90,14 @@ def advise(
     """The advice on one assessed loop.
 
     controller, its stated settings in percent and seconds; pv_span, span of PV in its own unit, for settings in
-    engineering units; held, settings that nights before have told, which are then compared with the present ones.
+    engineering units; held, settings reported by earlier nights, which are then compared with the present ones.
     """
     kept, oscillation = withheld(found, spec, controller, pv_span, config), counting(found.oscillations)
     if not found.op_scaled and found.for_settings is not None:
         return _unscaled(kept, found.for_settings)
     if kept is not None:
         return kept
-    assert controller is not None  # of others it is told why none are sought
+    assert controller is not None  # else `withheld` has given the reason
     assert oscillation is not None
     proposed = propose(found.verdict, controller, oscillation.period_s, config)
     proposal = proposed.proposal
@@ -115,7 +115,7 @@ def advise(
 def advise_if_sluggish(
     found: Assessment, advice: Advice, prepared: Prepared, spec: LoopSpec, controller: Pid, config: Config
 ) -> Advice:
-    """The advice on a calm loop of which nothing else is to be said: faster settings where it is sluggish."""
+    """The advice on a calm loop without other findings: faster settings if it is sluggish."""
     calm = counting(found.oscillations) is None and found.verdict.cause is Cause.NONE
     if advice.action is not Action.NONE or not calm or found.outdated or found.settings is not None:
         return advice
@@ -132,7 +132,7 @@ def advise_if_sluggish(
 def with_controller_told(
     found: Assessment, spec: LoopSpec, stated: Pid | None, prepared: Prepared
 ) -> Assessment:
-    """The assessment with a note on what the record shows of the controller and loops.csv does not state."""
+    """The assessment with a note on properties of the controller in the record that loops.csv does not state."""
     if found.scheduled_over is not None:
         said = SAID["scheduled"].format(found.scheduled_over.upper())
         return replace(found, notes=(*found.notes, said))
@@ -147,7 +147,7 @@ def with_controller_told(
 
 
 def on_recorded(advice: Advice, found: Assessment, spec: LoopSpec, pv_span: float) -> Advice:
-    """Advice on a loop without stated settings: new ones are said to rest on those recorded."""
+    """Advice on a loop without stated settings: its reason states that new ones are based on the recorded ones."""
     if found.shown is None or advice.kp_new is None:
         return advice
     followed = of_controller(found.shown, spec, pv_span)
@@ -155,26 +155,26 @@ def on_recorded(advice: Advice, found: Assessment, spec: LoopSpec, pv_span: floa
 
 
 def _unscaled(kept: Advice | None, needs: Requirement) -> Advice:
-    """What is left to do where OP is not in percent: a valve is stroked all the same, else the range is stated."""
+    """Advice if OP is not in percent: a stroke test of a faulty valve nevertheless, else a request for the range."""
     if kept is not None and kept.action is Action.REPAIR_VALVE:
         return replace(kept, reason=str(needs), lack=needs.lack)
     return _lacking(needs)
 
 
 def _or_repair(verdict: Verdict, other: Advice) -> Advice:
-    """What is left to do where new settings lack something: a valve at fault is one all the same."""
+    """Advice if data for new settings are missing: a faulty valve needs repair nevertheless."""
     return Advice(Action.REPAIR_VALVE, other.reason) if verdict.cause is Cause.VALVE else other
 
 
 def _lacking(needs: Requirement) -> Advice:
-    """The advice to get more data, or a test where no data tell, with what is lacking."""
+    """The advice to get more data, or a test if no data suffice, with the missing data."""
     return Advice(action.for_lack(needs.lack), str(needs), lack=needs.lack)
 
 
 def withheld(
     found: Assessment, spec: LoopSpec, controller: Pid | None, pv_span: float, config: Config
 ) -> Advice | None:
-    """Why no settings are sought for a loop, and what to do instead; None where they are sought."""
+    """Reason and advice if no settings are searched for; None if they are."""
     verdict = found.verdict
     if verdict.dead:
         return Advice(Action.REPAIR_VALVE)
@@ -205,14 +205,14 @@ def withheld(
 
 
 def _slip(found: Assessment, spec: LoopSpec, pv_span: float) -> str:
-    """Which unit or form makes the stated figures those recorded, '' where none does."""
+    """Unit or form in which the stated figures equal the recorded ones, '' if there is none."""
     changed = {} if found.settings is None else slip(spec, found.settings, pv_span)
     written = " and ".join(f"{column} {value}" for column, value in changed.items())
     return SAID["slip"].format(written) if changed else ""
 
 
 def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> Advice | None:
-    """What a loop that oscillates for its valve or its tuning lacks for new settings; None where nothing."""
+    """Missing data for new settings of a loop with a valve or tuning cause; None if there are none."""
     if found.for_settings is not None and found.verdict.cause is Cause.VALVE:
         return Advice(Action.REPAIR_VALVE, f"no new settings: {found.for_settings}")
     if found.for_settings is not None:
@@ -232,7 +232,7 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
 
 
 def _too_thin(found: Assessment, controller: Pid | None, config: Config) -> Advice | None:
-    """What sampling it takes, where the controller acts several times between two samples, unseen."""
+    """Required sampling if the controller acts several times between two samples, unrecorded."""
     m = found.verdict.measured
     thin = (
         None if m is None or found.verdict.told_between_rows else too_thin(m.window.row_s, controller, config)
@@ -241,8 +241,8 @@ def _too_thin(found: Assessment, controller: Pid | None, config: Config) -> Advi
 
 
 def sought_for(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loop, Fit, tuple[Loop, ...]]:
-    """The loop that settings are sought for, its fit, and what else it may be: the fault that is named, also where a
-    load keeps its cycle alive."""
+    """The loop for the search of settings, its fit, and other possible loops: with the identified fault, also if a
+    load sustains its cycle."""
     verdict = verdict.for_settings
     fit = verdict.fit
     loop = model_of(verdict, controller)
@@ -252,8 +252,8 @@ def sought_for(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple
 
 
 def propose(verdict: Verdict, controller: Pid, period_s: float | None, config: Config) -> Proposed:
-    """The tuning package's proposal on the model of a verdict, on its uncertainty, and on the load it leaves; where
-    that is not the model which the verdict tells, its reason says so."""
+    """The tuning package's proposal on the model of a verdict, on its uncertainty, and on its residual load; if that
+    is not the model which the verdict reports, its reason states this."""
     sought_on = verdict.for_settings
     found = _proposed(sought_on, controller, period_s, config)
     if sought_on is verdict or not found.proposal.reason:
@@ -263,7 +263,7 @@ def propose(verdict: Verdict, controller: Pid, period_s: float | None, config: C
 
 
 def _proposed(verdict: Verdict, controller: Pid, period_s: float | None, config: Config) -> Proposed:
-    """The proposal on the model of a verdict that is sought on."""
+    """The proposal on the model of a verdict used for settings."""
     loop = model_of(verdict, controller)
     right_way = loop.controller.kp * loop.process.slope > 0.0
     if not right_way or verdict.cause not in (Cause.VALVE, Cause.TUNING):

@@ -1,7 +1,7 @@
-"""Whether the identified loop, simulated at its present settings, does what was recorded.
+"""Whether the identified loop, simulated at its present settings, reproduces the record.
 
-Settings are sought on a simulation. Where it does not reproduce the record it says nothing about other settings: a
-derivative, a filter or a limit that the model lacks has turned promised gains into losses.
+Settings are searched in simulation. A simulation that does not reproduce the record is no evidence for other
+settings: a derivative, a filter or a limit missing in the model has turned promised gains into losses.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from identification.simulation.valve import play
 from tuning.forecast import in_digits, loop_in_digits, run, settled
 
 NEARLY = 0.8
-"""Share of the autocorrelation's highest peak from which an earlier one is that of the period: multiples are
-as high."""
+"""Share of the autocorrelation's highest peak from which an earlier peak is the period's: peaks at multiples are as
+high."""
 
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """What a simulation of the present settings has over what was recorded [-]: period, average absolute
-    error, travel of OP and of the stem; a period of 0 where the simulation does not cycle."""
+    """Ratio of a simulation at the present settings to the record [-]: period, average absolute error, travel of OP
+    and of the stem; a period of 0 if the simulation does not cycle."""
 
     period: float
     error: float
@@ -38,7 +38,7 @@ class Agreement:
     stem_travel: float
 
     def worst(self, limits: AdviceLimits) -> tuple[str, float] | None:
-        """The figure that is farthest beyond its limit, and its ratio; None where all agree."""
+        """The figure farthest beyond its limit, and its ratio; None if all agree."""
         allowed = {
             "period": (self.period, limits.agree_period),
             "average absolute error": (self.error, limits.agree_error),
@@ -51,11 +51,11 @@ class Agreement:
 
 
 def agreement(loop: Loop, fit: Fit, load: Floats, period_s: float) -> Agreement:
-    """The loop with its present settings under a load on its scan [% PV], shape (n,), beside the record of a fit,
-    which cycles at a period [s] where its error does not show one.
+    """Compare the loop at its present settings under a load on its scan [% PV], shape (n,), with the record of a fit,
+    which cycles at a period [s] if its error shows none.
 
-    Travel of both is that of their samples at the longer of both intervals, OP rounded as recorded and moves within
-    a digit left out: at a coarse digit OP's noise is not in the record.
+    Travel of both is that of their samples at the longer of both intervals, OP rounded as recorded and without moves
+    within a digit: at a coarse digit OP's noise is not in the record.
     """
     sim, window = settled(run(loop_in_digits(loop), in_digits(load))), fit.window
     dt_s, scan_s = window.step_s, scan_step(loop)
@@ -82,7 +82,7 @@ def _travel(x: Floats, dt_s: float) -> float:
 
 
 def period_of(error: Floats, dt_s: float) -> float:
-    """Period of the autocorrelation's first peak that is nearly its highest beyond its first zero [s], 0 where it has
+    """Period of the autocorrelation's first peak beyond its first zero that is nearly the highest [s], 0 if there is
     none; error, shape (n,), every dt_s [s]."""
     x = error - error.mean()
     if x.size < 8 or not np.any(x):

@@ -1,4 +1,4 @@
-"""One loop, one night: from a prepared record to everything that is known about it."""
+"""One loop, one night: the assessment of a prepared record."""
 
 from __future__ import annotations
 
@@ -43,27 +43,26 @@ from identification.record import LoopRecord
 from identification.signals.correlation import harris_index
 
 NYQUIST = 2.0
-"""Samples a period below which a cycle is seen as a slower one."""
+"""Samples per period below which a cycle appears as a slower one."""
 OF_OP: Mapping[str, Any] = dict.fromkeys(
     ("valve_travel_pct_per_h", "reversals_per_h", "at_limits_pct", "service_pct", "op_mean_pct")
 )
-"""Figures that rest on OP, as they are where none is in percent."""
+"""Figures based on OP, with their values if no OP in percent is recorded."""
 
 
 @dataclass(frozen=True, slots=True)
 class Assessment:
-    """What is known about one loop after one night.
+    """Assessment of one loop after one night.
 
-    loop; start_s, duration_s of the record [s]; night, the figures of the whole span; hours, of each clock
-    hour; oscillations; verdict; settings, the controller's where they are not the stated ones; shown, the stated
-    controller with what the record shows of it beside, or the recorded one where none is stated;
-    scheduled_over, as in Shown; harris index (1:
-    minimum variance) where known; moves of the set point; waves, its part in the plant-wide pass; trend, thinned;
-    notes, plain sentences about the data; needs, what the record lacks to tell whether the loop oscillates, None
-    where that is told; close_s, first and last time [s] of the last ten periods; for_settings, what
-    the record lacks for new settings whatever its cause, None where it lacks nothing; judged_h, good hours in
-    automatic that oscillations and verdict rest on: of the stretch that is judged (judged_stretch.py), whose settings
-    are `outdated` where they were changed since; op_scaled and shared as in Prepared.
+    loop; start_s, duration_s of the record [s]; night, the figures of the whole span; hours, of each clock hour;
+    oscillations; verdict; settings, the controller's if they differ from the stated ones; shown, the stated
+    controller with further terms found in the record, or the recorded one if none is stated; scheduled_over, as in
+    Shown; harris index (1: minimum variance) if known; moves of the set point; waves, its data for the plant-wide
+    analysis; trend, thinned; notes, sentences about the data; needs, the missing data for whether the loop
+    oscillates, None if this is known; close_s, first and last time [s] of the last ten periods; for_settings, the
+    missing data for new settings regardless of the cause, None if there are none; judged_h, good hours in automatic
+    on which oscillations and verdict are based: of the stretch that is judged (judged_stretch.py), whose settings are
+    `outdated` if they were changed since; op_scaled and shared as in Prepared.
     """
 
     loop: str
@@ -91,7 +90,7 @@ class Assessment:
 
 
 def unassessable(record: LoopRecord, config: Config) -> Requirement | None:
-    """What the record lacks for an assessment; None where it can support one."""
+    """Missing data of the record for an assessment; None if it is sufficient."""
     q = config.quality
     own = ~record.mask("idle")
     if int(own.sum()) < q.samples:
@@ -114,7 +113,7 @@ def unassessable(record: LoopRecord, config: Config) -> Requirement | None:
 def cause_of(
     prepared: Prepared, found: Oscillations, controller: Pid | None, config: Config, kind: str
 ) -> Verdict:
-    """The verdict on one loop by itself; abstains where the trends cannot tell."""
+    """The verdict on one loop by itself; undecided if the trends are not sufficient."""
     record, oscillation = prepared.record, counting(found)
     needs, measured = unfit_for_cause(prepared, oscillation, config), None
     if needs is None and float(np.ptp(record.pv)) > 0.0:
@@ -135,8 +134,8 @@ def cause_of(
 def with_valve_oscillation(
     prepared: Prepared, found: Oscillations, controller: Pid | None, config: Config, kind: str
 ) -> tuple[Oscillations, Verdict]:
-    """What oscillates, of `found` what counts by itself, and why: a cycle that alone is not regular enough to count
-    does so where the identified loop, or its valve, is seen to make it."""
+    """Oscillations, those of `found` that count by themselves, and their cause: a cycle that alone is too irregular
+    to count does if the identified loop, or its valve, explains it."""
     verdict = cause_of(prepared, found, controller, config, kind)
     quiet = verdict.measured
     if counting(found) is not None or not prepared.op_known or quiet is None:
@@ -156,8 +155,7 @@ def with_valve_oscillation(
 def _rung(
     prepared: Prepared, period_s: float, controller: Pid | None, config: Config, kind: str
 ) -> tuple[Oscillations, Verdict] | None:
-    """What oscillates and why in a loop whose identified model rings at a period [s]; None where the error
-    does not."""
+    """Oscillations and cause of a loop whose identified model rings at a period [s]; None if the error does not."""
     near = detect(prepared.record, config.oscillation.nearly(), whole=True)
     first = counting(near)
     if first is None or not same_period(first.period_s, period_s, config.cause):
@@ -167,7 +165,7 @@ def _rung(
 
 
 def _made_by_valve(verdict: Verdict, limits: CauseLimits) -> bool:
-    """Whether the valve is convicted of a cycle: surely at fault, not dead, of a stickband that OP crosses."""
+    """Whether the valve causes a cycle: high confidence, not dead, a stickband that OP crosses."""
     m = verdict.measured
     if verdict.cause is not Cause.VALVE or verdict.dead or m is None:
         return False
@@ -177,22 +175,22 @@ def _made_by_valve(verdict: Verdict, limits: CauseLimits) -> bool:
 def verdict_by_measures(
     measured: Measured, prepared: Prepared, oscillation: Oscillation | None, config: Config
 ) -> Verdict:
-    """The verdict by what was measured, as far as sampling and grid let it be told."""
+    """The verdict from the measures, as far as sampling and grid permit."""
     if hidden_by_grid(measured, prepared.pv_step, oscillation is not None, config.cause):
         measured = replace(measured, evidence=0.0)
     return resolve_ambiguity(judge(measured, oscillation, config.cause), prepared, oscillation, config)
 
 
 def _known_without_op(figures: Assessments, op: bool) -> Assessments:
-    """The figures without those that rest on OP where none is in percent: unknown is empty, never zero."""
+    """The figures without those based on OP if none is in percent: unknown is empty, never zero."""
     return figures if op else replace(figures, **OF_OP)
 
 
 def hidden(
     record: LoopRecord, found: Oscillations, controller: Pid | None, config: Config
 ) -> Requirement | None:
-    """Why what is seen, or not, says nothing: the loop's cycles are too fast for the sampling; None where not. An
-    integral time that is stated says so only where the record shows no other."""
+    """Requirement if the loop's cycles are too fast for the sampling, so that oscillations seen or not seen are no
+    evidence; None if not. A stated integral time counts only if the record shows no other."""
     samples = config.oscillation.samples
     if controller is not None and config.advice.cycle_per_ti * controller.ti_s < samples * record.dt_s:
         scale_s = time_scale(record, counting(found), controller)
@@ -217,8 +215,8 @@ def hidden(
 
 @dataclass(frozen=True, slots=True)
 class _Judged:
-    """What a stretch of a record comes to: what oscillates in all of the record and in the stretch, why, and where
-    what the record shows of the controller."""
+    """Result of a stretch of a record: oscillations of the whole record and of the stretch, their cause, and the
+    recorded controller."""
 
     part: Prepared
     of_all: Oscillations
@@ -228,7 +226,7 @@ class _Judged:
 
 
 def _judge_stretch(prepared: Prepared, stretch: Stretch, config: Config, kind: str) -> _Judged:
-    """The verdict on the stretch that is judged; one that rests on little is a hint."""
+    """The verdict on the stretch that is judged; a hint only if the data are few."""
     record = prepared.record
     part = replace(prepared, record=record.span(stretch.first, stretch.last))
     of_all, span = detect_where_it_cycles(record, config.oscillation)
@@ -250,7 +248,7 @@ def _judge_stretch(prepared: Prepared, stretch: Stretch, config: Config, kind: s
 def judged_where(
     part: Prepared, found: Oscillations, span: Span, controller: Pid | None, config: Config, kind: str
 ) -> tuple[Oscillations, Verdict]:
-    """What oscillates and why, by the span in which it is on."""
+    """Oscillations and cause, from the span in which the oscillation is on."""
     if span == (0, len(part.record)):
         return with_valve_oscillation(part, found, controller, config, kind)
     cycling = replace(part, record=part.record.span(*span))
@@ -271,23 +269,23 @@ def assess(
     kind: str = "",
     earlier: Sequence[Earlier] = (),
 ) -> Assessment:
-    """Assess one loop. Raises LacksError, a NotAssessedError, where the record cannot support it.
+    """Assess one loop. Raises LacksError, a NotAssessedError, if the record is not sufficient.
 
     Figures, hours, waves and trend are of the whole record; oscillations and verdict of the stretch that is judged.
     The controller has the stated settings [%, s], those in force at the record's end; kind is the loop's type (flow,
-    level, ...), empty where not stated; earlier, what was in force in the record before, oldest first.
+    level, ...), empty if not stated; earlier, settings in force earlier in the record, oldest first.
     """
     lacking = unassessable(prepared.record, config)
     if lacking is not None:
         raise LacksError(lacking)
-    if not prepared.op_scaled:  # settings in percent mean nothing beside such an OP
+    if not prepared.op_scaled:  # settings in percent do not apply to such an OP
         controller, earlier = None, [replace(e, controller=None) for e in earlier]
     stretch = judged_stretch(prepared.record, controller, earlier, config)
     return _assessment(prepared, stretch, _judge_stretch(prepared, stretch, config, kind), config)
 
 
 def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: Config) -> Assessment:
-    """The figures of the whole record beside what was judged."""
+    """The figures of the whole record and the results of the stretch."""
     record, found = prepared.record, judged.found
     in_percent = prepared.op_known and prepared.op_scaled
     night = _known_without_op(assess_span(record, config.figures), in_percent)

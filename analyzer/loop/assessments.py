@@ -1,7 +1,7 @@
-"""What a loop costs: error, travel, variability and the rest, hour by hour and for the night.
+"""Performance figures of a loop: error, travel, variability and others, per hour and for the night.
 
-All figures are over good samples in automatic only, all survive gaps and constants, and what cannot be told is
-None, never a good score.
+All figures use only good samples in automatic, all tolerate gaps and constants, and an unknown figure is None, never
+a good score.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from identification.record import Floats, LoopRecord, Mask
 from identification.signals.robust import robust_deviation
 
 ROUNDING = 1e-9
-"""Moves under this [% of OP] are rounding and turn nothing: a signal may stand exactly at the edge of the band."""
+"""Moves under this [% of OP] are rounding and no reversal: a signal may lie exactly at the edge of the band."""
 
 
 @dataclass(frozen=True, slots=True)
 class Assessments:
-    """Figures of one span; None where they cannot be told.
+    """Figures of one span; None if unknown.
 
-    usable_h : hours they rest on [h]; average_absolute_error_pct, variability_pct (2 sigma of e) and
-    pv_variability_pct (2 sigma of PV over its mean) [%]; valve_travel_pct_per_h [%/h] of OP or, where recorded,
-    of the position; reversals_per_h, crossings_per_h (of e beyond the noise band) [1/h]; noise_band_pct [% of
-    span]; normal_pct, at_limits_pct, service_pct, shares of good time [%]; sp_mean_pct, pv_mean_pct,
-    op_mean_pct, sp_travel_pct [% of span], which say whether two spans are comparable.
+    usable_h : hours used [h]; average_absolute_error_pct, variability_pct (2 sigma of e) and pv_variability_pct (2
+    sigma of PV over its mean) [%]; valve_travel_pct_per_h [%/h] of OP or, if recorded, of the position;
+    reversals_per_h, crossings_per_h (of e beyond the noise band) [1/h]; noise_band_pct [% of span]; normal_pct,
+    at_limits_pct, service_pct, shares of good time [%]; sp_mean_pct, pv_mean_pct, op_mean_pct, sp_travel_pct [% of
+    span], which show whether two spans are comparable.
     """
 
     usable_h: float
@@ -80,8 +80,8 @@ class Trends(NamedTuple):
 
 class Sums(NamedTuple):
     """Over the samples that are good and in automatic: means of |e|, SP, PV and OP, standard deviations of e and PV
-    [% of span], shares of time at limits and in good service [-], and how often e crosses the noise band; the set
-    point's travel over the whole span."""
+    [% of span], shares of time at limits and in good service [-], and number of crossings of the noise band by e; the
+    set point's travel over the whole span."""
 
     absolute_error: float
     sp: float
@@ -97,7 +97,7 @@ class Sums(NamedTuple):
 
 @njit(cache=True)
 def crossings_of(e: Floats, use: Mask, band: float) -> int:
-    """How often an error, where it may be used, goes from beyond one side of a band to beyond the other."""
+    """Number of crossings of an error, over usable samples, from beyond one side of a band to beyond the other."""
     side, count = 0, 0
     for k in range(e.size):
         if not use[k] or abs(e[k]) <= band:
@@ -112,7 +112,7 @@ def crossings_of(e: Floats, use: Mask, band: float) -> int:
 def travel_of(signal: Floats, use: Mask, step: int, deadband: float) -> tuple[float, int]:
     """Travel and reversals of every `step`-th sample of a signal beyond a deadband, shape (n,).
 
-    Moves between usable neighbours make one path: what a signal moved during a gap is not known.
+    Moves between usable neighbours form one path: moves of a signal during a gap are unknown.
     """
     half, x, stem = 0.5 * deadband, 0.0, 0.0
     path, way, turns = 0.0, 0.0, 0
@@ -134,9 +134,9 @@ def travel_of(signal: Floats, use: Mask, step: int, deadband: float) -> tuple[fl
 
 @njit(cache=True)
 def sums_of(x: Trends, use: Mask, small_error: float, band: float) -> Sums:
-    """Sums over the samples that may be used, at least one.
+    """Sums over the usable samples, at least one.
 
-    small_error : under which a loop is in good service; band : beyond which the error has a side [% of span].
+    small_error : limit of the error in good service; band : limit beyond which the error has a sign [% of span].
     """
     count, size, e, pv, op, sp, limits, service = 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0
     for k in range(x.pv.size):
@@ -162,7 +162,7 @@ def sums_of(x: Trends, use: Mask, small_error: float, band: float) -> Sums:
 
 
 def at_limits_share(record: LoopRecord) -> float:
-    """Share of the usable time with OP at a limit [-]; in manual a limit limits nothing."""
+    """Share of the usable time with OP at a limit [-]; limits in manual do not count."""
     use = record.usable
     return float(record.mask("saturated")[use].mean()) if use.any() else 0.0
 
@@ -175,7 +175,7 @@ def noise_band(pv: Floats) -> float:
 
 
 def assess_span(record: LoopRecord, limits: FigureLimits, noise: float | None = None) -> Assessments:
-    """The figures of one span of a record; `noise`, the noise band of PV [% of span], measured here where None."""
+    """The figures of one span of a record; `noise`, the noise band of PV [% of span], measured here if None."""
     use = record.usable
     count = int(use.sum())
     hours = count * record.dt_s / HOUR_S
@@ -210,7 +210,7 @@ def assess_span(record: LoopRecord, limits: FigureLimits, noise: float | None = 
 
 
 def hour_edges(record: LoopRecord) -> list[tuple[int, int, float]]:
-    """First and last sample (excluded) and start [s] of each clock hour that the record touches."""
+    """First and last sample (excluded) and start [s] of each clock hour of the record."""
     first = math.floor(record.start_s / HOUR_S)
     last = math.ceil((record.start_s + record.duration_s) / HOUR_S - 1e-9)
     starts = [h * HOUR_S for h in range(first, last)]
@@ -222,7 +222,7 @@ def hour_edges(record: LoopRecord) -> list[tuple[int, int, float]]:
 def _hourly_oscillation(
     found: Oscillations, record: LoopRecord, start_s: float, a: int, b: int
 ) -> tuple[float, float]:
-    """Significance and oscillating share of the samples a to b; they sum to the night's."""
+    """Significance and oscillating share of the samples a to b; their sums are the night's."""
     if found.first is None or found.active is None or found.level is None:
         return 0.0, 0.0
     dt = found.active_dt_s
@@ -240,13 +240,13 @@ def _hourly_oscillation(
 def hourly(
     record: LoopRecord, found: Oscillations, limits: FigureLimits, noise: float | None = None
 ) -> list[Hour]:
-    """The figures of each clock hour of a record; `noise`, the noise band of PV, measured here where None."""
+    """The figures of each clock hour of a record; `noise`, the noise band of PV, measured here if None."""
     band = noise_band(record.pv[record.usable]) if noise is None else noise
     rows = []
     for a, b, start in hour_edges(record):
         significance, share = _hourly_oscillation(found, record, start, a, b)
         figures = assess_span(record.span(a, b), limits, band)
-        if a > 0 and figures.sp_travel_pct is not None:  # a move on the hour is between two hours' samples
+        if a > 0 and figures.sp_travel_pct is not None:  # such a move is between two hours' samples
             moved = abs(float(record.sp[a] - record.sp[a - 1]))
             figures = replace(figures, sp_travel_pct=figures.sp_travel_pct + moved)
         rows.append(Hour(start, figures, significance, share))

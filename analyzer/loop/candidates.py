@@ -1,4 +1,4 @@
-"""The rivals that explain one window: a process behind an ideal valve, behind play, and behind stick-slip."""
+"""The candidate models of one window: a process behind an ideal valve, with backlash, and with stick-slip."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from identification.limits import FIT
 from identification.record import Mask
 
 Candidates = tuple[Fit, Fit, Fit | None]
-"""Fits behind an ideal valve, behind play, and behind stick-slip if that was tried."""
+"""Fits with an ideal valve, with backlash, and with stick-slip if that was tried."""
 Fits = tuple[Fit, Fit, Fit | None, Fit, float, float]
-"""Plain fit, play, stick-slip if it was tried, the better valve, its evidence and that of the jump [nat]."""
+"""Fits: no fault, backlash, stick-slip if tried, the better valve; its evidence and the jump's [nat]."""
 
 
 SEARCHED = 2
-"""Paths of OP while valves are searched: ours, for time; those found are followed with all."""
+"""Paths of OP during the search of valves: ours, for time; the valves found are evaluated on all paths."""
 
 
 class Question(NamedTuple):
-    """What is asked of a window: the period or another scale of the loop [s], where PV is due to answer the set
-    point, what the controller did within its rows (None: not known), and whether the loop is calm."""
+    """Inputs of the fits of a window: the period or another time scale of the loop [s], where a set point response of
+    PV is expected, the controller's scans within its rows (None: unknown), and whether the loop is calm."""
 
     scale_s: float
     due: Mask
@@ -40,8 +40,8 @@ class Question(NamedTuple):
 
 
 def fits_of(window: Window, q: Question) -> Fits:
-    """The candidates' fits, by a recorded stem where one shows a fault; with OP at the controller's scan where its
-    scans within a row are known."""
+    """The candidates' fits, by a recorded stem if it shows a fault; with OP at the controller's scan if its scans
+    within a row are known."""
     shown = None if window.position is None else seen(window.op, window.position)
     if shown is not None:
         return _stem_shown(window, shown, q)
@@ -52,7 +52,7 @@ def fits_of(window: Window, q: Question) -> Fits:
 
 
 def check_judged(window: Window, limits: CauseLimits) -> None:
-    """Raise NotAssessedError where too few blocks follow on as many good ones as the noise model looks back."""
+    """Raise NotAssessedError if too few blocks follow as many good ones as the noise model's order."""
     count = int(judged(window.usable, FIT.ar_order).sum())
     if count < limits.judged:
         raise NotAssessedError(
@@ -61,8 +61,8 @@ def check_judged(window: Window, limits: CauseLimits) -> None:
 
 
 def refined(fits: Candidates, best: Fit, hopeless: bool) -> Candidates:
-    """Fits at the record's own interval, where the dead time is no shorter than a block; the valve's are left as they
-    are where it is `hopeless` to look for its fault."""
+    """Fits at the record's own interval, if the dead time is no shorter than a block; the valve's are not refined if
+    a search for its fault is `hopeless`."""
     if best.window.factor == 1 or best.dead_time_s + best.window.half_block_s < best.window.dt_s:
         return fits
     linear, play = (replace(f, window=replace(f.window, fine=True)) for f in fits[:2])
@@ -74,13 +74,13 @@ def refined(fits: Candidates, best: Fit, hopeless: bool) -> Candidates:
 
 
 def hopeful(window: Window, q: Question) -> float:
-    """Evidence [nat] from which it is worth looking for the fault of a valve whose loop does not oscillate."""
+    """Evidence [nat] from which a search for a valve fault is worthwhile in a loop that does not oscillate."""
     count = int(judged(window.usable, FIT.ar_order).sum())
     return q.limits.hopeless * q.limits.needed(count, bool(q.due.any()), False)
 
 
 def _is_searched(linear: Fit, play: Fit, q: Question) -> bool:
-    """Whether a play explains enough for the whole search of the valve's fault."""
+    """Whether backlash explains enough for the complete search for a valve fault."""
     if q.calm and play.window.y.size < FIT.short:
         return True
     least = hopeful(play.window, q) if q.calm else FIT.screened
@@ -101,8 +101,8 @@ def _candidates(window: Window, q: Question) -> Candidates:
 
 
 def _at_scans(window: Window, q: Question, scans: Scans) -> Candidates | None:
-    """The fits with OP at the controller's scan, each as its own model makes it; None where those of OP at the rows
-    are clearly likelier: a controller that computes no faster holds it between them."""
+    """The fits with OP at the controller's scan, each computed by its own model; None if those with OP at the rows
+    are clearly more likely: a controller with no faster scan holds OP between rows."""
     linear = fit_linear(window, q.scale_s)
     rows = _likeliest((linear, fit_play(linear, q.scale_s), None))
     within = with_scans(settled(rows, scans), scans, SEARCHED).window
@@ -118,7 +118,7 @@ def _likeliest(fits: Candidates) -> Fit:
 
 
 def _compared(found: Candidates, q: Question) -> tuple[Fit, float, float]:
-    """The better valve, its evidence over an ideal one, and that of the jump over a play [nat]."""
+    """The better valve, its evidence over an ideal one, and that of the jump over backlash [nat]."""
     linear, play, stick = found
     if stick is None and not _is_searched(linear, play, q):
         return play, play.log_likelihood - linear.log_likelihood, 0.0
@@ -131,7 +131,7 @@ def _compared(found: Candidates, q: Question) -> tuple[Fit, float, float]:
 
 
 def _stem_shown(window: Window, shown: Seen, q: Question) -> Fits:
-    """The same where the stem is recorded: its fault is seen, and PV answers the stem itself."""
+    """The same with a recorded stem: its fault is visible, and PV responds to the stem itself."""
     linear = fit_linear(window, q.scale_s)
     behind = window if window.position is None else replace(window, op=window.position)
     play = descend(replace(fit_linear(behind, q.scale_s), window=window, valve=shown.play))

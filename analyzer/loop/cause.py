@@ -1,24 +1,24 @@
-"""Why a loop oscillates: valve, tuning or load, from signs that do not depend on each other.
+"""Cause of a loop's oscillation: valve, tuning or load, from independent signs.
 
-1. Likelihood and size of a valve fault: a play (or stick-slip) on the recorded OP followed by a lag explains PV
-   better than the lag alone, by innovations, in most stretches between two turns of OP, and its width is a large
+1. Likelihood and size of a valve fault: backlash (or stick-slip) on the recorded OP followed by a lag explains PV
+   better than the lag alone, by innovations, in most stretches between two OP reversals, and its width is a large
    share of OP's travel. Two questions.
-2. What is left as load: PV less the model's response. Where the valve model removes the peak from the load,
-   the valve made it; where the peak stays, it came from outside.
-3. Amplification: the identified process and the controller's settings give |S| at the period. A tuning makes
-   its own period only where the loop amplifies there.
-4. The same process on both sides: the gain that the data outside the period's band give to the process that
-   was identified with it. Under a strong load feedback alone is identified, and the gain falls or turns.
-5. Rhythm: a load from a machine keeps its period as by a clock; noise through a resonance does not.
-6. Wave: third harmonic locked to the phase of the fundamental (a triangle has 1/9, a square 1/3), after the
-   idea of harmonics and bicoherence (Choudhury, Shah, Thornhill 2004); a sine points away from the valve, and so do
-   harmonics that the valve's model does not explain.
-7. Size: noise through a resonance forgets its size as it forgets its phase (Rice 1945), so a cycle whose phase
-   wanders and whose size is kept is no tuning's.
+2. Residual load: PV minus the model's response. If the valve model removes the peak from the load, the valve
+   caused it; if the peak remains, the disturbance is external.
+3. Amplification: the identified process and the controller's settings give |S| at the period. A tuning causes
+   its own period only if the loop amplifies there.
+4. The same process on both sides: the process gain from the data outside the period's band, against the gain
+   identified with it. Under a strong load feedback alone is identified, and the gain falls or changes sign.
+5. Rhythm: a load from a machine has a constant frequency; noise through a resonance does not.
+6. Waveform: third harmonic locked to the phase of the fundamental (a triangle has 1/9, a square 1/3), after the
+   idea of harmonics and bicoherence (Choudhury, Shah, Thornhill 2004); a sine is evidence against the valve, and so
+   are harmonics that the valve's model does not explain.
+7. Size: noise through a resonance keeps neither its size nor its phase (Rice 1945), so a cycle with variable phase
+   and constant size is not caused by tuning.
 
-Of a loop that oscillates the signs are weighed together (cause_weights.py); a loop that does not can only have a
-valve at fault, by the first two questions. A valve that is blamed is looked at slip by slip: does it stick at
-distances that scatter, rather than play?
+In a loop that oscillates the signs are combined (cause_weights.py); a loop that does not can only have a valve fault,
+by the first two questions. For a valve fault each slip is tested: does the valve stick at distances that scatter,
+instead of backlash?
 """
 
 from __future__ import annotations
@@ -66,9 +66,9 @@ NO_MODEL = Requirement(None, RequirementKind.MODEL)
 class Verdict:
     """The cause of one loop's oscillation.
 
-    cause; confidence [%] of each cause; fault of the valve; signs; needs : what the record lacks for a
-    cause, None where it lacks nothing; measured; dead : the valve no longer moves PV at all; steady : the same by one
-    friction for all slips, where it was told slip by slip since.
+    cause; confidence [%] of each cause; fault of the valve; signs; needs : the missing data for a cause, None if
+    there are none; measured; dead : the valve no longer moves PV at all; steady : the same by one friction for all
+    slips, if the friction was then identified slip by slip.
     """
 
     cause: Cause
@@ -82,14 +82,14 @@ class Verdict:
 
     @property
     def require_measured(self) -> Measured:
-        """What was measured; NotAssessedError, with what the record lacks, where nothing was."""
+        """The measures; NotAssessedError, with the missing data, if there are none."""
         if self.measured is None:
             raise NotAssessedError(str(self.needs or NO_MODEL))
         return self.measured
 
     @property
     def fit(self) -> Fit:
-        """The fit that it rests on, the valve's where that is at fault; NotAssessedError where there is none."""
+        """The fit of the verdict, the valve's if that is at fault; NotAssessedError if there is none."""
         m = self.require_measured
         if self.cause is not Cause.VALVE:
             return m.linear
@@ -97,69 +97,69 @@ class Verdict:
 
     @property
     def told_between_rows(self) -> bool:
-        """Whether the loop is known whatever the sampling: its ringing makes the cycle, or the valve does, fitted
-        with what law and scan say of OP between the rows."""
+        """Whether the loop is identified at any sampling: its ringing causes the cycle, or the valve does, fitted
+        with OP between the rows from control law and scan."""
         if self.cause is Cause.VALVE and self.measured is not None:
             return scans_per_row(self.measured.controller, self.fit.window.row_s) > 1
         return self.cause is Cause.TUNING and any(s.kind is SignKind.RINGING for s in self.signs)
 
     @property
     def for_settings(self) -> Verdict:
-        """The verdict on whose model settings are sought: that of one friction for all slips."""
+        """The verdict whose model settings are searched on: that of one friction for all slips."""
         return self if self.steady is None or self.cause is not Cause.VALVE else self.steady
 
 
 TEMPER_NAT = 50.0
-"""Gain in log likelihood [nat] by which the doubt in a model's verdict falls to a third; a judgement: the chances
-that it gives are not calibrated."""
+"""Gain in log likelihood [nat] by which the doubt in a model's verdict falls to a third; a judgement: the resulting
+probabilities are not calibrated."""
 LEAST_AGREED = 0.25
-"""Chance of a cause by the other signs [-] from which they do not contradict the model that names it; ours: on
+"""Probability of a cause from the other signs [-] from which they do not contradict the model that names it; ours: on
 benchmarks/world, seeds 115 to 118, the one wrong cause had .17, the right ones that were undecided .30 and more."""
 NO_CAUSE = Verdict(Cause.NONE, dict.fromkeys(CAUSES, 0.0), Fault.NONE)
 
 
 def not_assessed(needs: Requirement | None) -> Verdict:
-    """The verdict that abstains and says what it needs."""
+    """The verdict without a cause, with its requirement."""
     return Verdict(Cause.UNDECIDED, dict.fromkeys(CAUSES, 0.0), Fault.UNDECIDED, needs=needs)
 
 
 def _ramp(x: float, low: float, high: float) -> float:
-    """0 below low, 1 above high, straight between."""
+    """0 below low, 1 above high, linear between."""
     return min(max((x - low) / (high - low), 0.0), 1.0)
 
 
 def needed(m: Measured, limits: CauseLimits, oscillating: bool) -> float:
-    """Evidence needed of these measures [nat]."""
+    """Evidence required of these measures [nat]."""
     return limits.needed(m.play.count, m.excited, oscillating)
 
 
 def _crossed(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
-    """Whether OP goes far enough to move a stem behind a fault of the width found: over all of its range, tails too,
-    in a cycle; of a calm loop, whose tails are kicks of its set point, over its usual range. OP of a valve that
-    slips seldom stays within its stickband, so there the whole range counts too."""
+    """Whether OP moves far enough to move a stem with a fault of the width found: over its whole range with tails in
+    a cycle; over its usual range in a calm loop, whose tails are kicks of its set point. OP of a valve that rarely
+    slips stays within its stickband, so the whole range counts there too."""
     whole = oscillating or fault_of(m, limits) is Fault.STICTION
     return m.play.valve.stickband <= limits.widest * float(np.ptp(m.window.op)) and (whole or m.size <= 1.0)
 
 
 def speaks(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
-    """Whether PV speaks for a fault of the valve: enough evidence, a process that goes the controller's way, and a
-    width that OP has crossed."""
+    """Whether PV shows a valve fault: enough evidence, a process gain of the controller's sign, and a width that OP
+    has crossed."""
     wrong_way = m.controller is not None and m.controller.kp * m.play.gain < 0
     return m.evidence >= needed(m, limits, oscillating) and not wrong_way and _crossed(m, limits, oscillating)
 
 
 def agrees(m: Measured, limits: CauseLimits) -> bool:
-    """Whether no single load gives the evidence of a calm loop: its stretches agree, or moves of the set point, for
-    which no load waits, suffice."""
+    """Whether no single load explains the evidence of a calm loop: its stretches agree, or set point moves, which no
+    load follows, suffice."""
     return m.steady >= limits.steady or m.asked >= needed(m, limits, False)
 
 
 def quiet_signs(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
-    """Signs of a valve at fault in a loop that does not oscillate.
+    """Signs of a valve fault in a loop that does not oscillate.
 
-    The stretches between moves of the stem must agree; of a fault that is narrow beside OP's range, as in a loop of a
-    programme, they are a sign of their own. A few moves are told from steps of the load, unless the set point called
-    for them, by more evidence.
+    The stretches between moves of the stem must agree; for a fault that is narrow relative to OP's range, as in a
+    loop of a programme, they are a separate sign. Few moves, unless the set point caused them, need more evidence to
+    be distinguished from steps of the load.
     """
     if not agrees(m, limits):
         return ()
@@ -186,7 +186,7 @@ def combined(signs: Iterable[Sign]) -> float:
 
 
 def fault_of(m: Measured, limits: CauseLimits) -> Fault:
-    """Backlash or stiction, by what a slip jump adds to a play."""
+    """Backlash or stiction, by the evidence of a slip jump beyond backlash."""
     found, clear = jump_evidence(m, limits)
     if found > clear:
         return Fault.STICTION
@@ -194,7 +194,7 @@ def fault_of(m: Measured, limits: CauseLimits) -> Fault:
 
 
 def jump_evidence(m: Measured, limits: CauseLimits) -> tuple[float, float]:
-    """Evidence for a slip jump and what it takes [nat], none where it was not looked for."""
+    """Evidence for a slip jump and its required value [nat], zero if none was searched for."""
     if m.stick_slip is None:
         return 0.0, 0.0
     clear = max(limits.evidence_jump, limits.jump_share * m.evidence)
@@ -203,12 +203,11 @@ def jump_evidence(m: Measured, limits: CauseLimits) -> tuple[float, float]:
 
 
 def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> Verdict:
-    """What makes the cycle.
+    """The cause of the cycle.
 
-    Where the controller's law is known the identified loop tells whether it rings by itself. Else, of a loop that
-    oscillates, the likeliest cause is named where its probability is high enough; the valve's more so,
-    and only where PV speaks for its fault, for a valve that is blamed is taken out. Where a
-    sign is not known none is.
+    If the control law is known, the identified loop shows whether it rings by itself. Else the most likely cause of
+    an oscillation is named if its probability is high enough; the valve needs more, and evidence in PV for its fault,
+    because a valve named as the cause is removed for repair. If a sign is unknown no cause is named.
     """
     if oscillation is None:
         return _quiet(m, limits)
@@ -234,8 +233,8 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
 
 
 def _rings(m: Measured, ringing: Ringing, oscillation: Oscillation, limits: CauseLimits) -> Verdict:
-    """The verdict on a loop that rings by itself; its process is the one under a smooth load, for a free noise
-    model takes the ringing for the load's."""
+    """The verdict on a loop that rings by itself; its process is the one under a smooth load, because a free noise
+    model assigns the ringing to the load."""
     clear = min(max(1.0 - ringing.line_nat / ringing.line_needed(limits), 0.0), 1.0)
     pct = limits.named_pct + (limits.ringing_pct - limits.named_pct) * clear
     rest = 0.5 * (100.0 - pct)
@@ -249,13 +248,13 @@ def _rings(m: Measured, ringing: Ringing, oscillation: Oscillation, limits: Caus
 
 
 def _may_be(cause: Cause, m: Measured, limits: CauseLimits) -> bool:
-    """Whether a cause may be named: any but a valve of whose fault PV does not speak, or that OP hardly feels."""
+    """Whether a cause may be named: any but a valve without evidence in PV, or with a fault too small for OP."""
     return cause is not Cause.VALVE or (m.size >= limits.least_size and speaks(m, limits, True))
 
 
 def _by_likelihood(m: Measured, found: dict[Cause, float], limits: CauseLimits) -> tuple[Cause, float] | None:
-    """The cause whose model is likelier than the others, and by how much [nat]; None where none is, where the other
-    signs contradict it, or where it is a valve with so narrow a fault that a neighbour's wave has it, too."""
+    """The cause whose model is more likely than the others, and by how much [nat]; None if there is none, the other
+    signs contradict it, or it is a valve with so narrow a fault that a neighbour's oscillation explains it too."""
     told = None if m.ringing is None else m.ringing.likelier(m.evidence, limits)
     if told is None or found[told[0]] < LEAST_AGREED or not _may_be(told[0], m, limits):
         return None
@@ -265,8 +264,8 @@ def _by_likelihood(m: Measured, found: dict[Cause, float], limits: CauseLimits) 
 def _likelier(
     m: Measured, cause: Cause, nat: float, limits: CauseLimits, others: tuple[Sign, ...]
 ) -> Verdict:
-    """The verdict on a cycle that one of valve and load explains better than the other, by so much [nat]: their
-    odds, tempered, since models of loops are never quite true. others, the other signs."""
+    """The verdict on a cycle that one of valve and load explains better than the other, by `nat` [nat]: their odds,
+    tempered, since models of loops are never exact. others, the other signs."""
     pct = limits.ringing_pct - (limits.ringing_pct - limits.load_pct) * math.exp(-nat / TEMPER_NAT)
     confidence = {**dict.fromkeys(CAUSES, 0.5 * (100.0 - pct)), cause: pct}
     signs = (Sign(cause, pct / 100.0, SignKind.LIKELIER, (str(cause), nat)), *others)
@@ -277,7 +276,7 @@ def _likelier(
 def _least(cause: Cause, m: Measured, limits: CauseLimits) -> float:
     """Confidence [%] from which a cause is named.
 
-    A stickband that is small beside OP's range makes no square of PV, and a cycle that keeps its size may be brought.
+    A stickband small relative to OP's range makes no square wave of PV, and a cycle of constant size may be external.
     """
     if cause is not Cause.VALVE:
         return limits.named_pct
@@ -289,7 +288,7 @@ def _least(cause: Cause, m: Measured, limits: CauseLimits) -> float:
 
 
 def _quiet(m: Measured, limits: CauseLimits) -> Verdict:
-    """The verdict on a loop that does not oscillate: a valve at fault, where likelihood and size agree, or none."""
+    """The verdict on a loop that does not oscillate: a valve fault, if likelihood and size agree, or none."""
     signs = quiet_signs(m, limits)
     pct = combined(signs)
     is_valve = len(signs) >= limits.signs and pct >= limits.named_pct
@@ -302,7 +301,7 @@ def _quiet(m: Measured, limits: CauseLimits) -> Verdict:
 
 def hidden_by_grid(m: Measured, pv_step: float, oscillates: bool, limits: CauseLimits) -> bool:
     """Whether the valve's stickband moves PV by so few steps of its grid, pv_step [% of span], or PV of a calm loop
-    covers so few, that the grid itself holds PV still as the valve would."""
+    covers so few, that the grid itself keeps PV constant as the valve would."""
     if m.window.position is not None and not m.window.decoded:
         return False
     best = m.stick_slip if m.stick_slip is not None and m.jump > limits.evidence_jump else m.play
@@ -312,12 +311,12 @@ def hidden_by_grid(m: Measured, pv_step: float, oscillates: bool, limits: CauseL
 
 
 def cap_confidence(verdict: Verdict, most_pct: float) -> Verdict:
-    """A verdict that rests on little: no confidence above `most_pct` [%]."""
+    """A verdict on few data: no confidence above `most_pct` [%]."""
     return replace(verdict, confidence={k: min(v, most_pct) for k, v in verdict.confidence.items()})
 
 
 def dead_valve(record: LoopRecord, limits: CauseLimits) -> Sign | None:
-    """A valve that no longer moves PV: OP winds over much of its range, the error stays on one side, PV is still."""
+    """A valve that no longer moves PV: OP winds over much of its range, the error keeps its sign, PV is constant."""
     good = ~(record.mask("gap") | record.mask("manual"))
     if record.sp_estimated or good.sum() < 100:
         return None
@@ -334,7 +333,7 @@ def dead_valve(record: LoopRecord, limits: CauseLimits) -> Sign | None:
 
 
 def with_dead_valve(verdict: Verdict, sign: Sign) -> Verdict:
-    """A verdict of a valve that is plainly at fault without oscillation."""
+    """A verdict of a clear valve fault without oscillation."""
     confidence = {Cause.VALVE: 90.0, Cause.TUNING: 0.0, Cause.LOAD: 0.0}
     return replace(
         verdict,
@@ -349,9 +348,9 @@ def with_dead_valve(verdict: Verdict, sign: Sign) -> Verdict:
 def resolve_ambiguity(
     verdict: Verdict, prepared: Prepared, oscillation: Oscillation | None, config: Config
 ) -> Verdict:
-    """The verdict, or none where trends on straight segments make a likely valve of a load, where the loop that is
-    called too tight is robust, and where a load is not likely enough, or what is recorded too coarse for another
-    cause to show: a load is what is left then."""
+    """The verdict, or none if compressed trends make a likely valve uncertain, if the loop with a tuning cause is
+    robust, and if a load is not likely enough, or the recording too coarse to show another cause: a load is the cause
+    that remains then."""
     if oscillation is None or verdict.cause not in CAUSES:
         return verdict
     lacking = _hides(verdict, prepared, oscillation, config)
@@ -365,7 +364,7 @@ def resolve_ambiguity(
 def _hides(
     verdict: Verdict, prepared: Prepared, oscillation: Oscillation, config: Config
 ) -> Requirement | None:
-    """What the recording lacks to tell the cause that is named from others; None where it lacks nothing."""
+    """Missing data to distinguish the named cause from others; None if there are none."""
     limits, pct = config.cause, verdict.confidence[verdict.cause]
     if verdict.cause is Cause.TUNING:
         return _robust(verdict, oscillation, config)
@@ -382,8 +381,8 @@ def _hides(
 def _too_coarse_for_a_load(
     prepared: Prepared, oscillation: Oscillation, limits: CauseLimits
 ) -> Requirement | None:
-    """What a recording lacks in which every cause looks like a load: a wave of few samples, or of few steps of PV's
-    grid, has lost what a valve writes into it; None where it lacks nothing."""
+    """Requirement of a recording in which every cause looks like a load: a cycle of few samples, or of few steps of
+    PV's grid, no longer shows a valve's effect; None if it is sufficient."""
     steps = oscillation.amplitude_pct / max(prepared.pv_step, 1e-12)
     if steps < limits.steps_told:
         return Requirement(
@@ -396,7 +395,7 @@ def _too_coarse_for_a_load(
 
 
 def _robust(verdict: Verdict, oscillation: Oscillation, config: Config) -> Requirement | None:
-    """A test in manual, where signs speak for the tuning and the identified loop is robust; None where it is not."""
+    """A test in manual, if signs indicate the tuning and the identified loop is robust; None if it is not."""
     ms = None if verdict.measured is None else sensitivity(verdict.measured, oscillation.period_s)
     if ms is None or ms > config.tuning.ms_most:
         return None
@@ -404,12 +403,12 @@ def _robust(verdict: Verdict, oscillation: Oscillation, config: Config) -> Requi
 
 
 def with_worn_valve(verdict: Verdict, period_s: float, limits: CauseLimits) -> Verdict:
-    """The verdict on a loop that cycles at a period [s] for another cause, its valve worn where play is seen beside
-    the cycle's line: whatever makes the cycle, the valve is to be repaired."""
+    """The verdict on a loop that cycles at a period [s] for another cause, its valve worn if backlash is seen outside
+    the cycle's line: the valve needs repair regardless of the cause."""
     m = verdict.measured
     if m is None or verdict.cause is Cause.VALVE or m.window.position is not None:
         return verdict
-    # ringing is no line: both ways of looking must see the play
+    # ringing is no line: both methods must show the backlash
     if verdict.cause is Cause.TUNING and m.evidence <= 0.0:
         return verdict
     found = beside_line(m.linear, m.play, period_s)
@@ -419,8 +418,8 @@ def with_worn_valve(verdict: Verdict, period_s: float, limits: CauseLimits) -> V
 
 
 def is_worn_beside(found: BesideLine, m: Measured, limits: CauseLimits) -> bool:
-    """Whether play is seen beside the cycle's line: enough evidence on which the half-cycles agree, a process that
-    goes the controller's way, and a width that OP crosses."""
+    """Whether backlash is seen outside the cycle's line: enough evidence on which the half-cycles agree, a process
+    gain of the controller's sign, and a width that OP crosses."""
     right_way = m.controller is None or m.controller.kp * found.play.gain > 0.0
     steady = found.trials is not None and found.trials.steadiness >= limits.beside_steady
     crossed = limits.beside_size <= found.play.valve.stickband / max(m.window.reach, 1e-9) <= 1.0
@@ -428,11 +427,11 @@ def is_worn_beside(found: BesideLine, m: Measured, limits: CauseLimits) -> bool:
 
 
 def refine_stick_slip(verdict: Verdict, period_s: float, limits: CauseLimits) -> Verdict:
-    """The verdict on a loop that cycles, its valve's fault named anew where slips that scatter explain PV better.
+    """The verdict on a loop that cycles, its valve's fault replaced if slips at variable distances explain PV better.
 
-    The cause stays: what is asked is how the valve fails that PV and OP convict already. Where its stem is told slip
-    by slip, the window has it as if it had been recorded. Settings are sought with one friction for all slips, found
-    about the path's: sought on this verdict, whose stem takes up part of what the load did, they left 7 of 24
+    The cause is unchanged: the test is for the kind of fault of a valve already identified by PV and OP. If the stem
+    is identified slip by slip, the window contains it as if recorded. Settings are searched with one friction for all
+    slips, found from the path's: searched on this verdict, whose stem includes a part of the load, they left 7 of 24
     sticking loops of proofs/retuning.py (seeds 21, 22, 81, 82) with no smaller error, one with a larger by 47 %. The
     cycle has a period of period_s [s].
     """
@@ -452,7 +451,7 @@ def refine_stick_slip(verdict: Verdict, period_s: float, limits: CauseLimits) ->
         return verdict
     jump = path_evidence(path, play)
     more = jump - max(m.jump, 0.0)
-    new = verdict.fault is Fault.BACKLASH  # of another fault a jump is known, or all but so
+    new = verdict.fault is Fault.BACKLASH  # for other faults a jump is known, or nearly
     share = limits.jump_share if new else 0.0
     if more < max(limits.evidence_jump, share * (m.evidence + more)):
         return verdict
@@ -465,12 +464,12 @@ def refine_stick_slip(verdict: Verdict, period_s: float, limits: CauseLimits) ->
 
 
 def _finely(fit: Fit, m: Measured) -> Fit:
-    """A fit in blocks followed to its end at the resolution of what was measured."""
+    """A fit in blocks, refined at the resolution of the measures."""
     return descend(replace(fit, window=replace(fit.window, fine=True))) if m.window.fine else fit
 
 
 def _with_path(m: Measured, path: SlipPath, jump: float, more: float) -> Measured:
-    """What was measured, with the path's stem and the friction and process behind it."""
+    """The measures, with the path's stem and the friction and process of its fit."""
     fit = _finely(path.fit, m)
     linear, play = (replace(x, window=fit.window) for x in (m.linear, m.play))
     return replace(m, linear=linear, play=play, stick_slip=fit, jump=jump, evidence=m.evidence + more)

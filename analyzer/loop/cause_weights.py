@@ -1,9 +1,9 @@
-"""The signs of a cause as numbers, and what each weighs in a multinomial logit fitted to simulated loops.
+"""The signs of a cause as numbers, and their weights in a multinomial logit fitted to simulated loops.
 
-Each sign counts along a broken line, and the odds of the causes are products over the signs, as in a scorecard (Good
-1950, weight of evidence). Which way a sign may point is fixed by physics; how much it weighs is fitted. Weights and
-knots are one whole, written by `python -m proofs.cause_weights`, which says on what they were fitted and how
-they do on loops that they were not.
+Each sign enters by a piecewise linear function, and the odds of the causes are products over the signs, as in a
+scorecard (Good 1950, weight of evidence). Physics fixes the direction of each sign; its weight is fitted. Weights and
+knots belong together; `python -m proofs.cause_weights` writes them and names the loops of the fit and the results on
+other loops.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Weights:
     """Weights of all measures.
 
     knots by measure, shape (k,) each; pieces, slopes of its line below, between and above them [nat per unit], shape
-    (1 + k, 3) each, causes as in CAUSES; usual, what a measure adds on average [nat], shape (len(NAMES), 3); base
+    (1 + k, 3) each, causes as in CAUSES; usual, average contribution of a measure [nat], shape (len(NAMES), 3); base
     [nat], shape (3,).
     """
 
@@ -51,7 +51,7 @@ def parted(x: Floats, knots: Floats) -> Floats:
 
 @cache
 def weights() -> Weights:
-    """The weights as the study wrote them."""
+    """The weights as written by the study."""
     kept = json.loads((files("analyzer.loop") / FILE).read_text("utf-8"))
     order = [str(c) for c in CAUSES]
     table = kept["measures"]
@@ -62,7 +62,7 @@ def weights() -> Weights:
 
 
 def contributions(found: Floats) -> Floats:
-    """What each measure of one loop adds to the log odds of each cause [nat], shape (len(NAMES), 3)."""
+    """Contribution of each measure of one loop to the log odds of each cause [nat], shape (len(NAMES), 3)."""
     w = weights()
     return np.array(
         [parted(np.asarray(x), w.knots[n]) @ w.pieces[n] for n, x in zip(NAMES, found, strict=True)]
@@ -70,7 +70,7 @@ def contributions(found: Floats) -> Floats:
 
 
 def pushes(found: Floats) -> dict[str, Floats]:
-    """How far each measure moves the odds of each cause, beyond what it usually does and beyond their mean [nat], of
+    """Effect of each measure on the odds of each cause, relative to its usual effect and to their mean [nat], of
     shape (3,) each, by its name."""
     added = contributions(found) - weights().usual
     return dict(zip(NAMES, added - added.mean(axis=1, keepdims=True), strict=True))
@@ -84,17 +84,17 @@ def chances(found: Floats) -> dict[Cause, float]:
 
 
 UNSTABLE = 20.0
-"""Amplification [-] that stands for that of an unstable loop; ours: more than any stable one's of the study."""
+"""Amplification [-] used for an unstable loop; ours: more than any stable one's of the study."""
 SMALL_GAIN, SMALL_GAIN_CYCLE = 5.0, 0.5
-"""Gains in log likelihood [nat], of all and a cycle, up to which they count as they are, above as their log."""
+"""Gains in log likelihood [nat], of all and a cycle, up to which they enter linearly, above as their log."""
 
 KEPT = 0.9
-"""Height of the autocorrelation's third returning peak [-] from which a rhythm is kept as by a clock; ours: a load
-from a machine and a loop at its limit of stability are both above it, and not told apart by how far."""
+"""Height of the autocorrelation's third returning peak [-] from which the frequency is constant; ours: a load from a
+machine and a loop at its limit of stability are both above it, and the excess does not distinguish them."""
 
 
 def _signed_log(x: float) -> float:
-    """Straight near zero, logarithmic far from it."""
+    """Linear near zero, logarithmic far from it."""
     return math.copysign(math.log1p(abs(x)), x)
 
 
@@ -108,16 +108,16 @@ NAMES = (
     *("line_linear", "line_valve", "amplification", "loop_gain", "dead_time_share", "consistency"),
     *("harmonic", "kurtosis", "rhythm", "saturated", "wave_left"),
 )
-"""What is measured, in the order of `measures`."""
+"""The measures, in the order of `measures`."""
 
 
 def measures(m: Measured, o: Oscillation) -> Floats:
-    """The signs of one oscillating loop as numbers, shape (len(NAMES),), within fixed bounds; NaN where not known.
+    """The signs of one oscillating loop as numbers, shape (len(NAMES),), within fixed bounds; NaN if unknown.
 
     Gains in log likelihood in logarithms; agreeing and steadiness of the trials, 0 without; stickband over range of
     OP; prominences, amplification at the period and K Kp, 1 without settings, in logarithms; dead time over period;
     gain outside the period's band over gain with it; third harmonic over fundamental; kurtosis of the cycle's size;
-    the autocorrelation's third returning peak; share of time at a limit; harmonics that a faulty valve leaves.
+    the autocorrelation's third returning peak; share of time at a limit; harmonics a faulty valve does not explain.
     """
     t, cycles = m.trials, max(o.cycles, 1.0)
     found = (
@@ -168,12 +168,12 @@ GROUPS: Mapping[SignKind, tuple[tuple[str, ...], Callable[[Measured, Oscillation
     SignKind.LIMITS: (("saturated",), lambda m, o: (m.saturated,)),
     SignKind.DEAD_TIME: (("dead_time_share",), lambda m, o: (o.period_s, m.linear.dead_time_s)),
 }
-"""Measures that are one sign together, and the figures it is told by."""
+"""Measures that together are one sign, and the figures reported for it."""
 
 
 def signs_of(m: Measured, o: Oscillation, found: Floats) -> tuple[Sign, ...]:
-    """The signs of one oscillating loop, by its `measures`; strength is one less the share to which a sign brings the
-    odds against its cause."""
+    """The signs of one oscillating loop, by its `measures`; strength is one minus the factor that a sign applies to
+    the odds against its cause."""
     moved = pushes(found)
     out = []
     for kind, (names, figures) in GROUPS.items():

@@ -1,4 +1,4 @@
-"""What is known of one loop in one night, put together from its assessment and the advice on it."""
+"""Finding of one loop in one night, from its assessment and the advice on it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ PER_OP = ("gain", "slope_pct_per_s", "backlash_pct", "stickband_pct", "slip_jump
 
 
 def stated(spec: LoopSpec) -> Known:
-    """What loops.csv states of a loop, by column."""
+    """Facts of a loop stated in loops.csv, by column."""
     return {
         **{name: getattr(spec, name) for name in AS_STATED},
         "percent_of": STATED if spec.has_pv_range else RECORDED,
@@ -43,13 +43,13 @@ def stated(spec: LoopSpec) -> Known:
 
 @dataclass(frozen=True, slots=True)
 class FailedLoop:
-    """Why a loop has no results: its status, and what the record lacks or the error that ended it."""
+    """Reason for a loop without results: its status, and the missing data or the error that ended it."""
 
     status: Status
     why: Requirement
 
     def of(self, spec: LoopSpec, night: str, **known: Cell) -> Finding:
-        """The same as a finding, with further columns that are known all the same."""
+        """The same as a finding, with further known columns."""
         return Finding(
             spec.loop, night, self.status, self.why, self.why.lack, known={**stated(spec), **known}
         )
@@ -58,8 +58,7 @@ class FailedLoop:
 def concluded(
     a: Assessment, advice: Advice, spec: LoopSpec, night: str, limits: AdviceLimits, **known: Cell
 ) -> Finding:
-    """What is known of a loop that was assessed: spec, with the settings in force at the night's end; known, further
-    columns."""
+    """Finding of an assessed loop: spec, with the settings in force at the night's end; known, further columns."""
     v = a.verdict
     lacks = a.needs or v.needs
     due = advice.due if advice.action is Action.REPAIR_VALVE else None
@@ -98,7 +97,7 @@ def _swing(found: Oscillations) -> Swing:
 
 
 def _cycle_known(a: Assessment) -> Known:
-    """How regular the most significant oscillation is, the periods of all, and the ends of its last ten."""
+    """Regularity of the most significant oscillation, the periods of all, and the ends of its last ten."""
     first, found = a.oscillations.first, a.oscillations.found
     spectrum = _spectrum_kept(a.oscillations)
     out: Known = {"periods": "[]", "spectrum": spectrum}
@@ -115,7 +114,7 @@ def _cycle_known(a: Assessment) -> Known:
 
 
 def _spectrum_kept(found: Oscillations) -> str | None:
-    """Power in sixths of an octave as the store keeps it."""
+    """Power in sixths of an octave, as the store keeps it."""
     s, b = found.spectrum, found.bands
     if s is None or b is None or not b.line.size:
         return None
@@ -124,7 +123,7 @@ def _spectrum_kept(found: Oscillations) -> str | None:
 
 
 def _measured(a: Assessment, limits: AdviceLimits) -> Known:
-    """What the verdict rests on, the model that it tells, and what was noted."""
+    """Measures of the verdict, its model, and notes."""
     v, m = a.verdict, a.verdict.measured
     out: Known = {
         "start_s": a.start_s,
@@ -145,7 +144,7 @@ def _measured(a: Assessment, limits: AdviceLimits) -> Known:
 
 
 def _model_known(verdict: Verdict, limits: AdviceLimits) -> Mapping[str, float | None]:
-    """The constants told; gain and time constant apart only where the latter is well inside the window."""
+    """The reported constants; gain and time constant separately only if the latter is well inside the window."""
     m = verdict.measured
     if m is None:
         return {}
@@ -155,7 +154,7 @@ def _model_known(verdict: Verdict, limits: AdviceLimits) -> Mapping[str, float |
 
 
 def _width_beside(fault: Fault, m: Measured) -> dict[str, float | None]:
-    """The width of a valve at fault beside another cause."""
+    """The width of a faulty valve if the cause is another one."""
     if fault is Fault.STICTION and m.stick_slip is not None:
         valve = m.stick_slip.valve
         return {"stickband_pct": valve.stickband, "slip_jump_pct": valve.slip_jump}
@@ -163,7 +162,7 @@ def _width_beside(fault: Fault, m: Measured) -> dict[str, float | None]:
 
 
 def _process_known(verdict: Verdict, limits: AdviceLimits) -> dict[str, float | None]:
-    """Constants of the process, and of the valve that makes the cycle."""
+    """Constants of the process, and of the valve that causes the cycle."""
     if verdict.cause not in (Cause.VALVE, Cause.TUNING):
         return {}
     m, fit = verdict.measured, verdict.fit
@@ -182,7 +181,7 @@ def _process_known(verdict: Verdict, limits: AdviceLimits) -> dict[str, float | 
 
 
 def _of_half(verdict: Verdict, limits: AdviceLimits) -> Known:
-    """How fast the process answers a half of a split range whose valve is sound, where moves of the set point tell it
+    """Response speed of the process to a half of a split range without a valve fault, if set point moves determine it
     well."""
     m = verdict.measured
     if m is None or not m.excited or verdict.cause is not Cause.NONE:
@@ -194,7 +193,7 @@ def _of_half(verdict: Verdict, limits: AdviceLimits) -> Known:
 
 
 def _cycles_of(advice: Advice) -> Known:
-    """Limit cycles that simulation finds at the present (predicted) and at the new (expected) settings."""
+    """Limit cycles in simulation at the present (predicted) and at the new (expected) settings."""
     out: Known = {}
     for name, cycle in (("predicted", advice.before), ("expected", advice.after)):
         if cycle is not None:

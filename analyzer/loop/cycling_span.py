@@ -1,4 +1,4 @@
-"""Where in a record a loop cycles: quiet hours beside a cycle take nothing away from it.
+"""Part of a record in which a loop cycles: quiet hours do not reduce the regularity of a cycle.
 
 A day's spectrum mixes a cycle with the hours in which it is off, and its band is then no more regular than noise. So
 a band that is loud in a part of the record and quiet in the rest is judged in that part, and its share of the time is
@@ -23,7 +23,7 @@ Span = tuple[int, int]
 
 def detect_where_it_cycles(record: LoopRecord, limits: OscillationLimits) -> tuple[Oscillations, Span]:
     """The oscillations of a record with their share of all its time, and the part of it in which the first one is on:
-    the whole record where it is on for most of it, or where there is none."""
+    the whole record if it is on for most of it, or if there is none."""
     found, whole = detect(record, limits), (0, len(record))
     first, s = found.first, found.spectrum
     if first is not None and first.oscillating_pct >= limits.mostly_pct:
@@ -49,7 +49,7 @@ def detect_where_it_cycles(record: LoopRecord, limits: OscillationLimits) -> tup
 
 
 def _longest(active: Mask, dt_s: float, period_s: float, record: LoopRecord) -> Span | None:
-    """The longest run of samples in which a band is loud but for holes of two periods; None where it is most of the
+    """The longest run of samples in which a band is loud, gaps up to two periods allowed; None if it is most of the
     record, or never loud."""
     short = round(2.0 * period_s / dt_s)
     bridged = active.copy()
@@ -63,7 +63,7 @@ def _longest(active: Mask, dt_s: float, period_s: float, record: LoopRecord) -> 
 
 
 def _inside(record: LoopRecord, span: Span, period_s: float, limits: OscillationLimits) -> Oscillation | None:
-    """What oscillates at a period in a part of a record that holds enough of its cycles."""
+    """The oscillation at a period in a part of a record with enough cycles of it."""
     long_s = (span[1] - span[0]) * record.dt_s
     if long_s < limits.span_periods * period_s or long_s > 0.01 * limits.mostly_pct * record.duration_s:
         return None

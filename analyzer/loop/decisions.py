@@ -1,8 +1,8 @@
-"""What is known and decided of one loop in one night, as values that programs test; rows and words are made of them.
+"""Findings and decisions of one loop in one night, as values for programs; rows and words are made of them.
 
-The values are those of the store and of `triage rank`. A worker finds of a loop what it is by itself; the night
-completes it: whom the loop follows or moves, and its lanes. Each step makes a new Finding, and what would contradict
-itself is not made.
+The values are those of the store and of `triage rank`. A worker finds the results of a loop by itself; the night adds
+the loop that it follows or those that it moves, and its lanes. Each step makes a new Finding, and contradictory
+findings are refused.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from tuning import Cause as Cause
 
 Cell = str | float | None
 Figures = tuple[Cell, ...]
-"""What a sentence of words/ is made of: numbers, and names of loops and tags."""
+"""Inputs of a sentence of words/: numbers, and names of loops and tags."""
 CAUSES = (Cause.VALVE, Cause.TUNING, Cause.LOAD)
-"""Causes that have a confidence of their own."""
+"""Causes with their own confidence."""
 
 
 class SignKind(StrEnum):
-    """What a sign of a cause shows; those of a loop that oscillates are named for the first measure they rest on."""
+    """Kinds of signs of a cause; those of a loop that oscillates have the name of their first measure."""
 
     EVIDENCE = "evidence"
     WIDTH = "size"
@@ -50,14 +50,14 @@ class SignKind(StrEnum):
 
 
 OF_LOAD = (SignKind.LOAD_LEFT, SignKind.PROCESS, SignKind.WAVE_LEFT, SignKind.REGULARITY)
-"""Signs that a load itself leaves: a peak in what the model leaves, another process away from the period, harmonics
-that no faulty valve makes, a size and rhythm kept; that a valve or a limit is not seen at work is none of them."""
+"""Signs of a load itself: a peak in the model's residual, another process away from the period, harmonics that no
+faulty valve makes, constant size and rhythm; missing signs of a valve or a limit do not count."""
 COUNTS_PCT = 20.0
-"""A loop counts as oscillating from this share of the time on [%]; contract of the ranking."""
+"""Share of the time from which a loop counts as oscillating [%]; contract of the ranking."""
 
 
 class Fault(StrEnum):
-    """What is wrong with a valve."""
+    """Fault of a valve."""
 
     BACKLASH = "backlash"
     STICTION = "stiction"
@@ -66,7 +66,7 @@ class Fault(StrEnum):
 
 
 class GroupRole(StrEnum):
-    """What a loop is in a group that shares an oscillation."""
+    """Role of a loop in a group with a common oscillation."""
 
     SOURCE = "source"
     CANDIDATE = "candidate"
@@ -75,7 +75,7 @@ class GroupRole(StrEnum):
 
 
 class Status(StrEnum):
-    """What became of a loop in a night."""
+    """Result of a loop's night."""
 
     OK = "ok"
     NOT_ASSESSED = "not assessed"
@@ -83,7 +83,7 @@ class Status(StrEnum):
 
 
 class Lane(StrEnum):
-    """Why a loop is worth a look, beside its oscillation too; in the order in which lanes are told."""
+    """Reason to check a loop, its oscillation or another; in the order of the report."""
 
     OSCILLATION = "oscillation"
     MANUAL = "manual"
@@ -97,14 +97,14 @@ class Lane(StrEnum):
 
 
 class Due(StrEnum):
-    """When a valve's repair is due: at once, or at the next shutdown, for what it does costs little meanwhile."""
+    """Due time of a valve's repair: at once, or at the next shutdown if its effect costs little until then."""
 
     NOW = "now"
     SHUTDOWN = "next shutdown"
 
 
 class MissingData(StrEnum):
-    """What a record lacks for an answer."""
+    """Missing data of a record for an answer."""
 
     PV = "PV"
     SAMPLES = "samples"
@@ -126,7 +126,7 @@ class MissingData(StrEnum):
 
 
 class RequirementKind(StrEnum):
-    """What is needed for an answer, each of them a sentence of words/texts.toml."""
+    """Requirement for an answer, each a sentence of words/texts.toml."""
 
     PV_TAG = auto()
     GOOD_PV = auto()
@@ -161,44 +161,44 @@ class RequirementKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """What a record lacks, None where it is an error that ended the loop; what it needs, and the figures of that."""
+    """Missing data of a record, None if an error ended the loop; its requirement, and the figures of that."""
 
     lack: MissingData | None
     need: RequirementKind
     figures: Figures = ()
 
     def __str__(self) -> str:
-        """What it needs and what it has, in words."""
+        """Requirement and available data, in words."""
         return sentences("needs")[self.need].format(*self.figures)
 
 
 class LacksError(NotAssessedError):
-    """A question cannot be answered from a record, and it is known what the record lacks."""
+    """A record is not sufficient for an answer, and its missing data are known."""
 
     def __init__(self, needs: Requirement) -> None:
         self.needs = needs
         super().__init__(str(needs))
 
     def __reduce__(self) -> tuple[type[LacksError], tuple[Requirement]]:
-        """How it travels between processes: by what it was made of."""
+        """Form for transfer between processes: the constructor's argument."""
         return type(self), (self.needs,)
 
 
 def counts(oscillating_pct: float | None) -> bool:
-    """Whether a loop that oscillates for so much of the time [%] counts as oscillating."""
+    """Whether a loop that oscillates for this share of the time [%] counts as oscillating."""
     return oscillating_pct is not None and oscillating_pct >= COUNTS_PCT
 
 
 def decided_fault(row: Mapping[str, object] | None) -> Fault | None:
-    """What a night's row says of the valve; None where there is no row, or the loop was not assessed."""
+    """Fault of the valve in a night's row; None if there is no row, or the loop was not assessed."""
     told = None if row is None or row["status"] != Status.OK else row.get("valve_fault")
     return None if told is None else Fault(str(told))
 
 
 @dataclass(frozen=True, slots=True)
 class Sign:
-    """One sign: which cause it points to, how strongly (0 to 1), what it shows, and the figures and loops that say
-    so, as words/reason.py takes them."""
+    """One sign: its cause, its strength (0 to 1), its kind, and its figures and loops, in the form for
+    words/reason.py."""
 
     points_to: Cause
     strength: float
@@ -208,7 +208,7 @@ class Sign:
 
 @dataclass(frozen=True, slots=True)
 class Swing:
-    """What oscillates: significance [% h], share of the time [%], period [s] and amplitude of PV [% of span]."""
+    """The oscillation: significance [% h], share of the time [%], period [s] and amplitude of PV [% of span]."""
 
     significance: float = 0.0
     oscillating_pct: float = 0.0
@@ -218,8 +218,8 @@ class Swing:
 
 @dataclass(frozen=True, slots=True)
 class Remedy:
-    """What to do: the action, None where none was sought; what there is to say of it; new settings in the units of
-    loops.csv, and when a valve's repair is due."""
+    """Remedy: the action, None if none was searched for; its text; new settings in the units of loops.csv, and the
+    due time of a valve's repair."""
 
     action: Action | None = None
     text: str = ""
@@ -228,7 +228,7 @@ class Remedy:
     due: Due | None = None
 
     def __post_init__(self) -> None:
-        """Refuse settings without a retune, and a time for a repair that is none."""
+        """Refuse settings without a retune, and a due time without a repair."""
         if self.action is not Action.RETUNE and (self.kp_new, self.ti_new) != (None, None):
             raise ValueError(f"new settings with the action {self.action}")
         if self.action is not Action.REPAIR_VALVE and self.due is not None:
@@ -237,8 +237,8 @@ class Remedy:
 
 @dataclass(frozen=True, slots=True)
 class Root:
-    """The loop that another one follows: coherence of the two [-], how much later the follower is [s], None where
-    that cannot be told, and how sure the oscillation starts there [%]."""
+    """The loop that another one follows: coherence of the two [-], delay of the follower [s], None if unknown, and
+    confidence that the oscillation starts there [%]."""
 
     loop: str
     coherence: float
@@ -250,11 +250,11 @@ class Root:
 class Finding:
     """One loop in one night.
 
-    swing, None where the record cannot show whether the loop oscillates; confidence [%] of each cause, none
-    where no verdict was sought; lacking, why there are no results, or what the record lacks for a cause; lack, what
-    it lacks for an answer or for new settings; remedy, what to do; known, all other columns of the loop's row by
-    their names; follows, the loop that moves it; moves, those that it moves; lanes, why it is worth a look; group,
-    the number of the oscillation that it shares.
+    swing, None if the record cannot show whether the loop oscillates; confidence [%] of each cause, none if no
+    verdict was searched for; lacking, the reason for missing results, or the missing data for a cause; lack, the
+    missing data for an answer or for new settings; remedy, the action; known, all other columns of the loop's row by
+    their names; follows, the loop that moves it; moves, those that it moves; lanes, reasons to check it; group, the
+    number of the oscillation that it shares.
     """
 
     loop: str
@@ -275,7 +275,7 @@ class Finding:
     group: str | None = None
 
     def __post_init__(self) -> None:
-        """Refuse a loop that follows another one and is to do something of its own."""
+        """Refuse an own action of a loop that follows another one."""
         if self.follows is not None and self.remedy.action is not Action.SEE_SOURCE_LOOP:
             raise ValueError(f"{self.loop} follows {self.follows.loop} and is to {self.remedy.action}")
 
@@ -286,15 +286,15 @@ class Finding:
 
     @property
     def width_pct(self) -> float | None:
-        """Play or stickband of a faulty valve [% of OP], None where it is not known."""
+        """Backlash or stickband of a faulty valve [% of OP], None if unknown."""
         return self.number("stickband_pct") or self.number("backlash_pct") or None
 
     def number(self, column: str) -> float:
-        """A column's number, 0 where it is not known."""
+        """A column's number, 0 if unknown."""
         value = self.known.get(column)
         return value if isinstance(value, (int, float)) else 0.0
 
     def text(self, column: str) -> str:
-        """A column's text, '' where it is not known."""
+        """A column's text, '' if unknown."""
         value = self.known.get(column)
         return value if isinstance(value, str) else ""

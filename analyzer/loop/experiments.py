@@ -1,4 +1,4 @@
-"""Experiments in a loop's record: where they are, the model that they make together, and settings from it."""
+"""Experiments in a loop's record: their times, their common model, and settings from it."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from identification.signals.robust import robust_deviation
 from tuning.from_test import FromTest, corners, settings_from
 
 CONSTANTS = {"gain": "gain", "slope_pct_per_s": "slope", "lags_s": "time_constant_s"}
-"""Constants of a model, and what the belief calls them."""
+"""Constants of a model, and their names in the belief."""
 
 
 @dataclass(frozen=True, slots=True)
 class Controlled:
-    """What an experiment in automatic tells of its controller: how far PV goes beyond SP [% of span], and the law
-    that gives OP, None where none does."""
+    """The controller in an experiment in automatic: overshoot of PV beyond SP [% of span], and the law that explains
+    OP, None if none does."""
 
     overshoot_pct: float
     law: ControlLaw | None
@@ -42,11 +42,11 @@ class Controlled:
 
 @dataclass(frozen=True, slots=True)
 class Learned:
-    """What the experiments of a record tell.
+    """Results of a record's experiments.
 
-    found, all of them; prepared, the record that they lie in; models, of those that tell a process; model, all of
-    these as one, None where none does; settings from it, None where it gives none; untold, of each that tells
-    nothing why; controlled, what the model's own experiment in automatic tells of the controller.
+    found, all of them; prepared, the record that contains them; models, of those that determine a process; model, all
+    of these combined, None if there are none; settings from it, None if it gives none; untold, experiments without a
+    model, each with the reason; controlled, the controller in the model's own experiment in automatic.
     """
 
     found: tuple[Experiment, ...]
@@ -59,8 +59,8 @@ class Learned:
 
 
 def manual_of(spec: LoopSpec, prepared: Prepared, series: Mapping[str, Series], config: Config) -> Mask:
-    """True where OP is moved by hand or by a script, shape (n,): in manual; without a mode also where OP stands at a
-    limit for long."""
+    """True where OP is moved by an operator or a script, shape (n,): in manual; without a mode also where OP is
+    constant at a limit for long."""
     record = prepared.record
     stands = constant_stretches(
         record.op, record.dt_s, config.quality.manual_s, config.quality.manual_samples
@@ -73,7 +73,7 @@ def manual_of(spec: LoopSpec, prepared: Prepared, series: Mapping[str, Series], 
 def on_even_clock(
     spec: LoopSpec, series: Mapping[str, Series], prepared: Prepared, config: Config
 ) -> Prepared:
-    """The record without the samples that a clock repeats or loses where stamps scatter a little."""
+    """The record without the samples that a clock repeats or loses if stamps scatter a little."""
     even = snapped(dict(series), spec.pv or "")
     return (
         prepared
@@ -100,7 +100,7 @@ def learned(
     closed: bool = True,
     beside: Sequence[Floats] = (),
 ) -> Learned | None:
-    """What experiments tell of a loop; None where there are none.
+    """Results of a loop's experiments; None if there are none.
 
     closed : whether those in automatic are modelled too, which a night leaves to its routine; beside : OPs of
     neighbours on the record's clock, shape (n,) each.
@@ -118,7 +118,7 @@ def learned(
             models.append(_the_right_way(modelled(even.record, x, beside), stated))
         except NotAssessedError as error:
             untold.append((x, str(error)))
-        except (ArithmeticError, ValueError) as error:  # a fit that runs away costs the loop nothing else
+        except (ArithmeticError, ValueError) as error:  # a fit that diverges costs nothing else of the loop
             untold.append((x, f"no fit: {error}"))
     models.sort(key=lambda m: m.experiment.first)
     if not models:
@@ -131,8 +131,8 @@ def learned(
 
 
 def _the_right_way(model: Modelled, stated: Pid | None) -> Modelled:
-    """The model; NotAssessedError for one of an experiment in automatic that goes against the stated controller: such
-    a loop would run away, so a load has moved PV."""
+    """The model; NotAssessedError for one of an experiment in automatic whose gain has the wrong sign for the stated
+    controller: such a loop would be unstable, so a load has moved PV."""
     closed = model.experiment.course.closed
     if closed and stated is not None and stated.kp * model.process.slope < 0.0:
         raise NotAssessedError("the fitted process goes against its controller: a load moved PV meanwhile")
@@ -140,7 +140,7 @@ def _the_right_way(model: Modelled, stated: Pid | None) -> Modelled:
 
 
 def controlled(part: LoopRecord) -> Controlled:
-    """The overshoot of an experiment in automatic, noise left out, and the law that gives OP in it."""
+    """The overshoot of an experiment in automatic, without noise, and the law that explains OP in it."""
     way = float(np.sign(np.median(part.error[:5]))) or 1.0
     beyond = -way * part.error
     reached = np.flatnonzero(beyond >= 0.0)
@@ -153,7 +153,7 @@ def controlled(part: LoopRecord) -> Controlled:
 
 
 def _settings(model: Pooled, spec: LoopSpec, prepared: Prepared) -> FromTest | None:
-    """Settings from a model; None of a process that gives none."""
+    """Settings from a model; None if its process gives none."""
     stated = controller_of(spec, prepared)
     scan_s = stated.scan_s if stated is not None else spec.scan_s or prepared.record.dt_s
     process = model.process
@@ -164,14 +164,14 @@ def _settings(model: Pooled, spec: LoopSpec, prepared: Prepared) -> FromTest | N
 
 
 def farther(present: Pid, new: Pid) -> float:
-    """How many times new settings are the present ones, in gain or integral time, at least 1."""
+    """Ratio of new and present settings, the larger of gain and integral time, at least 1."""
     if present.kp * new.kp <= 0.0 or not math.isfinite(present.ti_s) or present.ti_s <= 0.0:
         return math.inf
     return max(*(max(a / b, b / a) for a, b in ((present.kp, new.kp), (present.ti_s, new.ti_s))))
 
 
 def constants_known(model: Pooled) -> Mapping[str, tuple[float, float]]:
-    """Constants with the deviation of their logarithms, by the names that the belief has for them."""
+    """Constants with the deviation of their logarithms, by their names in the belief."""
     out = {}
     for name, known in CONSTANTS.items():
         e = model.estimates.get(name)
@@ -187,7 +187,7 @@ def constants_known(model: Pooled) -> Mapping[str, tuple[float, float]]:
 
 
 def with_constants(witness: str | None, model: Pooled) -> str:
-    """What a night witnesses of its valve, with the constants that experiments know better, or alone."""
+    """A night's evidence about its valve, with the constants that experiments determine better, or these alone."""
     said = json.loads(witness) if witness else {}
     for name, (value, deviation) in constants_known(model).items():
         if name not in said or deviation < said[name][1]:
@@ -196,7 +196,7 @@ def with_constants(witness: str | None, model: Pooled) -> str:
 
 
 def model_row(model: Pooled) -> dict[str, Cell]:
-    """The constants of a row: gain, slope, the longest lag and dead time, play."""
+    """The constants of a row: gain, slope, the longest lag and dead time, backlash."""
     e = model.estimates
     value = {name: x.value for name, x in e.items()}
     lag = value.get("time_constant_s") if "second_lag_s" in e else value.get("lags_s")
@@ -211,8 +211,8 @@ def model_row(model: Pooled) -> dict[str, Cell]:
 
 
 def as_rows(of: Learned) -> str:
-    """The experiments as the store keeps them (JSON): span [s since 1970-01-01 UTC], course, moves, what each
-    tells, and its answer in a few hundred points, PV in % of span."""
+    """The experiments as the store keeps them (JSON): span [s since 1970-01-01 UTC], course, moves, results of each,
+    and its response in a few hundred points, PV in % of span."""
     record = of.prepared.record
     told = {m.experiment: m for m in of.models}
     why = dict(of.untold)
@@ -241,7 +241,7 @@ def _as_row(record: LoopRecord, x: Experiment, m: Modelled | None, why: str | No
 
 
 def chosen(of: Learned, present: Pid | None) -> Pid | None:
-    """New settings in place of the present ones; None where these are as good, or none follow."""
+    """New settings in place of the present ones; None if these are as good, or there are none."""
     if of.settings is None or present is None:
         return None
     new = replace(of.settings.robust, scan_s=present.scan_s)

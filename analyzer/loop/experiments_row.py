@@ -1,4 +1,4 @@
-"""A night with an experiment as a finding: alone, where the record tells nothing else, or beside the routine."""
+"""A night with an experiment as a finding: alone, if the record gives nothing else, or added to the routine."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SAID = sentences("experiments")
 
 
 def remedy_of(of: Learned, spec: LoopSpec, present: Pid | None) -> Remedy:
-    """What to do by the model of an experiment."""
+    """Remedy from the model of an experiment."""
     if of.settings is None:
         return Remedy(Action.NONE)
     span, s = of.prepared.scale.span, of.settings
@@ -35,13 +35,13 @@ def remedy_of(of: Learned, spec: LoopSpec, present: Pid | None) -> Remedy:
 
 
 def _known(of: Learned) -> dict[str, Cell]:
-    """Columns of experiments, and of the model where they tell one."""
+    """Columns of experiments, and of their model if there is one."""
     out: dict[str, Cell] = {"experiments": as_rows(of), "experiment": in_a_clause(of) or None}
     return out if of.model is None else out | model_row(of.model)
 
 
 def _witnessed(of: Learned, witness: Cell) -> dict[str, Cell]:
-    """What the night witnesses, with the constants of the model."""
+    """The night's evidence, with the constants of the model."""
     kept = witness if isinstance(witness, str) else None
     return {} if of.model is None else {"witness": with_constants(kept, of.model)}
 
@@ -54,7 +54,7 @@ def by_experiment(
     present: Pid | None,
     known: Mapping[str, Cell],
 ) -> Finding:
-    """A loop whose record tells nothing but its experiment, with what it lacks for the rest."""
+    """Finding of a loop whose record gives only its experiment, with the missing data for the other results."""
     record, notes = of.prepared.record, "; ".join(of.prepared.notes)
     span: dict[str, Cell] = {"start_s": record.start_s, "duration_s": record.duration_s, "notes": notes}
     return Finding(
@@ -72,11 +72,11 @@ def by_experiment(
 
 
 def with_experiment(found: Finding, of: Learned, spec: LoopSpec, present: Pid | None) -> Finding:
-    """A finding with the experiments beside; their model stands before that of the routine, and their settings where
+    """A finding with the experiments added; their model replaces that of the routine, and their settings are used if
     there are no others."""
     witness = found.known.get("witness")
     known = {**found.known, **_known(of), **(_witnessed(of, witness) if witness else {})}
-    if found.width_pct is not None:  # the cycles tell the valve
+    if found.width_pct is not None:  # the cycles determine the valve
         known["backlash_pct"] = found.known.get("backlash_pct")
     told = replace(found, known=known)
     if of.model is None or found.remedy.action not in OPEN:

@@ -1,4 +1,4 @@
-"""The literature's own indices of a loop, as independent signs beside the verdict, in which they take no part."""
+"""The literature's own indices of a loop, as independent signs that do not enter the verdict."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from identification.record import Floats, LoopRecord
 from identification.signals import field_indices as of
 
 A_CYCLE, MOST_CYCLES = 30.0, 200.0
-"""Samples of a cycle to which trends are averaged, and cycles that are looked at, the last: more add time and no
-sign."""
+"""Samples of a cycle to which trends are averaged, and number of the last cycles used: more take more time and give
+no further sign."""
 IDLE_PARTS = 5.0
-"""Means in an integral time between which OP and PV go up or down."""
+"""Means per integral time whose changes of OP and PV are counted."""
 LEVEL, FLOW = "level", "flow"
-"""Types of loop, as loops.csv has them: an integrator; one whose PV is what passes the valve."""
+"""Types of loop, as loops.csv has them: an integrator; one whose PV is the flow through the valve."""
 
 
 def field_indices(
     prepared: Prepared, found: Oscillations, controller: Pid | None, kind: str, config: Config
 ) -> str:
     """The indices of a loop's longest unbroken stretch in automatic, as the store keeps them (JSON): values by name,
-    and the width of the ellipse [% of OP span]; what abstains is left out.
+    and the width of the ellipse [% of OP span]; indices without a result are left out.
 
-    Indices of a valve are of loops that oscillate, whose OP is known and whose trends are not compressed; kind as in
-    loops.csv, '' for not stated: Yamashita's and Kano's are of flows, Horch's of what is no level.
+    Indices of a valve are of oscillating loops with known OP and uncompressed trends; kind as in loops.csv, '' for
+    not stated: Yamashita's and Kano's apply to flows, Horch's to all types except levels.
     """
     whole = prepared.record
     first, last = max(runs(whole.usable), key=lambda r: r[1] - r[0], default=(0, 0))
@@ -53,7 +53,7 @@ def field_indices(
 
 
 def _averaged(x: Floats, width: int) -> Floats:
-    """Means of a trend over so many samples each."""
+    """Means of a trend over `width` samples each."""
     return x[: x.size // width * width].reshape(-1, width).mean(axis=1)
 
 

@@ -1,4 +1,4 @@
-"""The stretch of a record that is fitted, in blocks; where PV is due to answer the set point; what OP did within."""
+"""Data of the fit: the stretch of a record, in blocks; times of set point responses; OP between the rows."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from identification.record import Floats, LoopRecord, Mask
 
 
 def latest_fit_stretch(record: LoopRecord, n: int, calm: bool = False) -> int:
-    """First sample of the latest stretch of n samples with the fewest out of use, or, of a calm loop, with few more
-    where the set point moves farther in it: its moves tell the process apart from load and valve. In a cycle they do
-    not: of a tight loop of the sample mill they left the time constant unsure by three times."""
+    """First sample of the latest stretch of n samples with the fewest unusable ones or, in a calm loop, with few more
+    if the set point moves farther in it: its moves separate the process from load and valve. In a cycle they do not:
+    in a tight loop of the sample mill they left the time constant uncertain by three times."""
     firsts = np.arange(len(record) - n, -1, -max(n // 4, 1))
 
     def within(x: Floats) -> Floats:
@@ -36,7 +36,7 @@ def latest_fit_stretch(record: LoopRecord, n: int, calm: bool = False) -> int:
 
 
 def bridged(usable: Mask, period: float) -> Mask:
-    """Usable samples, shape (n,), and those in holes shorter than a share of a period [samples]."""
+    """Usable samples, shape (n,), and those in gaps shorter than a share of a period [samples]."""
     most = int(LOOP.bridged * period)
     out = usable.copy()
     edges = np.flatnonzero(np.diff(np.concatenate(([1], usable.astype(np.int8), [1]))))
@@ -47,7 +47,7 @@ def bridged(usable: Mask, period: float) -> Mask:
 
 
 def across(x: Floats, hole: Mask) -> Floats:
-    """A signal, shape (n,), with a straight line from end to end of each hole."""
+    """A signal, shape (n,), with a straight line from end to end of each gap."""
     if not hole.any() or hole.all():
         return x
     at = np.flatnonzero(~hole)
@@ -57,7 +57,7 @@ def across(x: Floats, hole: Mask) -> Floats:
 def window_of(
     record: LoopRecord, scale_s: float, limits: CauseLimits, kind: str = "", calm: bool = False
 ) -> Window:
-    """The latest stretch with the fewest samples out of use, in blocks of a fraction of the period."""
+    """The latest stretch with the fewest unusable samples, in blocks of a fraction of the period."""
     factor = max(round(scale_s / limits.blocks_per_period / record.dt_s), 1)
     n = min(len(record) // factor, limits.window) * factor
     first = latest_fit_stretch(record, n, calm)
@@ -83,8 +83,8 @@ def window_of(
 
 
 def scans_of(record: LoopRecord, window: Window, law: Pid | None) -> Scans | None:
-    """What the controller did within the rows of a window; None where it computes no faster than they come, or what
-    it acts on is not known."""
+    """The controller's scans within the rows of a window; None if they are no faster than the rows, or the signal
+    that it acts on is not known."""
     count = scans_per_row(law, record.dt_s)
     if law is None or count == 1 or record.sp_estimated:
         return None
@@ -94,9 +94,9 @@ def scans_of(record: LoopRecord, window: Window, law: Pid | None) -> Scans | Non
 
 
 def due_to_answer(record: LoopRecord, window: Window, scale_s: float) -> Mask:
-    """True where PV is due to answer a set point move, shape of the window.
+    """True while a response of PV to a set point move is expected, shape of the window.
 
-    From a move for scale_s [s], and on until PV has come to the set point, however long the valve takes.
+    From a move for scale_s [s], and on until PV has reached the set point, regardless of the valve's delay.
     """
     sp = record.sp[window.first :: window.factor][: window.y.size]
     moves = np.flatnonzero(np.abs(np.diff(sp)) > 1e-6) + 1

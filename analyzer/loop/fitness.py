@@ -1,4 +1,4 @@
-"""What trends lack for a cause to be told from them, or for new settings to be sought on them."""
+"""Missing data of trends for identifying a cause, or for new settings."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from identification.record import LoopRecord
 def unfit_for_cause(
     prepared: Prepared, oscillation: Oscillation | None, config: Config
 ) -> Requirement | None:
-    """What these trends lack for a cause; None where one can be told.
+    """Missing data of these trends for a cause; None if one can be identified.
 
-    oscillation : None where the loop does not oscillate, or it is not known whether it does.
+    oscillation : None if the loop does not oscillate, or this is unknown.
     """
     record, q = prepared.record, config.quality
     if not prepared.op_known:
@@ -36,7 +36,7 @@ def unfit_for_cause(
 
 
 def pv_that_jumps(record: LoopRecord, limits: RecorderLimits) -> Requirement | None:
-    """What a PV lacks that stands and then jumps, as behind a valve that sticks, though it is the sensor that does;
+    """Requirement of a PV that is constant and then jumps, as behind a sticking valve, although the sensor causes it;
     None of any other."""
     measured = record.pv[~record.bad]
     jump, stands = least_jump(measured, limits), float(np.mean(np.diff(measured) == 0.0))
@@ -48,7 +48,7 @@ def pv_that_jumps(record: LoopRecord, limits: RecorderLimits) -> Requirement | N
 
 
 def compressed(prepared: Prepared, oscillation: Oscillation | None, q: QualityLimits) -> Requirement | None:
-    """What trends lack that a historian compressed; None where it did not, or kept enough of each cycle."""
+    """Requirement of trends that a historian compressed; None if it did not, or kept enough of each cycle."""
     if prepared.compressed_share <= q.straight_share:
         return None
     straight_pct = 100 * prepared.compressed_share
@@ -63,7 +63,7 @@ def compressed(prepared: Prepared, oscillation: Oscillation | None, q: QualityLi
 
 
 def at_limits(record: LoopRecord, q: QualityLimits) -> Requirement | None:
-    """What a record lacks whose OP is at a limit for most of the time; None where it is not."""
+    """Requirement of a record with OP at a limit for most of the time; None for others."""
     saturated = at_limits_share(record)
     if saturated <= q.saturated_share:
         return None
@@ -71,14 +71,14 @@ def at_limits(record: LoopRecord, q: QualityLimits) -> Requirement | None:
 
 
 def unfit_for_settings(prepared: Prepared, config: Config) -> Requirement | None:
-    """What these trends lack for new settings; None where nothing that they show by themselves."""
+    """Missing data of these trends for new settings; None if the trends themselves are sufficient."""
     if not prepared.op_scaled:
         return op_range(prepared.scale, prepared.record.op)
     return compressed(prepared, None, config.quality)
 
 
 def too_thin(dt_s: float, controller: Pid | None, config: Config) -> Requirement | None:
-    """What sampling new settings take, where the controller acts several times between two samples, unseen."""
+    """Sampling required for new settings if the controller acts several times between two samples, unrecorded."""
     samples = config.settings.ti_samples
     if controller is None or dt_s <= controller.ti_s / samples:
         return None

@@ -1,4 +1,4 @@
-"""What is known of an identified loop: its constants within 90 %, how tight it is, its load, what else it may be."""
+"""Properties of an identified loop: its constants within 90 %, its sensitivity, its load, other possible loops."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ INTEGRATING = 10.0
 """Time constant over a cycle's period [-] from which a lag acts on it as an integrator: its phase is within a degree
 of -90 degrees."""
 WIDER = 1.4
-"""Width of a valve over that fitted to a record of one row in several scans, which is possible [-]; ours:
+"""Possible ratio of a valve's width to that fitted to a record of one row in several scans [-]; ours:
 benchmarks/world, seeds 95 to 99, every 10 s: the least of 37 widths is 1/1.43 of the truth."""
 MOST_OF_SWING = 0.8
 """Width over OP's swing up to which a wider valve still moves [-]; ours."""
@@ -40,19 +40,19 @@ COARSE = 2.0
 
 
 def is_known(fit: Fit, limits: AdviceLimits) -> bool:
-    """Whether the time constant is well inside the window, so that it can be told from an integrator's."""
+    """Whether the time constant is well inside the window, so that it differs from an integrator's."""
     return fit.time_constant_s < limits.longest_share * fit.window.duration_s
 
 
 def lag_factor(fit: Fit, valve: bool, limits: AdviceLimits) -> float | None:
-    """Factor from the time constant to its 90 % limits [-]; None where the record tells gain over it alone."""
+    """Factor from the time constant to its 90 % limits [-]; None if the record gives only gain over time constant."""
     spread = math.sqrt(max(float(covariance(fit, free_width=valve)[0, 0]), 0.0))
     factor = math.exp(min(NINETY * spread, 20.0))
     return factor if is_known(fit, limits) and factor < limits.most_factor else None
 
 
 def tuned(fit: Fit, valve: bool, limits: AdviceLimits) -> Process:
-    """The process that settings are sought for: an integrator where the time constant is not known."""
+    """The process for the search of settings: an integrator if the time constant is unknown."""
     process = fit.process
     if lag_factor(fit, valve, limits) is None:
         return Integrator(process.slope, process.dead_time_s)
@@ -62,17 +62,16 @@ def tuned(fit: Fit, valve: bool, limits: AdviceLimits) -> Process:
 def cautious(process: Fopdt, period_s: float | None) -> Fopdt:
     """A process with its time constant raised to two periods at the same slope.
 
-    A cycle tells gain over time constant; a time constant much beyond the period cannot be told from it, and an
-    integral time after one that is too short makes a loop swing that should be calmed.
+    A cycle gives gain over time constant; a time constant much beyond the period cannot be separated from it, and an
+    integral time based on too short a one makes a loop oscillate that should become calm.
     """
     t = max(process.time_constant_s, 2.0 * (period_s or 0.0))
     return Fopdt(process.slope * t, t, process.dead_time_s)
 
 
 def sensitivity(m: Measured, period_s: float) -> float | None:
-    """Ms of the identified loop [-], inf where it is unstable; None where no settings are known, or they act the
-    wrong way. The smaller of those with the process as identified and as settings are sought for it, of a cycle of
-    period_s [s].
+    """Ms of the identified loop [-], inf if it is unstable; None if no settings are known, or they act the wrong way.
+    The smaller of those with the process as identified and as used for settings, of a cycle of period_s [s].
     """
     process, controller = m.linear.process, m.controller
     if controller is None or process.gain * controller.kp <= 0.0:
@@ -83,8 +82,8 @@ def sensitivity(m: Measured, period_s: float) -> float | None:
 
 
 def gain_room(m: Measured) -> float | None:
-    """SIMC's gain for the identified process over the present one [-]; None where no settings are known, or they act
-    the wrong way, or the set point did not move: a load alone does not tell how late PV answers OP."""
+    """SIMC's gain for the identified process over the present one [-]; None if no settings are known, or they act the
+    wrong way, or the set point did not move: a load alone does not determine the delay of PV."""
     process, controller = m.linear.process, m.controller
     if not m.excited or controller is None or process.gain * controller.kp <= 0.0:
         return None
@@ -92,12 +91,12 @@ def gain_room(m: Measured) -> float | None:
 
 
 def load_of(fit: Fit, controller: Pid) -> Floats:
-    """Load and noise [% PV] that the model leaves, on the scan's clock, the latest scans, shape (m,).
+    """Residual load and noise of the model [% PV], on the scan's clock, the latest scans, shape (m,).
 
-    Moves of the set point are taken off it: a PI at a constant set point answers such a load as it does the moves.
+    Moves of the set point are subtracted: a PI at a constant set point responds to such a load as to the moves.
 
-    Blocks have lost the noise from scan to scan, rows have it at their own interval only. OP still has it, times the
-    gain, and it dithers the stem; white noise of that size is added.
+    Blocks do not contain the noise from scan to scan, rows contain it at their own interval only. OP still contains
+    it, times the gain, and it dithers the stem; white noise of that size is added.
     """
     window = fit.window
     scan_s = controller.scan_s or window.dt_s
@@ -115,8 +114,8 @@ def load_of(fit: Fit, controller: Pid) -> Floats:
 
 
 def recorded_error(fit: Fit, controller: Pid) -> float:
-    """Average absolute error of what a fit rests on [% PV]; about PV's mean where the set point stands still.
-    The noise that blocks have lost is added as in `load_of`."""
+    """Average absolute error of the data of a fit [% PV]; about PV's mean if the set point is constant. The noise
+    missing in blocks is added as in `load_of`."""
     window = fit.window
     sp = 0.0 if window.sp is None else window.sp - window.y.mean()
     slow = float(np.mean(np.abs((window.centred - sp)[window.usable])))
@@ -125,14 +124,14 @@ def recorded_error(fit: Fit, controller: Pid) -> float:
 
 
 def scan_noise(window: Window, controller: Pid) -> float:
-    """Standard deviation of PV's noise from sample to sample [% PV], read from OP's second differences.
+    """Standard deviation of PV's noise from sample to sample [% PV], from OP's second differences.
 
-    Those of white noise have sqrt(6) times its deviation, behind a filter of PV that keeps a share a
-    (1 - a) sqrt(2 (3 - a) / (1 + a)) times; OP's rounding is taken off. The median leaves steps aside (Rousseeuw,
-    Croux 1993); where it lies within a few digits of OP it is a digit's, and the mean square of all jumps as small is
-    taken (Sheppard 1898).
+    Those of white noise have sqrt(6) times its deviation, and behind a filter of PV that keeps a share a
+    (1 - a) sqrt(2 (3 - a) / (1 + a)) times; OP's rounding is subtracted. The median ignores steps (Rousseeuw, Croux
+    1993); if it is within a few digits of OP it is a digit's, and the mean square of jumps of that size is used
+    (Sheppard 1898).
     """
-    held = max(round(controller.scan_s / window.step_s), 1)  # OP stands still between two scans
+    held = max(round(controller.scan_s / window.step_s), 1)  # OP is constant between two scans
     op = window.op[::held]
     jumps = np.abs(np.diff(op, 2))
     if jumps.size == 0 or controller.kp == 0:
@@ -153,15 +152,15 @@ def uncertain(fit: Fit, loop: Loop, samples: int = 6) -> tuple[Loop, ...]:
     spread = covariance(fit, free_width=loop.valve is not None) * np.outer(relative, relative)
     scale = np.sqrt(np.maximum(np.diag(spread), 1e-24))
     unit = spread / np.outer(scale, scale) + 1e-9 * np.eye(mean.size)
-    # not by singular vectors, whose signs are a matter of rounding
+    # not by singular vectors, whose signs depend on rounding
     root = scale[:, None] * np.linalg.cholesky(unit)
     draws = mean + np.random.default_rng(SEED).normal(size=(samples, mean.size)) @ root.T
     return tuple(_drawn(draw, fit, loop) for draw in draws)
 
 
 def alike(fit: Fit, loop: Loop, period_s: float) -> tuple[tuple[Loop, Floats], ...]:
-    """Loops that the cycle of a period [s] cannot tell from the fitted one, each with the load [% PV] that the record
-    leaves to it, as `load_of`.
+    """Loops that the cycle of a period [s] cannot distinguish from the fitted one, each with its residual load [% PV]
+    of the record, as `load_of`.
 
     A limit cycle determines the product of the process and the valve's describing function at its own frequency alone
     (Astrom, Hagglund 1984). OP between two rows of a record is unknown and biases the rest: the time constant and the
@@ -190,14 +189,14 @@ def alike(fit: Fit, loop: Loop, period_s: float) -> tuple[tuple[Loop, Floats], .
 def _drawn(draw: Floats, fit: Fit, loop: Loop) -> Loop:
     """The loop at one draw of log time constant, dead time, stickband and log gain.
 
-    The lag stays within a factor of ten, slope and dead time within three. Gain over time constant is drawn well
-    where the two by themselves are not: their errors go together.
+    The lag stays within a factor of ten, slope and dead time within three. The draw of gain over time constant is
+    precise even if both by themselves are not: their errors are correlated.
     """
     log_t = min(max(draw[0], math.log(fit.time_constant_s) - 2.3), math.log(fit.time_constant_s) + 2.3)
     off = draw[3] - draw[0] - math.log(abs(fit.slope))
     slope = fit.slope * math.exp(min(max(off, -math.log(3.0)), math.log(3.0)))
     longest = 3.0 * max(loop.process.dead_time_s, loop.controller.scan_s)
-    between = loop.process.dead_time_s - fit.process.dead_time_s  # of a controller that acts between samples
+    between = loop.process.dead_time_s - fit.process.dead_time_s  # for a controller that acts between samples
     dead, t = min(max(float(draw[1]) + between, 0.0), longest), math.exp(log_t)
     is_ramp = isinstance(loop.process, Integrator)
     process: Process = Integrator(slope, dead) if is_ramp else Fopdt(slope * t, t, dead)
@@ -208,9 +207,9 @@ def _drawn(draw: Floats, fit: Fit, loop: Loop) -> Loop:
 def intervals(fit: Fit, valve: bool, limits: AdviceLimits) -> dict[str, Estimate]:
     """Estimates of a fit with 90 % intervals from the curvature of the likelihood and the scatter of its scores.
 
-    Gain and time constant are left out where the record tells their ratio alone (lag_factor). Of a
-    valve that jumps PV tells jump times slope; only slips beyond the first of a half cycle part the two, so both
-    are told within wide limits. proofs/coverage.md says how often the intervals hold the truth.
+    Gain and time constant are left out if the record gives only their ratio (lag_factor). For a valve that jumps PV
+    gives jump times slope; only slips beyond the first of a half cycle separate the two, so both have wide intervals.
+    proofs/coverage.md gives the coverage of the intervals.
     """
     whole = covariance(fit, free_width=valve)
     t, window = fit.time_constant_s, fit.window
@@ -228,7 +227,7 @@ def intervals(fit: Fit, valve: bool, limits: AdviceLimits) -> dict[str, Estimate
     out["dead_time_s"] = _around(dead_s, late, "s", least=0.0)
     if valve and window.decoded:
         spread[2] = INTERVALS.decoded * fit.valve.stickband
-    if valve and window.steps > 1:  # what OP did between the rows is drawn, not known
+    if valve and window.steps > 1:  # OP between the rows is drawn, not known
         spread[2] = math.hypot(spread[2], INTERVALS.between * fit.valve.stickband)
     if valve:
         name = "backlash_pct" if fit.valve.slip_jump == 0 else "stickband_pct"
@@ -239,17 +238,17 @@ def intervals(fit: Fit, valve: bool, limits: AdviceLimits) -> dict[str, Estimate
 
 
 def _lag_wider(fit: Fit, valve: bool) -> float:
-    """Times wider that a time constant is told; behind play the deviations are those of its errors."""
+    """Factor on the interval of a time constant; with backlash the deviations are those of its errors."""
     if not valve:
         return INTERVALS.wider
     return INTERVALS.wider * INTERVALS.jumping if fit.valve.slip_jump > 0 else 1.0
 
 
 def _jumping(window: Window, valve: StemLaw, found: dict[str, Estimate]) -> dict[str, Estimate]:
-    """What is told of a valve that jumps, within what PV leaves open.
+    """Intervals of a valve that jumps, from the uncertainty that PV leaves.
 
-    Slip jump from half of the found one to the whole stickband, slope and gain by what their product with the jump
-    leaves; a stem that lets go later is as good as a process that answers later by the time OP takes for that.
+    Slip jump from half of the found one to the whole stickband, slope and gain from their product with the jump; a
+    stem that slips later is equivalent to a process that responds later by the time OP takes for that.
     """
     jump, band = valve.slip_jump, valve.stickband
     out = {"slip_jump_pct": Estimate(jump, jump / INTERVALS.least_jump, band, "% of OP")}
@@ -268,8 +267,8 @@ def _jumping(window: Window, valve: StemLaw, found: dict[str, Estimate]) -> dict
 
 
 def slope_deviation(fit: Fit, spread: Floats) -> float:
-    """Relative deviation of gain over time constant [-], whose errors go together; spread, covariance of (log T, L,
-    stickband, gain), shape (4, 4)."""
+    """Relative deviation of gain over time constant [-], whose errors are correlated; spread, covariance of (log T,
+    L, stickband, gain), shape (4, 4)."""
     relative = spread[3, 3] / fit.gain**2 + spread[0, 0] - 2.0 * spread[0, 3] / fit.gain
     return math.sqrt(max(relative, 0.0))
 

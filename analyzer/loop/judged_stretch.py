@@ -1,11 +1,11 @@
-"""Which stretch of a record its verdict rests on: in automatic, and under one pair of settings; and which settings.
+"""Stretch of a record for the verdict: in automatic, and under one pair of settings; and the settings.
 
-New settings make another loop of the same process, and a controller in manual makes none: neither tells anything of
-the other. Where the settings were changed within a record, what came before says nothing of those in force.
+New settings make another loop of the same process, and a controller in manual makes none: neither is evidence about
+the other. If the settings were changed within a record, the part before is no evidence about those in force.
 
-Settings are changed and lists are not; advice that rests on settings of last month can double an error. The law that
-OP follows is recovered from the night's own SP, PV and OP, and where it explains OP far better than the stated one
-and is another, the two are told and nothing is advised.
+Often settings are changed but lists are not; advice based on last month's settings can double an error. The law that
+OP follows is recovered from the night's own SP, PV and OP. If it explains OP far better than the stated one and
+differs from it, both are reported and no advice is given.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from identification.record import LoopRecord, Mask
 
 @dataclass(frozen=True, slots=True)
 class Earlier:
-    """Settings in force in a record until a time [s since 1970-01-01 UTC]: the row that states them, and the
-    controller that it makes, None where it states none."""
+    """Settings in force in a record until a time [s since 1970-01-01 UTC]: the row that states them, and its
+    controller, None if it states none."""
 
     until_s: float
     spec: LoopSpec
@@ -43,7 +43,7 @@ class Earlier:
 @dataclass(frozen=True, slots=True)
 class Stretch:
     """Samples first to last (excluded) of a record, the settings in force there, and whether those in force at the
-    record's end are younger than it, and so are not judged."""
+    record's end are newer, and so are not judged."""
 
     first: int
     last: int
@@ -52,7 +52,7 @@ class Stretch:
 
 
 def controller_of(spec: LoopSpec, prepared: Prepared) -> Pid | None:
-    """The controller that a row states, in percent and seconds, its scan that of the record where it states none."""
+    """The controller of a row, in percent and seconds, its scan that of the record if none is stated."""
     stated = stated_controller(spec, prepared.scale.span)
     if stated is None or spec.scan_s is not None:
         return stated
@@ -62,21 +62,21 @@ def controller_of(spec: LoopSpec, prepared: Prepared) -> Pid | None:
 def earlier_settings(
     spec: LoopSpec, changes: Sequence[TuningChange], prepared: Prepared
 ) -> tuple[Earlier, ...]:
-    """What was in force in a record before its last settings, of a loop as loops.csv states it."""
+    """Settings in force in a record before its last ones, of a loop as loops.csv states it."""
     record = prepared.record
     before = settings_before(spec, changes, record.start_s, record.start_s + record.duration_s)
     return tuple(Earlier(until_s, old, controller_of(old, prepared)) for until_s, old in before)
 
 
 def _between_runs(out: Mask, first: int, last: int, least: int) -> list[tuple[int, int]]:
-    """Stretches of the samples first to last between runs of True in `out` of at least so many."""
+    """Stretches of the samples first to last between runs of True in `out` of at least `least`."""
     long = ((first + a, first + b) for a, b in runs(out[first:last]) if b - a >= least)
     edges = [first, *chain.from_iterable(long), last]
     return [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b > a]
 
 
 def _in_automatic(record: LoopRecord, first: int, last: int, config: Config) -> tuple[int, int]:
-    """The longest stretch between long spans in manual, where it holds most of what is in automatic; else all."""
+    """The longest stretch between long spans in manual, if it contains most of the time in automatic; else all."""
     least = max(round(config.quality.manual_s / record.dt_s), 1)
     a, b = max(_between_runs(record.mask("manual"), first, last, least), key=lambda ends: ends[1] - ends[0])
     use = record.usable
@@ -87,9 +87,9 @@ def _in_automatic(record: LoopRecord, first: int, last: int, config: Config) -> 
 def judged_stretch(
     record: LoopRecord, controller: Pid | None, earlier: Sequence[Earlier], config: Config
 ) -> Stretch:
-    """The stretch that a verdict rests on: the part since the last change of settings, in automatic.
+    """The stretch for the verdict: the part since the last change of settings, in automatic.
 
-    Where too little of it is good to judge new settings, the part of the record with most good samples. The
+    If too few of its samples are good to judge new settings, the part of the record with most good samples. The
     controller is the one in force at the record's end; those before it, oldest first.
     """
     cuts = [round((e.until_s - record.start_s) / record.dt_s) for e in earlier]
@@ -104,7 +104,7 @@ def judged_stretch(
 
 
 def _factor(a: float, b: float) -> float:
-    """How many times one setting is the other, at least 1; inf where one is nothing or the signs differ."""
+    """Ratio of two settings, at least 1; inf if one is zero or the signs differ."""
     if a == b:
         return 1.0
     if not a * b > 0 or math.isinf(a) or math.isinf(b):
@@ -114,12 +114,12 @@ def _factor(a: float, b: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """What a record shows of a controller, in percent and seconds.
+    """Evidence of a record about its controller, in percent and seconds.
 
-    other, settings that are not the stated ones, None where they agree or the record cannot tell; beside, the stated
-    ones with what the controller has beside, or those recorded where none are stated, None where the record shows no
-    more than is stated; scheduled_over, the signal, 'op', 'pv' or 'sp', in a part of whose range alone the stated
-    gain holds, None where there is none.
+    other, settings that differ from the stated ones, None if they agree or the record is not sufficient; beside, the
+    stated ones with the controller's further terms, or the recorded ones if none are stated, None if the record shows
+    no more than is stated; scheduled_over, the signal, 'op', 'pv' or 'sp', that schedules the gain, so that the
+    stated gain is valid only in a part of its range, None if there is none.
     """
 
     other: Pid | None = None
@@ -128,10 +128,10 @@ class Shown:
 
 
 def shown(record: LoopRecord, stated: Pid | None, scale_s: float, limits: SettingsLimits) -> Shown:
-    """What a record shows of its controller, in the whole of it or in its later half.
+    """Evidence of a record about its controller, from the whole of it or its later half.
 
-    Settings that were changed within the record show in its later half, and those are the ones in force. scale_s is
-    the period, or another time scale on which the loop moves [s].
+    Settings changed within the record appear in its later half, and those are in force. scale_s is the period, or
+    another time scale of the loop [s].
     """
     if record.mask("compressed").mean() > limits.straight_share:
         return Shown()
@@ -158,12 +158,12 @@ def shown(record: LoopRecord, stated: Pid | None, scale_s: float, limits: Settin
 
 
 def differing(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits) -> Pid | None:
-    """The recorded settings where they are plainly not the stated ones; None where they agree or none can be told."""
+    """The recorded settings if clearly different from the stated ones; None if they agree or are not identified."""
     return shown(record, stated, scale_s, limits).other
 
 
 def recorded(record: LoopRecord, scale_s: float, limits: SettingsLimits) -> Pid | None:
-    """The controller that a record shows where none is stated; None where no law with a gain gives nearly all of
+    """The controller identified in a record if none is stated; None if no law with a gain explains nearly all of
     OP."""
     first = fit_pi(record, scale_s)
     if first is None or first.kp == 0.0 or first.explained < limits.explained:
@@ -175,8 +175,8 @@ def recorded(record: LoopRecord, scale_s: float, limits: SettingsLimits) -> Pid 
 
 
 def as_recorded(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits) -> Pid:
-    """The controller whose integral time says whether a record's samples suffice: the recorded one where the record
-    shows a law with a gain, however little that differs from the stated one, else the stated one."""
+    """The controller whose integral time decides if a record's samples suffice: the recorded one if the record shows
+    a law with a gain, however little that differs from the stated one, else the stated one."""
     seen = compare_laws(record, scale_s, stated)
     if seen is None or seen.explained < limits.explained or seen.found.kp == 0.0:
         return stated
@@ -184,8 +184,8 @@ def as_recorded(record: LoopRecord, stated: Pid, scale_s: float, limits: Setting
 
 
 def _of_another_form(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits) -> Pid | None:
-    """The controller whose settings were stated in another form, series for ideal or the reverse, where the record
-    obeys it; the stated one is known not to be it."""
+    """The controller with settings stated in another form, series for ideal or the reverse, if the record agrees with
+    it; only called if the stated one is rejected."""
     for other in other_forms(stated):
         if _factor(other.kp, stated.kp) >= limits.factor_of_form:
             seen = compare_laws(record, scale_s, other)
@@ -195,8 +195,8 @@ def _of_another_form(record: LoopRecord, stated: Pid, scale_s: float, limits: Se
 
 
 def other_forms(c: Pid) -> tuple[Pid, ...]:
-    """What a controller with a derivative is where the settings of its series form were read as ideal ones, and where
-    those of its ideal form were read as series; the latter where there are such settings."""
+    """A controller with a derivative if the settings of its series form were read as ideal ones, and if those of its
+    ideal form were read as series; the latter if such settings exist."""
     if c.td_s == 0.0 or not c.ki or c.kp == 0.0:
         return ()
     ratio = c.td_s / c.ti_s
@@ -208,9 +208,9 @@ def other_forms(c: Pid) -> tuple[Pid, ...]:
 
 
 def _plainly(seen: LawsCompared, stated: Pid, record: LoopRecord, limits: SettingsLimits) -> bool:
-    """Whether the stated law is another than the one found, and explains plainly less: noise that the recorder adds
-    to PV leaves the true law 1/explained times what it leaves the best. Where OP may reach a limit of its own, or an
-    integral act, between two samples, the law found must give nearly all of OP."""
+    """Whether the stated law differs from the one found, and explains clearly less: noise that the recorder adds to
+    PV gives the true law a residual of 1/explained times the best one's. If OP may reach a limit of its own, or an
+    integral act, between two samples, the law found must explain nearly all of OP."""
     if seen.explained < limits.explained or seen.explained - seen.explained_stated < limits.gain:
         return False
     unseen = limits.judged_ti_samples * record.dt_s
@@ -224,8 +224,8 @@ def _plainly(seen: LawsCompared, stated: Pid, record: LoopRecord, limits: Settin
 
 
 def _apart(found: Pid, stated: Pid, dt_s: float, filtered: float) -> float:
-    """The largest factor between settings, less what a derivative's filter may make of it; of a slope that is taken
-    between the samples nothing is known."""
+    """The largest factor between settings, less the possible effect of a derivative's filter; a slope computed
+    between the samples is unknown."""
     apart = max(_factor(found.kp, stated.kp), _factor(found.ti_s, stated.ti_s))
     if max(found.td_s, stated.td_s) == 0.0:
         return apart

@@ -1,4 +1,4 @@
-"""What the signs of a cause are read from: rivals fitted to one loop's trends, and what they leave."""
+"""Measures for the signs of a cause: candidates fitted to one loop's trends, and their residuals."""
 
 from __future__ import annotations
 
@@ -40,25 +40,25 @@ from tuning.frequency_response import is_stable, loop_response
 from tuning.ringing import ObservedRinging, observed_ringing
 
 HARMONICS = (2, 3)
-"""Harmonics of a cycle that a valve's model must explain: beyond the third few samples a cycle are left."""
+"""Harmonics of a cycle that a valve's model must explain: beyond the third too few samples a cycle remain."""
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What the signs are read from.
+    """The measures for the signs.
 
-    linear, play, stick_slip : the fits; evidence [nat] of the better valve over none; size, its stickband over
-    OP's range [-]; jump [nat], stick-slip over play; line_linear and line_valve, prominence at the period of the
-    load that the plain model and the valve model leave [-]; amplification |S| there [-], None without settings;
-    stable, the identified loop; consistency [-], gain outside the period's band over gain with it; harmonic [-],
-    locked third over the fundamental; saturated, share of time at limits [-]; moves, how often the stem of the
-    better valve sets out; excited, whether set point moves drove the loop; trials, how the stretches between OP's
-    turns agree on the better valve, None with too few; kurtosis [-] of the band at the period, 3 for noise, 1.5 where
-    the size is kept; wave_left [-], harmonics of PV's cycle that the better valve leaves, over its fundamental;
-    steady [-], of a calm loop, how the stretches between moves of the stem agree on the better valve: their mean gain
-    over its standard error, and asked, what it gains while PV is due to answer moves of the set point [nat]; ringing,
-    whether the loop itself makes the cycle, None without settings; observed, the spectrum of its error, None without
-    a cycle; scale_s, the period or another time scale of the loop [s].
+    linear, play, stick_slip : the fits; evidence [nat] of the better valve over none; size, its stickband over OP's
+    range [-]; jump [nat], stick-slip over backlash; line_linear and line_valve, prominence at the period of the
+    residual load of the model without a valve fault and of the valve model [-]; amplification |S| there [-], None
+    without settings; stable, the identified loop; consistency [-], gain outside the period's band over gain with it;
+    harmonic [-], locked third over the fundamental; saturated, share of time at limits [-]; moves, number of moves of
+    the better valve's stem; excited, whether set point moves drove the loop; trials, agreement of the stretches
+    between OP reversals on the better valve, None with too few; kurtosis [-] of the band at the period, 3 for noise,
+    1.5 for a constant size; wave_left [-], harmonics of PV's cycle in the residual of the better valve, over its
+    fundamental; steady [-], of a calm loop, agreement of the stretches between moves of the stem on the better valve:
+    their mean gain over its standard error, and asked, its gain while a response of PV to set point moves is expected
+    [nat]; ringing, whether the loop itself makes the cycle, None without settings; observed, the spectrum of its
+    error, None without a cycle; scale_s, the period or another time scale of the loop [s].
     """
 
     linear: Fit
@@ -88,7 +88,7 @@ class Measured:
 
     @property
     def window(self) -> Window:
-        """What all of them are fitted to."""
+        """The data of all the fits."""
         return self.linear.window
 
 
@@ -98,7 +98,7 @@ def _prominence(x: Floats, dt_s: float, period_s: float) -> float:
 
 
 def _harmonics_left(fit: Fit, period_s: float) -> float:
-    """Second and third harmonic locked to PV's cycle in what a fit leaves of PV, over PV's fundamental."""
+    """Second and third harmonic locked to PV's cycle in the residual of a fit, over PV's fundamental."""
     window = fit.window
     if window.duration_s < LOOP.harmonic_cycles * period_s:
         return 0.0
@@ -121,8 +121,8 @@ def measure(
     error: Spectrum | None = None,
     kind: str = "",
 ) -> Measured:
-    """Fit the candidates and read what the signs need; see Measured. Raises NotAssessedError where good samples are
-    too scattered for a model of how one follows from those before it."""
+    """Fit the candidates and compute the measures for the signs; see Measured. Raises NotAssessedError if good
+    samples are too scattered for an autoregressive model."""
     scale, calm = time_scale(record, oscillation, controller), oscillation is None
     window = window_of(record, scale, limits, kind, calm)
     check_judged(window, limits)
@@ -152,27 +152,27 @@ def measure(
     if oscillation is None:
         if window.position is not None:
             return replace(seen_alone, steady=math.inf)
-        alone = not record.mask("idle").any()  # else another one moves PV too
+        alone = not record.mask("idle").any()  # else another loop moves PV too
         return _without_a_cycle(seen_alone, best, linear, due if alone else None)
     return _of_a_cycle(seen_alone, best, linear, law, error)
 
 
 def ringing_period(m: Measured, limits: CauseLimits) -> float | None:
-    """Period [s] at which the identified loop of a calm record rings; None where it is damped, or not known."""
+    """Period [s] at which the identified loop of a calm record rings; None if it is damped, or unknown."""
     ms, period_s = calm_resonance(m.linear, m.controller, m.scale_s)
     return period_s if ms >= limits.ringing_ms else None
 
 
 def _without_a_cycle(m: Measured, best: Fit, linear: Fit, due: Mask | None) -> Measured:
-    """What the stretches between moves of the stem show beside, and PV where it is due to answer a set point."""
+    """Further measures of the stretches between moves of the stem, and of PV's set point responses."""
     shown = trials_between_moves(best, linear)
     asked = 0.0 if due is None else float(gains(best, linear)[due].sum())
     return replace(m, steady=0.0 if shown is None else shown.steadiness, asked=asked)
 
 
 def _of_a_cycle(m: Measured, best: Fit, linear: Fit, law: Pid | None, error: Spectrum | None) -> Measured:
-    """What a cycle of this period shows beside: in the load that the fits leave, in the wave of the error and,
-    where the controller's law is known, in the margins of the loop."""
+    """Further measures of a cycle of this period: in the residual load of the fits, in the waveform of the error and,
+    if the control law is known, in the margins of the loop."""
     dt_s, scale = linear.window.dt_s, m.scale_s
     found = replace(
         m,
@@ -194,7 +194,7 @@ def _of_a_cycle(m: Measured, best: Fit, linear: Fit, law: Pid | None, error: Spe
 
 
 def recovered(record: LoopRecord, scale_s: float, least: float = 0.5) -> Pid | None:
-    """PI settings recovered from the record where they explain at least so much of OP's moves [-], None where not."""
+    """PI settings recovered from the record if they explain at least `least` of OP's moves [-], else None."""
     found = fit_pi(record, scale_s)
     if found is None or found.explained < least or not math.isfinite(found.ti_s):
         return None
@@ -211,9 +211,9 @@ def _amplification(process: Fopdt, controller: Pid | None, period_s: float) -> t
 
 
 def time_scale(record: LoopRecord, oscillation: Oscillation | None, controller: Pid | None) -> float:
-    """The period [s], or a guess of the loop's time scale where it does not oscillate.
+    """The period [s], or an assumed time scale of a loop that does not oscillate.
 
-    Four integral times where they are stated (the cycle of a PI loop with play is of that order), else sixty
+    Four integral times if they are stated (the cycle of a PI loop with backlash is of that order), else sixty
     samples, so that blocks are samples.
     """
     if oscillation is not None:

@@ -1,10 +1,10 @@
-"""Whether a loop oscillates: periods, amplitude, regularity, share of time, significance.
+"""Detection of oscillations: periods, amplitude, regularity, share of time, significance.
 
-A peak of the spectrum counts where it carries a fair share of the error, stands out most of the time, and its
-half-cycles, none larger than the usual one, come back, by more than noise shows in so many cycles: see _in_shape.
-What the set point explains is taken out first, so set point steps and a cascade's moving set point are not
-oscillation of the loop, nor is what dies away where the set point rests, as a programme's corners do. A cycle a
-little short of that counts where PV convicts the valve of making it: see `assess.with_valve_oscillation`.
+A peak of the spectrum counts if it has a sufficient share of the error, is prominent most of the time, and its
+half-cycles, none larger than the usual one, recur more regularly than noise does in as many cycles: see _in_shape.
+The set point's part is removed first, so set point steps and a cascade's moving set point are no oscillation of the
+loop; neither is ringing that decays while the set point is constant, as after a programme's corners. A slightly less
+regular cycle counts if PV shows that the valve causes it: see `assess.with_valve_oscillation`.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ class Oscillation:
     """One period of a loop.
 
     period_s [s]; amplitude_pct, half of peak to peak of the fundamental [% of PV span] while it oscillates;
-    oscillating_pct, share of time [%]; significance [% h], amplitude times correlation summed over the hours
-    of oscillation; rhythm, what the autocorrelation says; prominence as in OscillationLimits; cycles, periods that
-    the record holds, and so its frequency in lines of the spectrum.
+    oscillating_pct, share of time [%]; significance [% h], amplitude times correlation summed over the hours of
+    oscillation; rhythm, regularity of the autocorrelation; prominence as in OscillationLimits; cycles, number of
+    periods in the record, which is the frequency in lines of the spectrum.
     """
 
     period_s: float
@@ -56,11 +56,11 @@ class Oscillation:
 
 @dataclass(frozen=True, slots=True)
 class Oscillations:
-    """What was found in one record.
+    """Oscillations of one record.
 
     found : the oscillations, the most significant first; active : True where the first one is on, shape (m,), at
-    interval active_dt_s [s]; level : its amplitude over time [% of PV span], shape (m,); spectrum and bands of
-    the error without the set point's part.
+    interval active_dt_s [s]; level : its amplitude over time [% of PV span], shape (m,); spectrum and bands of the
+    error without the set point's part.
     """
 
     found: tuple[Oscillation, ...] = ()
@@ -77,9 +77,9 @@ class Oscillations:
 
 
 def begun_up(error: Floats) -> int:
-    """Sample at which the error first comes to nothing, of a record that begins far from its set point; else 0.
+    """Sample at which the error first reaches zero, of a record that begins far from its set point; else 0.
 
-    A vessel heated up, or a loop just switched on, is on its way there; what it swings by then hides every cycle.
+    A vessel that heats up, or a loop just switched on, approaches its set point; this excursion hides every cycle.
     """
     arrived = int(np.argmax(error * error[0] <= 0.0))
     if arrived == 0 or arrived > LOOP.longest_way * error.size:
@@ -89,8 +89,8 @@ def begun_up(error: Floats) -> int:
 
 
 def error_spectrum(record: LoopRecord, whole: bool = False) -> Spectrum:
-    """Spectrum of the error, once it has come to the set point, without what the set point explains unless the
-    `whole` of it is wanted."""
+    """Spectrum of the error after it has reached the set point, without the set point's part unless the `whole` error
+    is required."""
     error, good = record.error, np.flatnonzero(record.at_work)
     if good.size < error.size:
         error = np.interp(np.arange(error.size), good, error[good])
@@ -112,12 +112,12 @@ def _in_shape(
     seen: tuple[float, float, float],
     limits: OscillationLimits,
 ) -> bool:
-    """Whether half-cycles that differ in length and size are yet more than noise of the same surroundings shows.
+    """Whether half-cycles that differ in length and size are still more regular than noise in the same band.
 
-    seen : cycles, prominence, correlation. Prominence in doublings (its mean over time and its median averaged)
-    and correlation (of the band and of its levelled half-cycles averaged) add up; noise of any colour, the closed
-    loop's included, reaches shape + shape_few / sqrt(cycles) in fewer than one of a thousand records. What swings
-    between limits, as Gaussian noise of no spectrum does, adds to that and stands alone where halves differ most.
+    seen : cycles, prominence, correlation. Prominence in doublings (average of its mean over time and its median)
+    and correlation (average of the band's and its levelled half-cycles') are added; noise of any colour, also the
+    closed loop's, reaches shape + shape_few / sqrt(cycles) in fewer than one of a thousand records. A swing between
+    limits, absent in Gaussian noise of any spectrum, adds to that and suffices alone if halves differ most.
     """
     cycles, prominence, correlation = seen
     levelled = 0.5 * (correlation + levelled_correlation(x, dt_s, s.duration_s / line))
@@ -137,7 +137,7 @@ def _in_shape(
 
 
 def _candidate(s: Spectrum, b: Bands, k: int, limits: OscillationLimits) -> Oscillation | None:
-    """The oscillation about one trial frequency, None where the signs do not agree."""
+    """The oscillation at one trial frequency, None if the criteria do not agree."""
     line = float(b.line[k])
     expected = s.duration_s / line
     if expected < limits.samples_few * s.dt_s:
@@ -157,14 +157,14 @@ def _candidate(s: Spectrum, b: Bands, k: int, limits: OscillationLimits) -> Osci
 
 
 def peaks(b: Bands, least: float) -> list[int]:
-    """Trial frequencies whose prominence is the highest within half an octave, the most power first."""
+    """Trial frequencies with the highest prominence within half an octave, the most power first."""
     p = b.prominence
     ks = [k for k in range(p.size) if p[k] >= least and p[k] >= p[max(k - 3, 0) : k + 4].max()]
     return sorted(ks, key=lambda k: -float(b.power[k] * b.line[k]))[: 2 * LOOP.reported]
 
 
 def subthreshold_period(found: Oscillations, limits: OscillationLimits) -> float | None:
-    """Period [s] of a cycle that stands out of the spectrum with too few samples to be judged, or None."""
+    """Period [s] of a prominent cycle with too few samples to be judged, or None."""
     s, b = found.spectrum, found.bands
     if s is None or b is None:
         return None
@@ -180,7 +180,7 @@ def where_loud(
     level: Floats, dt_s: float, own_s: float, period_s: float, usable: Mask, limits: OscillationLimits
 ) -> tuple[Mask, Mask, Floats]:
     """Where a band is loud and where it may be used, shape (m,) each, and its level over two periods [% of span],
-    shape (m,); from its level at interval dt_s [s] and where samples at interval own_s [s] may be used, shape (n,).
+    shape (m,); from its level at interval dt_s [s] and the usable samples at interval own_s [s], shape (n,).
     """
     width = max(round(2 * period_s / dt_s), 1)
     power = np.convolve(np.pad(level**2, width, mode="reflect"), np.ones(width) / width, mode="same")
@@ -211,9 +211,9 @@ def _sized_by_envelope(
 
 
 def _lasts(s: Spectrum, record: LoopRecord, o: Oscillation, limits: OscillationLimits) -> bool:
-    """Whether a period is the loop's own: of a set point that swings in its band by less than a loop's sensitivity
-    makes of it, or seen where the set point has rested; one in every second cycle of which the set point moves is the
-    set point's. Of a set point that never rests it is not asked."""
+    """Whether a period is the loop's own: its amplitude exceeds the set point's in its band times the sensitivity, or
+    it occurs while the set point is constant. It is the set point's if the set point moves in every second cycle of
+    it. If the set point is never constant, neither is tested."""
     moving = moves(record.sp)
     if record.sp_estimated or not moving.any() or moving.mean() > limits.programme_moves:
         return True
@@ -228,8 +228,8 @@ def _lasts(s: Spectrum, record: LoopRecord, o: Oscillation, limits: OscillationL
 
 
 def _longest_seen(record: LoopRecord) -> float:
-    """Period [s] of which two fit between times at which another one has the loop's valve: a longer one is of the
-    hand-overs; inf of a loop that has its valve alone."""
+    """Period [s] of which two fit between times at which another loop has the valve: longer ones come from the
+    change-overs; inf if the loop has its own valve."""
     idle = record.mask("idle")
     if not idle.any():
         return math.inf
@@ -237,21 +237,21 @@ def _longest_seen(record: LoopRecord) -> float:
 
 
 def _is_harmonic_of(o: Oscillation, other: Oscillation) -> bool:
-    """Whether one oscillation is a whole multiple (2 to 7) of a stronger one's frequency."""
+    """Whether one oscillation has a whole multiple (2 to 7) of a stronger one's frequency."""
     ratio = other.period_s / o.period_s
     whole = round(ratio)
     return 2 <= whole <= 7 and abs(ratio / whole - 1) < 0.02 and o.amplitude_pct < 0.6 * other.amplitude_pct
 
 
 def counting(found: Oscillations) -> Oscillation | None:
-    """The first oscillation where it fills enough of the time for the loop to count as oscillating, else None."""
+    """The first oscillation if its share of time is large enough for the loop to count as oscillating, else None."""
     first = found.first
     return first if first is not None and counts(first.oscillating_pct) else None
 
 
 def detect(record: LoopRecord, limits: OscillationLimits, whole: bool = False) -> Oscillations:
-    """The oscillations of a loop; none for noise, drift, ramps, steps and constants. In the `whole` error the
-    ringing after moves of the set point counts too."""
+    """The oscillations of a loop; none for noise, drift, ramps, steps and constants. In the `whole` error the ringing
+    after set point moves counts too."""
     s = error_spectrum(record, whole)
     resolution = float(np.max(np.abs(record.error))) * 1e-9
     if s.n < 16 or s.variance <= resolution**2:

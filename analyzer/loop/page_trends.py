@@ -1,4 +1,4 @@
-"""Trends as the pages draw them: thinned, with ten periods fine, and the last ten half-cycles of an oscillation."""
+"""Trends for the pages: thinned, with ten periods fine, and the last ten half-cycles of an oscillation."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ if TYPE_CHECKING:
 BUCKETS = 1200
 """Buckets a day: 72 s each, about a pixel of a screen's width."""
 FINE_BUCKETS = 6000
-"""Buckets a day of a loop that oscillates, so that its cycle can be zoomed into."""
+"""Buckets a day of a loop that oscillates, sufficient to zoom into its cycle."""
 PERIODS = 10.0
 """Periods of the close view that a page opens on."""
 TYPICAL = 0.2
-"""How far the amplitude of typical periods lies from the usual one, over that [-]; ours."""
+"""Deviation of the amplitude of typical periods from the usual one, over that [-]; ours."""
 CLOSE_BUCKETS = 600
-"""Buckets of the close view at most, 60 a period; fewer where the record has fewer samples."""
+"""Buckets of the close view at most, 60 a period; fewer if the record has fewer samples."""
 HALVES = 10
 """Half-cycles that are kept."""
 SEARCHED_PERIODS = 30.0
-"""Periods from the close view's end back in which they are looked for; ours: those with gaps are passed over."""
+"""Periods before the close view's end that are searched for half-cycles; ours: those with gaps are omitted."""
 
 
 def close_view(part: LoopRecord, found: Oscillations, before: int) -> tuple[int, int] | None:
-    """First and last sample (excluded) of the last ten typical periods of the oscillation in a part of a record, of
-    which so many samples are before it; None where there is none."""
+    """First and last sample (excluded) of the last ten typical periods of the oscillation in a part of a record,
+    which `before` samples precede; None if there is none."""
     if found.first is None or found.active is None or not found.active.any():
         return None
     skipped = len(part) * part.dt_s - found.active.size * found.active_dt_s
@@ -49,8 +49,8 @@ def close_view(part: LoopRecord, found: Oscillations, before: int) -> tuple[int,
 
 
 def _last_typical(active: np.ndarray, level: np.ndarray | None, count: int) -> int:
-    """End of the last `count` samples in which an oscillation is on all the time and about as large as it mostly is;
-    else the end of what is on."""
+    """End of the last `count` samples in which an oscillation is on all the time and has about its usual amplitude;
+    else the end of its last active samples."""
     end = int(np.flatnonzero(active)[-1]) + 1
     if level is None or active.size <= count:
         return end
@@ -79,9 +79,9 @@ def thinned(
     record: LoopRecord, a_day: int = BUCKETS, close: tuple[int, int] | None = None
 ) -> Mapping[str, np.ndarray]:
     """Columns time_s and, for SP, PV and OP, least and greatest of each bucket [% of span], shape (b,); bad, manual
-    and frozen: True where all of a bucket is; a PV that stands still is not bad, for it is drawn.
+    and frozen: True where all of a bucket is; a frozen PV is not bad, so it is drawn.
 
-    Buckets are the record's own samples where there are fewer of these, and finer between the samples of `close`.
+    Buckets are the record's own samples if there are fewer of these, and finer between the samples of `close`.
     """
     n = len(record)
     buckets = min(n, max(round(a_day * record.duration_s / 86400.0), 400))
@@ -97,7 +97,7 @@ def thinned(
 
 
 def _marks(faulty: Fit | None, fit: Fit | None, period_s: float) -> StemMarks:
-    """What the marks need: of a slow process PV does not come to rest, and the mark begins at the turn."""
+    """Data for the marks: PV of a slow process does not settle, and the mark begins at the OP reversal."""
     if fit is None:
         return StemMarks(0.0, 0.0, 0.0)
     quick = fit.time_constant_s <= LOOP.quick * 0.5 * period_s

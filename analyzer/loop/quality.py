@@ -1,6 +1,6 @@
-"""From raw stamps to one clock: what is fit for use, said sample by sample, before any analysis.
+"""From raw stamps to one clock: masks of unusable samples, set before any analysis.
 
-Masks are taken on the raw stamps, where a gap, a frozen value or a compressed stretch is still visible, and
+Masks are determined on the raw stamps, where a gap, a frozen value or a compressed stretch is still visible, and
 carried onto the clock of the loop's record.
 """
 
@@ -35,17 +35,17 @@ from identification.limits import EXPERIMENTS, LIMITS
 from identification.record import Floats, LoopRecord, Mask
 
 RECORDED_RANGE = (0.005, 0.995)
-"""Quantiles of PV that stand for its span where none is stated; contract of loops.csv."""
+"""Quantiles of PV that give its span if none is stated; contract of loops.csv."""
 MODES: Mapping[str, list[str]] = STATED["modes"]
-"""Mode texts, lower case, that mean that the controller does not move OP, or that it does."""
+"""Mode texts, lower case, of modes in which the controller does not move OP, or does."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """What percent means for a loop.
+    """Ranges of a loop's signals: the meaning of percent.
 
-    low, span : PV range in the tag's own unit; op_low, op_span : range of OP; recorded : True where the PV
-    range was taken from the record because none is stated.
+    low, span : PV range in the tag's own unit; op_low, op_span : range of OP; recorded : True if the PV range was
+    taken from the record because none is stated.
     """
 
     low: float
@@ -65,13 +65,12 @@ class Scale:
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
-    """A record with its scale, the resolution of its trends and plain sentences about its quality.
+    """A record with its scale, the resolution of its trends and sentences about its quality.
 
-    pv_step : resolution of PV [% of span], 0 where none was seen; compressed_share : share of
-    samples on straight segments [-]; op_known : False where no OP was recorded; op_scaled : False where what was
-    recorded cannot be percent of the range that is stated, or assumed, of OP; archived_share : share of samples, of
-    PV or OP the fewer, that were kept where trends are compressed [-]; shared : what the loop has of a valve that it
-    shares, None where it has it alone.
+    pv_step : resolution of PV [% of span], 0 if none was found; compressed_share : share of samples on straight
+    segments [-]; op_known : False if no OP was recorded; op_scaled : False if the recorded OP cannot be in percent of
+    its stated or assumed range; archived_share : share of samples that a compressing historian kept [-], the smaller
+    of PV and OP; shared : the loop's part of a valve that it shares, None if it has its own valve.
     """
 
     record: LoopRecord
@@ -86,7 +85,7 @@ class Prepared:
 
 
 def scale_of(spec: LoopSpec, pv: Floats) -> Scale:
-    """What percent means: the stated ranges, else the recorded range of PV and 0 to 100 for OP."""
+    """Ranges of a loop: the stated ones, else the recorded range of PV and 0 to 100 for OP."""
     op_low = spec.op_lo if spec.op_lo is not None else 0.0
     op_high = spec.op_hi if spec.op_hi is not None else 100.0
     if spec.pv_lo is not None and spec.pv_hi is not None:
@@ -113,7 +112,7 @@ def _trimmed(pv: Series | None, spec: LoopSpec, limits: QualityLimits) -> tuple[
 
 def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits) -> Prepared:
     """One loop's raw samples on one clock, with masks; the spec has the tags that the export has. Raises LacksError
-    where there is no PV, or too little of it; the text says what is needed and what there is."""
+    if PV is missing or too short; the text gives the requirement and the available data."""
     series = _numeric(spec, series, limits)
     trimmed, dt = _trimmed(series.get(spec.pv or ""), spec, limits)
     clock = clock_of(trimmed, dt, limits)
@@ -148,7 +147,7 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
     other = spec.beside.tag if spec.beside is not None else None
     shared = _shared(masked, spec, _signal(series, other, clock, dt, limits), limits)
     if shared is not None:
-        saturated = masked.mask("saturated") & ~shared.idle  # at rest a limit limits nothing
+        saturated = masked.mask("saturated") & ~shared.idle  # an idle loop has no limit
         masks = {**masked.masks, "saturated": saturated, "idle": shared.idle}
         masked = replace(masked, masks=MappingProxyType(masks))
     return replace(_described(masked, scale, op_known, spec.in_ma, step, limits), shared=shared)
@@ -157,7 +156,7 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
 def _shared(
     record: LoopRecord, spec: LoopSpec, other: tuple[Floats, Mask], limits: QualityLimits
 ) -> Shared | None:
-    """What a loop has of a valve that it shares, beside the other controller's output in that one's own unit."""
+    """The loop's part of a shared valve; other, the other controller's output in its own unit."""
     if spec.beside is None or spec.op is None or other[1].all():
         return None
     output = 100.0 * (other[0] - spec.beside.low) / (spec.beside.high - spec.beside.low)
@@ -166,8 +165,8 @@ def _shared(
 
 
 def _numeric(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits) -> dict[str, Series]:
-    """The samples of a loop, what is no number in SP, PV, OP or position bad. Raises LacksError where many values of
-    one of them were not understood: what is left would be another trend."""
+    """The samples of a loop; values of SP, PV, OP or position that are no number are bad. Raises LacksError if many
+    values of one of them are unreadable: the remaining ones would be a different trend."""
     out = dict(series)
     for role in ("pv", "sp", "op", "position"):
         tag = getattr(spec, role)
@@ -194,8 +193,8 @@ def _signal(
 def op_in_range(op: Floats, q: QualityLimits) -> bool:
     """Whether OP can be in percent of its stated range.
 
-    It cannot where it leaves the range, nor where it moves freely within a band beside a limit and does not rest on
-    the limit itself, as outputs do that were recorded from 0 to 1 or as deviations.
+    It cannot if it leaves the range, or if it moves freely within a band near a limit and does not stay at the limit
+    itself, as outputs recorded from 0 to 1 or as deviations do.
     """
     low, high = float(op.min()), float(op.max())
     if low < -q.outside_pct or high > 100 + q.outside_pct:
@@ -208,7 +207,7 @@ def op_in_range(op: Floats, q: QualityLimits) -> bool:
 def _masked(
     record: LoopRecord, clock: Floats, mode: Series | None, op_known: bool, pv_step: float, q: QualityLimits
 ) -> LoopRecord:
-    """The record, whose bad samples are its gaps, with its masks."""
+    """The record with its masks; its bad samples are its gaps."""
     op, gap, none = record.op, record.bad, np.zeros(clock.size, dtype=bool)
     stale = constant_stretches(record.pv, record.dt_s, q.stale_s, q.stale_samples) & ~gap
     ranged = op_known and op_in_range(op, q)
@@ -217,7 +216,7 @@ def _masked(
     if stands and not _driven_to_limit(record, stale, saturated, q):
         stale = none
     by_script = mode is None and op_known and moved_by_script(record)
-    if by_script:  # OP at 0 before a test and after it is at no limit
+    if by_script:  # OP at 0 before and after a test is at no limit
         saturated = none
     manual = ~none if by_script else _manual(mode, clock, record, q) if op_known else none
     masks = {
@@ -232,8 +231,8 @@ def _masked(
 
 
 def _driven_to_limit(record: LoopRecord, stale: Mask, saturated: Mask, q: QualityLimits) -> bool:
-    """Whether OP stands since a frozen PV has driven it to its limit: PV stands for long, off its set point and off
-    the ends of its own range, at which a transmitter stands still too."""
+    """Whether OP is constant because a frozen PV has driven it to its limit: PV is constant for long, away from its
+    set point and from the ends of its own range, at which a transmitter is constant too."""
     off = float(np.abs(record.error[stale]).min())
     within = q.frozen_ends_pct < float(record.pv[stale].min()) < 100.0 - q.frozen_ends_pct
     long = float(stale.sum()) * record.dt_s >= q.frozen_s
@@ -247,8 +246,8 @@ def _driven_to_limit(record: LoopRecord, stale: Mask, saturated: Mask, q: Qualit
 
 
 def moved_by_script(record: LoopRecord) -> bool:
-    """Whether a hand, or a script, moves OP from first to last: no SP is recorded, and OP, which mostly stands, does
-    not answer PV."""
+    """Whether an operator or a script moves OP over the whole record: no SP is recorded, and OP, mostly constant,
+    does not respond to PV."""
     op = record.op
     stands = record.sp_estimated and float(np.mean(np.diff(op) != 0.0)) < EXPERIMENTS.moving
     if not stands or not by_hand(record, np.ones(op.size, dtype=bool)):
@@ -257,7 +256,7 @@ def moved_by_script(record: LoopRecord) -> bool:
 
 
 def _manual(mode: Series | None, clock: Floats, record: LoopRecord, q: QualityLimits) -> Mask:
-    """True where the controller is in manual: by its mode, else where OP stands still while the error moves."""
+    """True where the controller is in manual: by its mode, else where OP is constant while the error moves."""
     found = None if mode is None else _mode_mask(mode, clock)
     if found is not None:
         return found
@@ -267,8 +266,8 @@ def _manual(mode: Series | None, clock: Floats, record: LoopRecord, q: QualityLi
 
 
 def beyond_gap(manual: Mask, error: Floats, gap: float) -> Mask:
-    """The spans of a mask, shape (n,), in which the error [% PV] leaves a gap: within it OP of a controller in
-    automatic stands still too."""
+    """The spans of a mask, shape (n,), in which the error [% PV] leaves a gap: within the gap OP of a controller in
+    automatic is constant too."""
     out = manual.copy()
     for first, last in runs(manual):
         out[first:last] = float(np.abs(error[first:last]).max()) > LOOP.beyond_gap * gap
@@ -287,7 +286,7 @@ def _mode_mask(mode: Series, clock: Floats) -> Mask | None:
 
 
 def op_range(scale: Scale, op: Floats) -> Requirement:
-    """What to state where OP [% of the range assumed] cannot be percent of that range."""
+    """The range to state if OP [% of the range assumed] cannot be percent of that range."""
     low, high = (scale.op_low + 0.01 * scale.op_span * float(x) for x in (op.min(), op.max()))
     return Requirement(
         MissingData.OP_RANGE,

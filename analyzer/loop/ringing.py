@@ -1,7 +1,7 @@
-"""Does the loop itself ring? The same record explained three ways, each a model with its likelihood.
+"""Does the loop itself ring? Three explanations of the same record, each a model with its likelihood.
 
 Tuning: the identified process with the controller's law has little damping and rings at the observed period under a
-smooth load. Load: a periodic load drives a loop. Valve: the stem behind OP sticks or has play. See
+smooth load. Load: a periodic load drives a loop. Valve: the stem behind OP sticks or has backlash. See
 identification/estimation/smooth_load.py.
 """
 
@@ -22,8 +22,8 @@ from tuning.frequency_response import controller_response, maximum_sensitivity, 
 
 @dataclass(frozen=True, slots=True)
 class Regularity:
-    """How regular a cycle is: height of the first returning peak of the error's autocorrelation [-], kurtosis of the
-    error's band at the period [-], and whether OP reaches a limit in each cycle, which then holds its size."""
+    """Regularity of a cycle: height of the first returning peak of the error's autocorrelation [-], kurtosis of the
+    error's band at the period [-], and whether OP reaches a limit in each cycle, which fixes the cycle's size."""
 
     correlation: float
     kurtosis: float
@@ -32,12 +32,12 @@ class Regularity:
 
 @dataclass(frozen=True, slots=True)
 class Ringing:
-    """What a smooth load leaves to the loop.
+    """Fits of a loop under a smooth load.
 
     smooth, the process under a smooth load; lined, under one with a line; ms, maximum sensitivity of the loop under
-    the smooth load [-], inf where it is unstable, and period_s, at which it rings [s]; cycle_s, the observed
-    period [s]; line_nat and valve_nat, gain in log likelihood of a line in the load, and of a valve's fault,
-    over the smooth load [nat]; dt_s, interval of the rows [s].
+    the smooth load [-], inf if it is unstable, and period_s, at which it rings [s]; cycle_s, the observed period [s];
+    line_nat and valve_nat, gain in log likelihood of a line in the load, and of a valve's fault, over the smooth load
+    [nat]; dt_s, interval of the rows [s].
     """
 
     smooth: SmoothFit
@@ -50,20 +50,20 @@ class Ringing:
     dt_s: float
 
     def is_tight(self, m: Regularity, evidence: float, limits: CauseLimits) -> bool:
-        """Whether the loop itself makes the cycle: it rings at the observed period, no more regularly than it can,
-        and neither a line of the load nor a fault of the valve is needed.
+        """Whether the loop itself makes the cycle: it rings at the observed period, the cycle is no more regular than
+        such ringing, and neither a line of the load nor a fault of the valve is needed.
 
-        evidence, for that fault under a free noise model [nat]; a fault that explains less than a line of the load
-        is neither.
+        evidence, for that fault under a free noise model [nat]; a fault that explains less than a line of the load is
+        neither.
         """
         faulty = min(evidence, self.valve_nat) >= max(limits.evidence, self.line_nat)
-        if math.isinf(self.ms) and m.limited:  # it must cycle, whatever the load does
+        if math.isinf(self.ms) and m.limited:  # it must cycle, under any load
             return self.rings(limits) and not faulty
         return self.rings(limits) and not (faulty or self.has_line(limits)) and self.is_as_regular(m, limits)
 
     def likelier(self, evidence: float, limits: CauseLimits) -> tuple[Cause, float] | None:
-        """Whether a faulty valve or a line of the load explains the cycle, and by how much more than the other and
-        than neither [nat]; None where neither is ahead by what its constants cost.
+        """Whether a faulty valve or a line of the load explains the cycle, and its gain over the other and over
+        neither [nat]; None if neither leads by the penalty of its constants.
 
         evidence, for a faulty valve under a free noise model [nat]; the lower of both counts.
         """
@@ -75,48 +75,48 @@ class Ringing:
         return None
 
     def is_as_regular(self, m: Regularity, limits: CauseLimits) -> bool:
-        """Whether the loop makes a cycle as regular as the observed one. Where OP reaches its limit in each cycle,
-        any. Else noise rings through the loop: it does not keep its size (Rice 1945), comes back by exp(-2 pi z) a
-        period under damping z, and its peak is about 1/(2 z)."""
+        """Whether the loop makes a cycle as regular as the observed one: any if OP reaches its limit in each cycle.
+        Else noise rings through the loop: its size varies (Rice 1945), its correlation falls by exp(-2 pi z) a period
+        under damping z, and its peak is about 1/(2 z)."""
         if m.limited:
             return True
         implied = math.pi / -math.log(min(max(m.correlation, 1e-3), 1.0 - 1e-9))
         return m.kurtosis >= limits.kept_size and implied <= limits.ringing_decay * self.ms
 
     def is_seen(self, limits: CauseLimits) -> bool:
-        """Whether the rows are close enough to tell how the identified loop rings."""
+        """Whether the rows are close enough to show the ringing of the identified loop."""
         return self.period_s >= limits.ringing_samples * self.dt_s
 
     def has_line(self, limits: CauseLimits) -> bool:
-        """Whether the load has a line that keeps its phase."""
+        """Whether the load has a line of constant phase."""
         line = self.lined.line
         kept = line is not None and line.kept >= limits.line_kept
         return kept and self.line_nat >= self.line_needed(limits)
 
     def line_needed(self, limits: CauseLimits) -> float:
-        """Gain that a line has to bring [nat]: for three constants by Schwarz's criterion (1978), and a floor."""
+        """Required gain of a line [nat]: for three constants by Schwarz's criterion (1978), and a floor."""
         return limits.line_floor + 1.5 * math.log(self.smooth.count)
 
     def rings(self, limits: CauseLimits) -> bool:
-        """Whether the loop is little damped at the observed period."""
+        """Whether the loop has little damping at the observed period."""
         return self.ms >= limits.ringing_ms and same_period(self.period_s, self.cycle_s, limits)
 
 
 def same_period(predicted_s: float, seen_s: float, limits: CauseLimits) -> bool:
-    """Whether the period of a model is that of a cycle."""
+    """Whether the period of a model agrees with that of a cycle."""
     return abs(math.log(predicted_s / seen_s)) <= math.log(limits.ringing_period)
 
 
 def between_samples(process: Process, window: Window, controller: Pid) -> Process:
-    """The process as the controller sees it. What is fitted holds OP from one sample of the record to the next, while
-    the controller moves it between them: half an interval of that hold belongs to the dead time."""
+    """The process as the controller acts on it. The fit holds OP from one sample of the record to the next, while the
+    controller moves it between them: half an interval of that hold belongs to the dead time."""
     hold_s = max(window.step_s - controller.scan_s, 0.0)
     return replace(process, dead_time_s=process.dead_time_s + 0.5 * hold_s)
 
 
 def calm_resonance(linear: Fit, controller: Pid | None, scale_s: float) -> tuple[float, float]:
     """Maximum sensitivity [-] of the identified loop of a record without a cycle, and the period [s] of its peak; 1
-    without settings, or where they act the wrong way."""
+    without settings, or if they act the wrong way."""
     if controller is None or controller.kp == 0.0:
         return 1.0, scale_s
     window, dead_s = linear.window, max(linear.dead_time_s, 0.0)
@@ -131,10 +131,10 @@ def calm_resonance(linear: Fit, controller: Pid | None, scale_s: float) -> tuple
 def ringing_of(
     linear: Fit, valves: tuple[Fit, ...], controller: Pid | None, period_s: float
 ) -> Ringing | None:
-    """What a smooth load leaves to a loop that cycles at a period [s]; None where no settings are known, or the loop
-    does not act on PV.
+    """Fits under a smooth load of a loop that cycles at a period [s]; None if no settings are known, or the loop does
+    not act on PV.
 
-    linear, the night's fit behind an ideal valve; valves, those behind faulty ones that explain PV better.
+    linear, the night's fit with an ideal valve; valves, those with faulty ones that explain PV better.
     """
     window = linear.window
     if controller is None or controller.kp == 0.0 or not math.isfinite(period_s):

@@ -1,4 +1,4 @@
-"""Raw stamps and one clock: intervals, holding values, runs of equal values, straight lines, steps of a grid."""
+"""Raw stamps and one clock: intervals, held values, runs of equal values, straight segments, resolution."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from identification.record import Floats, Mask
 
 
 def interval(stamp_s: Floats) -> float:
-    """The sample interval of raw stamps [s]: the median spacing, or the mean where it is the same but for jitter."""
+    """The sample interval of raw stamps [s]: the median spacing, or the mean if they differ by jitter only."""
     if stamp_s.size < 2:
         return math.nan
     median = float(np.median(np.diff(stamp_s)))
@@ -24,13 +24,13 @@ def interval(stamp_s: Floats) -> float:
 
 
 def onto_clock(series: Series, clock: Floats, dt_s: float, limits: QualityLimits) -> tuple[Floats, Mask]:
-    """Values held on a clock, and where there is nothing to hold.
+    """Values held on a clock, and the gaps in which no value can be held.
 
     Returns
     -------
     ndarray of shape (n,), ndarray of bool, shape (n,)
-        The last good value at or before each tick (the next one where there is none), and True where it is a
-        gap: older than gap_factor intervals of the tag, or not good.
+        The last good value at or before each tick (the next one if there is none), and True in gaps: the value is
+        older than gap_factor intervals of the tag, or not good.
     """
     good = ~series.bad
     if not good.any():
@@ -48,9 +48,9 @@ def onto_clock(series: Series, clock: Floats, dt_s: float, limits: QualityLimits
 
 
 def snapped(series: dict[str, Series], pv: str) -> dict[str, Series]:
-    """The same samples with stamps that scatter by less than half a sample put onto PV's uniform clock.
+    """The same samples, with stamps that scatter by less than half a sample moved to PV's uniform clock.
 
-    Holding values on a clock would repeat or lose a sample wherever a stamp is a little late.
+    Values held on a clock would repeat or lose a sample at each slightly late stamp.
     """
     at_s = series[pv].stamp_s
     if at_s.size < 3:
@@ -77,7 +77,7 @@ def _last_good_held(value: Floats, good: Mask) -> tuple[Floats, Mask]:
 
 @njit(cache=True)
 def constant_for(value: Floats, samples: float) -> Mask:
-    """True where a value stands unchanged for at least so many samples, shape (n,)."""
+    """True where a value is constant for at least `samples` samples, shape (n,)."""
     out = np.zeros(value.size, dtype=np.bool_)
     first = 0
     for k in range(1, value.size + 1):
@@ -90,7 +90,7 @@ def constant_for(value: Floats, samples: float) -> Mask:
 
 
 def constant_stretches(value: Floats, dt_s: float, seconds: float, samples: int) -> Mask:
-    """True where a value stands unchanged for so long [s] and so many samples, shape (n,)."""
+    """True where a value is constant for `seconds` [s] and `samples` samples, shape (n,)."""
     return constant_for(value, max(samples, seconds / dt_s))  # type: ignore[no-any-return]
 
 
@@ -98,8 +98,8 @@ def constant_stretches(value: Floats, dt_s: float, seconds: float, samples: int)
 def collinear(value: Floats) -> Mask:
     """True where a sample lies on the line between its neighbours while the trend moves, shape (n,).
 
-    Swinging-door compression leaves straight, sloping segments; steps of a coarse resolution and constants
-    are straight too, but level.
+    Swinging-door compression produces straight, sloping segments; steps of a coarse resolution and constants are
+    straight too, but level.
     """
     out = np.zeros(value.size, dtype=np.bool_)
     largest = 0.0
@@ -112,16 +112,16 @@ def collinear(value: Floats) -> Mask:
 
 
 def archived_share(value: Floats) -> float:
-    """Share of samples that a line through their neighbours does not give [-]: those that compression kept."""
+    """Share of samples that differ from a line through their neighbours [-]: those that compression kept."""
     level = np.zeros(value.size, dtype=np.bool_)
     level[1:-1] = (value[1:-1] == value[:-2]) & (value[1:-1] == value[2:])
     return float((~(collinear(value) | level)).mean())
 
 
 def resolution(value: Floats) -> float:
-    """The step of the grid that values stand on, in their unit; 0 where there is none.
+    """Resolution of values, in their unit; 0 if none is found.
 
-    The usual difference between values that occur; a grid is told by so many samples a level.
+    It is the usual difference between occurring values; a minimum of samples per level identifies it.
     """
     most = min(value.size, LOOP.grid_samples) / LOOP.grid_per_level
     if np.unique(value[: int(most) + 2 * LOOP.grid_per_level]).size > most:
@@ -133,12 +133,12 @@ def resolution(value: Floats) -> float:
 
 
 def clock_of(pv: Series, dt_s: float, limits: QualityLimits) -> Floats:
-    """PV's own stamps where they are uniform, else a uniform clock over them.
+    """PV's own stamps if they are uniform, else a uniform clock over them.
 
     Raises
     ------
     LacksError
-        The samples are spread so thinly that most of that clock would be gaps.
+        The samples are so sparse that most of that clock would be gaps.
     """
     spacing = np.diff(pv.stamp_s)
     if spacing.size and float(np.max(np.abs(spacing - dt_s))) <= 0.01 * dt_s:
@@ -154,7 +154,7 @@ def clock_of(pv: Series, dt_s: float, limits: QualityLimits) -> Floats:
 
 
 def without_stray_ends(pv: Series) -> Series:
-    """PV from its first to its last good sample, those far from the rest left out."""
+    """PV from its first to its last good sample, without those far from the others."""
     stamp = pv.stamp_s[~pv.bad]
     span = main_span(stamp)
     if span.stray:

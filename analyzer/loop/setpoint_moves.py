@@ -1,4 +1,4 @@
-"""How PV answers each move of the set point: rise, overshoot and settling, as step responses are told."""
+"""Response of PV to each set point move: rise, overshoot and settling, as of step responses."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from identification.record import Floats, LoopRecord, Mask
 from identification.signals.robust import robust_deviation
 
 POINTS, FOLLOWED = 48, 2
-"""Points of a course that are kept, and times its settling time that it is followed; ours."""
+"""Points kept of a response, and its recorded length in settling times; ours."""
 MOST = 12
-"""Moves of a night that are kept one by one, the latest; ours: a picture holds no more."""
+"""Moves of a night that are kept individually, the latest; ours: a picture has space for no more."""
 
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """One move of the set point, a step or a ramp, between times at which it stood.
+    """One move of the set point, a step or a ramp, between times of constant set point.
 
-    start_s [s since 1970-01-01 UTC]; begin, the set point before it, size, how far it went [% of span]; ramp_s, how
-    long it took, 0 for a step [s]; rise_s, from a tenth to nine tenths of the way [s], None where PV never got there
-    and for a ramp, which sets it; overshoot, how far PV goes beyond the new set point at first, noise left out, over
-    the size [-]; settled_s, from the move's end until the error stays small for as long again [s], None where it
-    does not before the next move; lasts_s, how long the course was followed [s]; course, PV at even times until then,
-    0 at the old set point and 1 at the new.
+    start_s [s since 1970-01-01 UTC]; begin, the set point before it, size, its change [% of span]; ramp_s, its
+    duration, 0 for a step [s]; rise_s, from a tenth to nine tenths of the way [s], None if PV never reached that and
+    for a ramp, which determines it; overshoot, first excursion of PV beyond the new set point, without noise, over
+    the size [-]; settled_s, from the move's end until the error stays small for as long again [s], None if it does
+    not before the next move; lasts_s, recorded duration of the course [s]; course, PV at even times until then, 0 at
+    the old set point and 1 at the new.
     """
 
     start_s: float
@@ -43,11 +43,11 @@ class Move:
 
 
 def moves(record: LoopRecord, noise: float, limits: FigureLimits) -> tuple[Move, ...]:
-    """The moves of a record that are larger than noise [% of span] and than what the error does anyway, between spans
-    in which the set point stood.
+    """The moves of a record that are larger than noise [% of span] and than the usual excursions of the error,
+    between spans of constant set point.
 
-    Steps that follow closely, all up or all down, are one ramp. A set point that is always under way, as a slave's,
-    has none; neither has one that was estimated from PV.
+    Steps in close succession, all up or all down, are one ramp. A set point that always moves, as a slave's, has
+    none; neither has one that was estimated from PV.
     """
     if record.sp_estimated:
         return ()
@@ -67,10 +67,10 @@ def moves(record: LoopRecord, noise: float, limits: FigureLimits) -> tuple[Move,
 
 
 def _move(record: LoopRecord, edges: np.ndarray, noise: float, limits: FigureLimits) -> Move | None:
-    """One move; None where the set point did not stand about it, the error did as much before it, or samples are
-    lacking before PV has settled.
+    """One move; None if the set point was not constant before and after it, the error moved as much before it, or
+    samples are missing before PV has settled.
 
-    edges : first sample since which SP stood, first and last of the move, and that of the next, shape (4,).
+    edges : first sample since which SP was constant, first and last of the move, and that of the next, shape (4,).
     """
     first, at, end, last = (int(x) for x in edges)
     before = record.error[first:at][record.usable[first:at]]
@@ -90,8 +90,8 @@ def _move(record: LoopRecord, edges: np.ndarray, noise: float, limits: FigureLim
 def _answered(
     record: LoopRecord, part: slice, ramp: int, size: float, spread: float, limits: FigureLimits
 ) -> Move:
-    """How PV answers a move of so many samples; part, from the sample before it to the next move; spread of the error
-    before [% of span]."""
+    """Response of PV to a move of `ramp` samples; part, from the sample before it to the next move; spread of the
+    error before [% of span]."""
     begin = float(record.sp[part.start])
     way = (record.pv[part] - begin) / size
     still = spread / abs(size)
@@ -114,8 +114,8 @@ def _answered(
 
 
 def _settled_from(outside: Mask, least: int) -> int | None:
-    """First sample from which nothing is outside for as long again as it took, and for some samples at least; None
-    where there is none."""
+    """First sample from which nothing is outside for as long again as it took, and for `least` samples at least; None
+    if there is none."""
     ends = np.flatnonzero(outside)
     if not ends.size:
         return 0
@@ -125,7 +125,7 @@ def _settled_from(outside: Mask, least: int) -> int | None:
 
 
 def _excursion(way: Floats) -> float:
-    """How far PV goes beyond the set point before it first comes back [-]; what loads do later is not the move's."""
+    """First excursion of PV beyond the set point [-]; later ones come from loads."""
     beyond = way > 1.0
     if not beyond.any():
         return 0.0
@@ -135,7 +135,7 @@ def _excursion(way: Floats) -> float:
 
 
 def _rise(way: Floats, dt_s: float) -> float | None:
-    """Time from the first tenth of the way to the first nine tenths [s], read between samples."""
+    """Time from the first tenth of the way to the first nine tenths [s], interpolated between samples."""
     at = [int(np.argmax(way >= share)) for share in (0.1, 0.9)]
     if not way.max() >= 0.9 or 0 in at:
         return None
@@ -147,8 +147,8 @@ def _rise(way: Floats, dt_s: float) -> float | None:
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """Moves of a programme that are alike: set point before and after [% of span], and of each repetition its start
-    [s since 1970-01-01 UTC], overshoot [% of the size] and settling [s], None where it did not settle."""
+    """Similar moves of a programme: set point before and after [% of span], and of each repetition its start [s since
+    1970-01-01 UTC], overshoot [% of the size] and settling [s], None if it did not settle."""
 
     begin: float
     end: float
@@ -158,7 +158,7 @@ class Phase:
 
 
 def phases(found: Sequence[Move]) -> tuple[Phase, ...]:
-    """Moves that come back between the same levels, in the order in which they first came."""
+    """Repeated moves between the same levels, in the order of their first occurrence."""
     kinds: list[list[Move]] = []
     for m in found:
         same = [k for k in kinds if alike((k[0].begin, k[0].begin + k[0].size), (m.begin, m.begin + m.size))]
@@ -179,14 +179,14 @@ def phases(found: Sequence[Move]) -> tuple[Phase, ...]:
 
 
 def alike(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    """Whether moves from one level to another are of one kind [% of span]."""
+    """Whether two moves between levels are of one kind [% of span]."""
     most = LOOP.alike_level * abs(one[1] - one[0])
     return all(abs(a - b) <= most for a, b in zip(one, other, strict=True))
 
 
 def as_row(found: Sequence[Move]) -> dict[str, float | str | None]:
-    """Columns of the night: how many moves, the medians of what is known of them, the latest of them and the phases
-    that come back as JSON."""
+    """Columns of the night: number of moves, medians of the known figures, and as JSON the latest moves and the
+    repeated phases."""
     back = phases(found)
     return {
         "sp_moves": float(len(found)),
@@ -199,6 +199,6 @@ def as_row(found: Sequence[Move]) -> dict[str, float | str | None]:
 
 
 def _median(values: Sequence[float | None]) -> float | None:
-    """The median of what is known, None where nothing is."""
+    """The median of the known values, None if there are none."""
     known = [v for v in values if v is not None]
     return float(np.median(known)) if known else None

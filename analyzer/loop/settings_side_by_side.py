@@ -1,5 +1,5 @@
-"""Present, recommended and textbook settings of one flagged loop on the load that its night leaves, and those between
-which an engineer may choose."""
+"""Present, recommended and textbook settings of one flagged loop on its night's residual load, and the alternatives
+for an engineer's choice."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from tuning.search import Candidate, Case, bench, rejection, try_out
 from tuning.trade import Trade, trade
 
 MAP_POINTS, SPREAD = 24, 12.0
-"""Points of the travel map along each axis, and how far it reaches about the present settings; ours."""
+"""Points of the travel map along each axis, and its range about the present settings; ours."""
 BEYOND = 1.5
-"""How far the map reaches beyond the outermost settings [-]; ours."""
+"""Range of the map beyond the outermost settings [-]; ours."""
 SHOWN_PERIODS, SHOWN_POINTS = 8.0, 240
-"""Periods of each simulation that a picture shows, and its points at most; ours."""
+"""Periods of each simulation in a picture, and its points at most; ours."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """A piece of one simulation: seconds and error, shape (n,) each [s, % PV]."""
+    """Part of one simulation: seconds and error, shape (n,) each [s, % PV]."""
 
     time_s: Floats
     error: Floats
@@ -40,14 +40,14 @@ class Shown:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Settings of one loop beside each other.
+    """Comparison of settings of one loop.
 
     loop, the identified one with its present controller; load [% PV] on the controller's clock, shape (n,); tried, in
-    the order in which they are told; shown, a piece of each simulation by name; travel, the map of the limit cycle's
-    travel, None where the valve is free; pv_span, that of PV in its own unit; peaks, largest error after a unit step
-    of load at the valve, over the present one, by name [-]; everywhere, each on all loops that the data allow, by
-    name; curve, what no other settings beat in travel and in error, the calmest first; repaired, the present settings
-    behind a free valve, None where it is free or rests, or the loop does not cycle as it was recorded.
+    the order of the report; shown, a part of each simulation by name; travel, the map of the limit cycle's travel,
+    None if the valve is free; pv_span, that of PV in its own unit; peaks, largest error after a unit step of load at
+    the valve, over the present one, by name [-]; everywhere, each on all loops that the data allow, by name; curve,
+    settings that no others improve in both travel and error, the calmest first; repaired, the present settings with a
+    free valve, None if it is free or does not move, or the loop does not cycle as recorded.
     """
 
     loop: Loop
@@ -71,13 +71,13 @@ def _piece(record: LoopRecord, period_s: float) -> Shown:
 
 
 def middle_ti(loop: Loop) -> float:
-    """Integral time [s] about which a map is drawn: the present one, SIMC's where the integral is off."""
+    """Integral time [s] at the centre of a map: the present one, SIMC's if the integral is off."""
     ti = integral_s(loop.controller)
     return ti if math.isfinite(ti) else simc(loop.process, scan_s=max(loop.controller.scan_s, 1.0)).ti_s
 
 
 def _map_of_settings(loop: Loop, settings: Sequence[Pid]) -> TravelMap | None:
-    """The travel map about the present settings, reaching to the others."""
+    """The travel map about the present settings, with range to the others."""
     if loop.valve is None:
         return None
     c, now_s = loop.controller, middle_ti(loop)
@@ -90,7 +90,7 @@ def _map_of_settings(loop: Loop, settings: Sequence[Pid]) -> TravelMap | None:
 
 
 def _beaten(name: str, everywhere: Mapping[str, Candidate]) -> bool:
-    """Whether the recommended settings win as much for less, on all loops that the data allow."""
+    """Whether the recommended settings have no more travel and error, on all loops that the data allow."""
     best, own = everywhere.get(RECOMMENDED), everywhere[name]
     if best is None:
         return False
@@ -98,8 +98,8 @@ def _beaten(name: str, everywhere: Mapping[str, Candidate]) -> bool:
 
 
 def cycles_as(loop: Loop, period_s: float) -> bool:
-    """Whether simulation finds the recorded cycle at the present settings, so that what it says of another valve
-    can be believed."""
+    """Whether simulation gives the recorded cycle at the present settings, so that its result for another valve is
+    credible."""
     found = confirm(loop).cycle
     return found is not None and abs(math.log(found.period_s / period_s)) <= math.log(LOOP.cycle_within)
 
@@ -114,17 +114,17 @@ def compared(
     others: Sequence[Loop] = (),
     alike: Sequence[Case] = (),
 ) -> Comparison | None:
-    """Present, recommended and textbook settings of an identified loop; None where its load is too short for that.
+    """Present, recommended and textbook settings of an identified loop; None if its load is too short for that.
 
     load is load and noise on the controller's clock [% PV], shape (n,); period_s, of the recorded cycle [s]; pv_span,
-    the span of PV in its own unit; others, what else the loop may be, on which each is tried too; alike as
-    in tuning.search.bench.
+    the span of PV in its own unit; others, other possible loops, on which each is tried too; alike as in
+    tuning.search.bench.
     """
     if load.size < limits.least_steps or loop.process.slope * loop.controller.kp <= 0.0:
         return None
     loop, load = loop_in_digits(loop), as_held(load)
     table = bench(loop, others, load, limits, alike)
-    moves = table.travel[0] > 0.0  # of a stem that rests no settings are calmer, and a ratio says nothing
+    moves = table.travel[0] > 0.0  # a constant stem cannot become calmer, and a ratio means nothing
     found = trade(table) if moves else Trade((), {})
     settings = alternatives(loop, new, {name: c.controller for name, c in found.chosen.items()})
     everywhere = {name: try_out(table, pid) for name, pid in settings.items()} if moves else {}

@@ -1,7 +1,7 @@
-"""Which of two controllers has the valve, and which half of a split range works: a loop is judged while it does.
+"""Which of two controllers has the valve, and which half of a split range works: a loop is judged only meanwhile.
 
-A select hands the valve to the output that is lower, or higher; the one that holds its set point while it has the
-valve tells which. A half of a split range rests at an end of its valve while the other half works.
+A select gives the valve to the lower, or higher, output; the loop at its set point while it has the valve shows
+which. A half of a split range is idle at an end of its valve while the other half works.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from identification.record import Floats, LoopRecord, Mask
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """What a loop has of a valve, or of a process, that it shares.
+    """A loop's part of a valve, or of a process, that it shares.
 
-    idle : True where the other one has it, shape (n,); valve_pct, share of good time that the loop has it [%];
-    changeovers_per_h, how often it passes from one to the other; winds_up_pct, share of the idle time in which OP
-    stands at the far end, None for a half of a split range; takeover_s, median time from the error's asking for the
-    valve to having it [s], None where that never happens; split_at_pct, split_slope, output of the split range's
-    controller from which on the half works [%], and how much it moves for it [-]; valve, what a select gives the
-    valve, shape (n,) [%], None for a half.
+    idle : True where the other one has it, shape (n,); valve_pct, share of good time in which the loop has it [%];
+    changeovers_per_h, frequency of change-overs between the two; winds_up_pct, share of the idle time with OP at the
+    far end, None for a half of a split range; takeover_s, median time from the error's change of sign to the
+    take-over of the valve [s], None if that never happens; split_at_pct, split_slope, output of the split range's
+    controller from which on the half works [%], and the half's move per move of it [-]; valve, OP that a select gives
+    the valve, shape (n,) [%], None for a half.
     """
 
     idle: Mask
@@ -43,8 +43,8 @@ class Shared:
 
 
 def selected(record: LoopRecord, other: Floats, other_bad: Mask, limits: QualityLimits) -> Shared | None:
-    """A loop beside the output of the controller with which it shares a valve by a select, shape (n,) [% of the
-    valve]; None where none is seen."""
+    """A loop and the output of the controller with which it shares a valve by a select, shape (n,) [% of the valve];
+    None if none is found."""
     good = record.usable & ~other_bad
     lower = record.op < other
     share, least = float(lower[good].mean() if good.any() else 0.0), limits.shared_share
@@ -65,15 +65,15 @@ def selected(record: LoopRecord, other: Floats, other_bad: Mask, limits: Quality
 
 
 def _in_turn(idle: Mask, good: Mask, dt_s: float) -> Shared:
-    """What the two have in turn: how long, and how often it passes in an hour of good time."""
+    """Time shares of the two controllers, and number of change-overs in an hour of good time."""
     passed = int(np.count_nonzero(np.diff(idle[good].astype(np.int8))))
     hours = max(float(good.sum()) * dt_s / 3600.0, 1e-9)
     return Shared(idle, 100.0 * float(1.0 - idle[good].mean()), passed / hours)
 
 
 def _takeover_s(record: LoopRecord, idle: Mask, good: Mask) -> float | None:
-    """Median time before a take-over for which the error has had the other side than while the loop is idle [s]; None
-    without a take-over."""
+    """Median time before a take-over for which the error has the opposite sign to that while the loop is idle [s];
+    None without a take-over."""
     side, waits = np.sign(record.error) * np.sign(np.median(record.error[idle])), []
     for first, last in runs(idle):
         if last < idle.size and good[last]:
@@ -83,8 +83,8 @@ def _takeover_s(record: LoopRecord, idle: Mask, good: Mask) -> float | None:
 
 
 def half(record: LoopRecord, whole: Floats, whole_bad: Mask, limits: QualityLimits) -> Shared | None:
-    """A half of a split range, OP its own, beside the output of the controller of both halves, shape (n,) [%]; None
-    where it never rests."""
+    """A half of a split range, OP its own, and the output of the controller of both halves, shape (n,) [%]; None if
+    it is never idle."""
     good = record.usable & ~whole_bad
     ends = record.op <= limits.limit_pct, record.op >= 100.0 - limits.limit_pct
     rest = max(ends, key=lambda end: int((end & good).sum()))
@@ -99,8 +99,8 @@ def half(record: LoopRecord, whole: Floats, whole_bad: Mask, limits: QualityLimi
 def _part_of(
     op: Floats, whole: Floats, working: Mask, end: float, least: int
 ) -> tuple[float | None, float | None]:
-    """How much a half moves for its controller's output [-], and the output at which it leaves its end [%]; None
-    where so few samples are at work."""
+    """The half's move per move of its controller's output [-], and the output at which it leaves its end [%]; None if
+    too few samples are at work."""
     if int(working.sum()) < least:
         return None, None
     x, y = whole[working], op[working]

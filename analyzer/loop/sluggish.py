@@ -1,8 +1,8 @@
-"""Settings for a calm loop that answers far more slowly than its process allows.
+"""Settings for a calm loop whose response is far slower than its process allows.
 
-Moves of the set point make its process known, at a finer clock than its own slow settings ask for. Where SIMC's
-settings for every process that the record allows reject loads several times faster, and take a fair part of the error
-off by simulation, they are advised.
+Set point moves identify its process, at a finer clock than its own slow settings require. If SIMC's settings for
+every process that the record allows reject loads several times faster, and reduce the error considerably in
+simulation, they are advised.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from tuning.rules import simc
 from tuning.search import mean_error, rounded
 
 CLOCKS = (4.0, 16.0)
-"""Times finer than the present settings ask for at which the process is identified: SIMC's integral times of sluggish
-loops are that much shorter."""
+"""Factors by which the process is identified on a finer clock than the present settings require: SIMC's integral
+times of sluggish loops are that much shorter."""
 
 
 @dataclass(frozen=True, slots=True)
 class FasterSettings:
-    """New settings [%, s] of a sluggish loop, how many times faster they reject a load (Kp/Ti over the present one)
-    [-], and the change of the average absolute error that simulation finds [-]."""
+    """New settings [%, s] of a sluggish loop, the factor by which they reject a load faster (Kp/Ti over the present
+    one) [-], and the change of the average absolute error in simulation [-]."""
 
     new: Pid
     times: float
@@ -48,7 +48,7 @@ class FasterSettings:
 def faster_settings(
     record: LoopRecord, controller: Pid | None, kind: str, config: Config
 ) -> FasterSettings | None:
-    """Settings for a loop without a cycle; None where it is not sluggish, is slow on purpose as levels are, or its
+    """Settings for a loop without a cycle; None if it is not sluggish, is slow on purpose as levels are, or its
     process is not known well enough. controller, its present settings [%, s]; kind, its type."""
     if controller is None or kind.strip().lower() == AVERAGING or record.sp_estimated:
         return None
@@ -64,7 +64,7 @@ def faster_settings(
 
 
 def _known_fits(record: LoopRecord, controller: Pid, kind: str, config: Config) -> list[Fit]:
-    """The fits behind an ideal valve on the clocks on which slope and dead time are sure, the coarsest first."""
+    """The fits with an ideal valve on the clocks on which slope and dead time are precise, the coarsest first."""
     found: list[Fit] = []
     limits, scale_s = config.lanes, time_scale(record, None, controller)
     for finer in CLOCKS:
@@ -85,7 +85,7 @@ def _known_fits(record: LoopRecord, controller: Pid, kind: str, config: Config) 
 
 
 def _allowed(process: Process, known: dict[str, Estimate]) -> tuple[Process, ...]:
-    """The process, and those at the ends of what the record leaves open of slope and dead time."""
+    """The process, and those at the limits of slope and dead time in the record."""
     slope, dead = known["slope_pct_per_s"], known["dead_time_s"]
     late = [max(process.dead_time_s + end - dead.value, 0.0) for end in (dead.low, dead.high)]
     ends = product((slope.low, slope.high), late)
@@ -100,7 +100,7 @@ def _proposed(
     limits = config.lanes
     try:
         found = settings_from(process, allowed, present.scan_s)
-    except ValueError:  # no delay to speak of
+    except ValueError:  # no significant delay
         return None
     most = limits.sluggish_most * abs(present.kp)
     kp = math.copysign(min(abs(found.robust.kp), most), present.kp)
@@ -109,7 +109,7 @@ def _proposed(
     if min(abs(pid.ki) for pid in (new, *plain)) < limits.sluggish_times * abs(present.ki):
         return None
     times = new.kp / new.ti_s / present.ki
-    load = in_digits(detrend(load_of(fit, present)))  # a loop at work has long answered what stays, or drifts
-    loop = Loop(between_samples(fit.process, fit.window, present), present)  # the one that leaves this load
+    load = in_digits(detrend(load_of(fit, present)))  # a working loop has compensated offset and drift
+    loop = Loop(between_samples(fit.process, fit.window, present), present)  # the loop with this load
     change = mean_error((loop,), new, load) / max(mean_error((loop,), present, load), 1e-9) - 1.0
     return FasterSettings(new, times, change) if change <= -limits.sluggish_gain else None

@@ -1,4 +1,4 @@
-"""What is known of a loop before a step test, and the test that settles the rest."""
+"""Prior knowledge of a loop before a step test, and the test for the remaining constants."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ READ = (
         "stickband_pct",
     ),
 )
-"""Columns of a night that tell what is known of a loop."""
+"""Columns of a night with the known constants of a loop."""
 EXPECTED_RAMP = 10.0
-"""Dead times over which an integrator's answer is followed; ours: its slope is told by then."""
+"""Dead times for which an integrator's response is followed; ours: its slope is identified by then."""
 
 
 def of_experiments(model: Pooled) -> Known:
-    """What experiments have told already."""
+    """Results of earlier experiments."""
     e = model.estimates
     width = e["backlash_pct"].value if "backlash_pct" in e else 0.0
     dead_s, source = e["dead_time_s"].value, f"experiments: {model_text(model)}"
@@ -52,7 +52,7 @@ def of_experiments(model: Pooled) -> Known:
 
 
 def of_row(row: Mapping[str, Any]) -> Known | None:
-    """What a night of the store tells; None where it tells no process."""
+    """Known constants from a night of the store; None if it has no process."""
     width = row["backlash_pct"] or row["stickband_pct"] or 0.0
     dead_s = row["dead_time_s"] or 0.0
     if row["gain"] is not None and row["time_constant_s"] is not None:
@@ -64,7 +64,7 @@ def of_row(row: Mapping[str, Any]) -> Known | None:
 
 
 def of_night(one: PlantLoop) -> Known | None:
-    """What the loop's own night tells by its routine; None where it tells no process of the right sign."""
+    """Known constants from the loop's own night in routine; None if it gives no process of the right sign."""
     config, controller = one.plant.config, one.controller
     try:
         found = assess(one.prepared, controller, config, one.spec.type, one.earlier)
@@ -84,7 +84,7 @@ def of_night(one: PlantLoop) -> Known | None:
 
 
 def supposed(one: PlantLoop) -> Known:
-    """What is supposed of a loop of which nothing is known: that its integral time is as its lag."""
+    """Assumption for a loop without known constants: its lag equals its integral time."""
     controller, record = one.controller, one.record
     lag_s = record.duration_s / 50.0
     if controller is not None and math.isfinite(controller.ti_s) and controller.ti_s > 0.0:
@@ -93,7 +93,7 @@ def supposed(one: PlantLoop) -> Known:
 
 
 def known_of(one: PlantLoop, store: Path | None) -> Known:
-    """What is known of a loop: by its experiments, by the store's last night, else what its record lets suppose."""
+    """Known constants of a loop: from its experiments, from the store's last night, else assumed from its record."""
     from analyzer.store.store import Store
 
     series = one.plant.trends(one.spec.tags, one.night)
@@ -112,7 +112,7 @@ def known_of(one: PlantLoop, store: Path | None) -> Known:
 
 
 def plan_lines(one: PlantLoop, store: Path | None) -> Iterator[str]:
-    """A loop's test in words. Raises InputError where OP is not recorded, or not in percent."""
+    """A loop's test in words. Raises InputError if OP is not recorded, or not in percent."""
     prepared, spec = one.prepared, one.spec
     if not prepared.op_known or not prepared.op_scaled:
         raise InputError(

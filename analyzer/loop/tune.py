@@ -1,4 +1,4 @@
-"""What `triage tune` says and draws of one loop: its last night read, assessed and tuned, new settings forecast."""
+"""Text and pictures of `triage tune` for one loop: its last night read, assessed and tuned, new settings forecast."""
 
 from __future__ import annotations
 
@@ -45,19 +45,18 @@ MAP_POINTS = 36
 """Points of the map along each axis."""
 NO_MOVES = Requirement(None, RequirementKind.MOVING_PV)
 SPREAD = 20.0
-"""The map reaches this factor below and above the present settings."""
+"""Factor of the map's range below and above the present settings."""
 FORECAST = ("average_absolute_error", "stem_travel", "oscillation", "variability")
-"""Figures of a forecast that are told."""
+"""Reported figures of a forecast."""
 
 
 @dataclass(frozen=True, slots=True)
 class Tuning:
-    """All that is known about retuning one loop.
+    """All results for retuning one loop.
 
     estimates by name with 90 % intervals; model, the identified loop with its present controller; period_s and
-    amplitude_pct of the recorded cycle [s], [% of span], None where there is none; cycle, the one simulation
-    finds; proposal; forecast, None where nothing is proposed; load [% PV] on the scan's clock; others, what else the
-    loop may be.
+    amplitude_pct of the recorded cycle [s], [% of span], None if there is none; cycle, the simulated one; proposal;
+    forecast, None if nothing is proposed; load [% PV] on the scan's clock; others, other possible loops.
     """
 
     estimates: dict[str, Estimate]
@@ -72,8 +71,8 @@ class Tuning:
 
 
 def identified(found: Assessment, limits: AdviceLimits) -> tuple[Process, Valve, dict[str, Estimate]]:
-    """Process, valve and their parameters with 90 % intervals, as one assessed loop's verdict has them. Raises
-    NotAssessedError where the loop's trends give no model."""
+    """Process, valve and their parameters with 90 % intervals, from one assessed loop's verdict. Raises
+    NotAssessedError if the loop's trends give no model."""
     verdict = found.verdict
     fit, at_fault = verdict.fit, verdict.cause is Cause.VALVE
     valve = fit.valve.valve if at_fault else None
@@ -87,9 +86,9 @@ def tune(
     kept: Advice | None,
     decided: tuple[Action, Pid | None] | None = None,
 ) -> Tuning:
-    """Propose settings for one assessed loop whose stated ones are `controller` [%, s], with what the record shows of
-    it beside; `kept`, why none are to be proposed (advice.withheld); decided, action and settings of all nights,
-    which stand. Raises NotAssessedError where the loop's trends give no model."""
+    """Propose settings for one assessed loop with stated ones `controller` [%, s], and further terms found in the
+    record; `kept`, the reason if none are to be proposed (advice.withheld); decided, action and settings of all
+    nights, which have precedence. Raises NotAssessedError if the loop's trends give no model."""
     verdict, controller = found.verdict, found.shown or controller
     first = found.oscillations.first
     period = first.period_s if first else None
@@ -120,7 +119,7 @@ def tune(
 
 
 def _as_decided(found: Proposal, action: Action, new: Pid | None) -> Proposal:
-    """A proposal with the action and the settings that were decided; of another action its reason says nothing."""
+    """A proposal with the decided action and settings; without a reason if its action was another one."""
     meanwhile = found.meanwhile if action is Action.REPAIR_VALVE else None
     reason = found.reason if action is found.action else ""
     return replace(found, action=action, reason=reason, controller=new, meanwhile=meanwhile)
@@ -171,7 +170,7 @@ def proposal_lines(t: Tuning, spec: LoopSpec, pv_span: float) -> list[str]:
 
 
 def pictures(t: Tuning, title: str) -> tuple[Picture, ...]:
-    """Describing functions, travel map and forecast, as far as there are any."""
+    """Describing functions, travel map and forecast, those that exist."""
     out: tuple[Picture, ...] = ()
     if t.model.valve is not None:
         out = (_curves(t, title), _map_field(t, title))
@@ -179,7 +178,7 @@ def pictures(t: Tuning, title: str) -> tuple[Picture, ...]:
 
 
 def _curves(t: Tuning, title: str) -> Plot:
-    """Where the describing function meets the loop: a limit cycle."""
+    """Intersections of the describing function with the loop: limit cycles."""
     c = curves(t.model)
     reach = 1.4 * float(np.abs(c.valve).max(initial=1.0))
     re, im = c.linear.real, c.linear.imag
@@ -197,7 +196,7 @@ def _curves(t: Tuning, title: str) -> Plot:
 
 
 def _map_field(t: Tuning, title: str) -> Field:
-    """Valve travel of each pair of settings, where the loop comes to rest, and where it is unstable."""
+    """Valve travel of each pair of settings, those without a cycle, and those that are unstable."""
     from analyzer.pages.compared import travel_field
 
     c, new = t.model.controller, t.proposal.controller
@@ -230,8 +229,8 @@ def _trend_panels(t: Tuning, new: Pid, title: str) -> Panels:
 
 @dataclass(frozen=True, slots=True)
 class TuningReport:
-    """What is told of retuning a loop: lines of text, pictures by file name, what the night decided, and the model
-    and the forecast as data."""
+    """Report on retuning a loop: lines of text, pictures by file name, the night's decision, and the model and the
+    forecast as data."""
 
     lines: list[str]
     pictures: dict[str, bytes]
@@ -239,7 +238,7 @@ class TuningReport:
     tuning: Tuning | None = None
 
     def as_data(self) -> dict[str, Any]:
-        """All of it as plain data, the pictures left out."""
+        """All of it as plain data, without the pictures."""
         t = self.tuning
         data: dict[str, Any] = {"loop": self.decision["loop"], "decision": as_data(self.decision)}
         if t is None:
@@ -254,8 +253,8 @@ class TuningReport:
 
 
 def proposal(one: PlantLoop, decision: Decided, drawn: bool) -> TuningReport:
-    """What is told of one loop over a night that decided `decision`, with pictures if wanted. Raises InputError where
-    its settings are not known, NotAssessedError where its trends give no model and the night decided nothing."""
+    """The report on one loop over a night that decided `decision`, with pictures if wanted. Raises InputError if its
+    settings are not known, NotAssessedError if its trends give no model and the night decided nothing."""
     spec, stated = one.spec, one.controller
     taught = taught_by(one)
     shown = [] if taught is None else list(experiments.lines(taught, spec, stated, one.plant.zone))
@@ -273,14 +272,14 @@ def proposal(one: PlantLoop, decision: Decided, drawn: bool) -> TuningReport:
 
 
 def taught_by(one: PlantLoop) -> Learned | None:
-    """What the experiments of a loop tell, its neighbours' OPs beside."""
+    """Results of a loop's experiments, with its neighbours' OPs."""
     spec, plant, record = one.spec, one.plant, one.prepared.record
     series = plant.trends(spec.tags, one.night)
     return learned(spec, series, one.prepared, plant.config, beside=_neighbours(one, record))
 
 
 def _neighbours(one: PlantLoop, record: LoopRecord) -> tuple[Floats, ...]:
-    """OPs of the plant's other loops on a record's clock, as many as an explanation reads."""
+    """OPs of the plant's other loops on a record's clock, up to the number that an explanation uses."""
     spec, plant = one.spec, one.plant
     tags = [s.op for s in plant.specs if s.loop != spec.loop and s.op and s.op != spec.op]
     tags = list(dict.fromkeys(tags))[: EXPLAIN.neighbours]
@@ -293,8 +292,8 @@ def _neighbours(one: PlantLoop, record: LoopRecord) -> tuple[Floats, ...]:
 
 
 def _routine(one: PlantLoop, stated: Pid | None, decision: Decided, drawn: bool) -> TuningReport:
-    """The same by what the loop does in automatic; without a model where its cause is none of its own, for then the
-    load looks like the process."""
+    """The report from routine operation in automatic; without a model if the cause is external, because the load then
+    looks like the process."""
     spec, prepared, config, loop = one.spec, one.prepared, one.plant.config, one.spec.loop
     if stated is None:
         seen = f"{loop}: no kp and ti in loops.csv"
@@ -306,11 +305,11 @@ def _routine(one: PlantLoop, stated: Pid | None, decision: Decided, drawn: bool)
     if found.verdict.cause is cause:
         signs = [s for s in found.verdict.signs if s.points_to is cause]
         text = [f"sign of {s.points_to}: {sign_in_full(s)}" for s in signs]
-    else:  # as the plant, or other nights, have it
+    else:  # the cause from the plant or from other nights
         found = replace(found, verdict=replace(found.verdict, cause=cause))
     if found.verdict.measured is None:
         limited = at_limits(prepared.record, config.quality) if prepared.op_known else None
-        needs = limited or unfit_for_cause(prepared, None, config)  # the nearest first
+        needs = limited or unfit_for_cause(prepared, None, config)  # the most direct reason first
         raise NotAssessedError(f"{loop}: {needs or found.verdict.needs or NO_MOVES}")
     if cause not in AGAINST and action is not Action.RETUNE:
         left = [WHY[cause]] if action is WITHOUT_SETTINGS[cause] else []
@@ -336,7 +335,7 @@ def _with_settings_beside(
 
     period_s = t.period_s or 10.0 * slowest_s(t.model)
     new = t.proposal.new
-    bounded = new is not None or is_stable(t.model)  # else what is identified is no loop to try settings on
+    bounded = new is not None or is_stable(t.model)  # else the identified loop is unstable
     known = t.model, t.load, new, period_s, pv_span, config.tuning, t.others
     sought = new is not None or t.proposal.before is not None
     found = compared(*known) if bounded and (sought or drawn) else None

@@ -1,5 +1,5 @@
-"""What one record says of valve and process, whatever its verdict: kept with the night, so that nights can be
-added up."""
+"""Evidence of one record about valve and process, regardless of its verdict: stored with the night, so that nights
+can be combined."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ Known = tuple[float, float]
 
 
 def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, config: Config) -> str | None:
-    """What a record says, as the store keeps it (JSON): the profile of widths and the evidence that it takes to
-    tell a fault [nat], the evidence for a slip jump and what it takes [nat], and constants with the deviation
-    of their logarithms; None where nothing was fitted, or PV's grid may hold PV still as a valve would. Compression
-    cuts turns so that they look like slips: nothing is said of a jump then."""
+    """Evidence of a record, as the store keeps it (JSON): the profile of widths and the evidence required for a fault
+    [nat], the evidence for a slip jump and its required value [nat], and constants with the deviation of their
+    logarithms; None if nothing was fitted, or PV's grid may keep PV constant as a valve would. Compression cuts OP
+    reversals so that they look like slips: there is no evidence for a jump then."""
     m, limits = verdict.for_settings.measured, config.cause
     if m is None or hidden_by_grid(m, prepared.pv_step, oscillates, limits):
         return None
@@ -57,8 +57,8 @@ def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, config: Conf
 
 
 def _profile(m: Measured, noise_widths: float) -> Floats:
-    """The profile of widths [nat], what speaks for a fault brought to the evidence that outliers leave of it;
-    nothing is said of widths under so many deviations of OP's noise, which crosses such a play now and then."""
+    """The profile of widths [nat], its positive part scaled to the evidence that remains after outliers; zero for
+    widths under `noise_widths` deviations of OP's noise, which sometimes crosses such a backlash."""
     found = width_profile(m.linear, m.play)
     crossed = noise_widths * robust_deviation(np.abs(np.diff(m.window.op, 2))) / math.sqrt(6.0) > WIDTHS
     found[crossed] = 0.0
@@ -71,8 +71,8 @@ def _profile(m: Measured, noise_widths: float) -> Floats:
 def _constants_of_fit(
     m: Measured, slips: Measured | None, limits: CauseLimits, oscillates: bool
 ) -> Mapping[str, Known]:
-    """Constants of the better fit: of the valve's where PV speaks for its fault, else of the process alone; a valve's
-    that is told slip by slip are those told."""
+    """Constants of the better fit: of the valve's if PV shows its fault, else of the process alone; the valve's
+    constants are those identified slip by slip, if there are any."""
     worn = m.evidence >= needed(m, limits, oscillates)
     sticks = worn and fault_of(m, limits) is Fault.STICTION and m.stick_slip is not None
     fit = (m.stick_slip if sticks else m.play) if worn else m.linear
