@@ -49,8 +49,8 @@ def detect_where_it_cycles(record: LoopRecord, limits: OscillationLimits) -> tup
 
 
 def _longest(active: Mask, dt_s: float, period_s: float, record: LoopRecord) -> Span | None:
-    """The longest run of samples in which a band is loud, gaps up to two periods allowed; None if it is most of the
-    record, or never loud."""
+    """The longest run of samples in which a band is loud, gaps up to two periods allowed; None if it is never
+    loud."""
     short = round(2.0 * period_s / dt_s)
     bridged = active.copy()
     for first, last in runs(~active):

@@ -51,14 +51,15 @@ class Measured:
     range [-]; jump [nat], stick-slip over backlash; line_linear and line_valve, prominence at the period of the
     residual load of the model without a valve fault and of the valve model [-]; amplification |S| there [-], None
     without settings; stable, the identified loop; consistency [-], gain outside the period's band over gain with it;
-    harmonic [-], locked third over the fundamental; saturated, share of time at limits [-]; moves, number of moves of
+    harmonic [-], locked third over the fundamental; saturated, share of time at limits [-]; controller, stated or
+    recovered; moves, number of moves of
     the better valve's stem; excited, whether set point moves drove the loop; trials, agreement of the stretches
     between OP reversals on the better valve, None with too few; kurtosis [-] of the band at the period, 3 for noise,
     1.5 for a constant size; wave_left [-], harmonics of PV's cycle in the residual of the better valve, over its
     fundamental; steady [-], of a calm loop, agreement of the stretches between moves of the stem on the better valve:
     their mean gain over its standard error, and asked, its gain while a response of PV to set point moves is expected
-    [nat]; ringing, whether the loop itself makes the cycle, None without settings; observed, the spectrum of its
-    error, None without a cycle; scale_s, the period or another time scale of the loop [s].
+    [nat]; ringing, whether the loop itself makes the cycle, None without settings; observed, the ringing seen
+    in the error, None without a cycle; scale_s, the period or another time scale of the loop [s].
     """
 
     linear: Fit
