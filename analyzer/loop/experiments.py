@@ -164,7 +164,8 @@ def _settings(model: Pooled, spec: LoopSpec, prepared: Prepared) -> FromTest | N
 
 
 def farther(present: Pid, new: Pid) -> float:
-    """Ratio of new and present settings, the larger of gain and integral time, at least 1."""
+    """Ratio of new and present settings, the larger of gain and integral time, at least 1; inf for another sign, or
+    where the present integral is off."""
     if present.kp * new.kp <= 0.0 or not math.isfinite(present.ti_s) or present.ti_s <= 0.0:
         return math.inf
     return max(*(max(a / b, b / a) for a, b in ((present.kp, new.kp), (present.ti_s, new.ti_s))))
