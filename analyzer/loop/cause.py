@@ -370,6 +370,8 @@ def _hides(
         return _robust(verdict, oscillation, config)
     if verdict.cause is Cause.VALVE:
         return None if pct >= limits.compressed_pct else compressed(prepared, None, config.quality)
+    if any(s.kind is SignKind.LIKELIER for s in verdict.signs):  # by its model, not by what is missing
+        return None
     unlikely = (
         None
         if pct >= limits.load_pct

@@ -330,3 +330,19 @@ def test_a_sign_that_is_not_known_names_no_cause(name):
     assert judge(found.verdict.measured, first, CONFIG.cause).cause == "valve"
     broken = replace(found.verdict.measured, **{name: float("nan")})
     assert judge(broken, first, CONFIG.cause).cause == "undecided"
+
+
+def test_a_load_of_few_samples_a_cycle_is_named_where_its_model_is_likelier():
+    """A sine load with 5.5 rows a cycle is named; a sticking valve recorded every 10 s is not called a load."""
+    swung = Sketch("load", (1.4, 40.0, 5.0), 0.8, 60.0, noise=0.05, load_std=0.3, sine=4.0, sine_s=55.0)
+    worn = Sketch("valve", (1.2, 8.0, 3.0), 0.4, 20.0, stickband=4.0, slip_jump=3.0, noise=0.08)
+    verdicts = []
+    for sketch in (swung, worn):
+        t, every = simulate(sketch, 8), 10
+        stamp = START_S + every * np.arange(t.pv[::every].size, dtype=float)
+        tags = {f"L.{name.upper()}": series(stamp, getattr(t, name)[::every]) for name in ("sp", "pv", "op")}
+        loop = prepare(spec("L", ""), tags, CONFIG.quality)
+        verdicts.append(assess(loop, sketch.controller, CONFIG).verdict)
+    load, valve = verdicts
+    assert load.cause == "load"
+    assert valve.cause != "load"
