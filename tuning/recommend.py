@@ -27,7 +27,7 @@ from tuning.rules import effective_delay, simc
 from tuning.search import (
     Bench,
     Candidate,
-    Case,
+    LoadedLoop,
     bench,
     mean_error,
     rejection,
@@ -101,7 +101,7 @@ def recommend(
     error: float | None = None,
     halfway: bool = False,
     seen: ObservedRinging | None = None,
-    alike: Sequence[Case] = (),
+    indistinguishable: Sequence[LoadedLoop] = (),
 ) -> Proposal:
     """The proposal for one loop: identified process and valve with the present controller.
 
@@ -110,7 +110,7 @@ def recommend(
     ValueError where it is not finite; None, or too short a load (tuning.limits): steps at the valve; error, the
     recorded average absolute error [% PV], because the simulation of a barely stable loop is too inaccurate, None:
     simulated; halfway, whether the dead time of a ringing loop is uncertain, so that a first step is proposed; seen,
-    the observed ringing of such a loop, None: that of the model; alike, as in tuning.search.bench:
+    the observed ringing of such a loop, None: that of the model; indistinguishable, as in tuning.search.bench:
     settings must be no worse on these either.
     """
     _check(cause, load)
@@ -123,7 +123,7 @@ def recommend(
         cases = None if load is None else _cases(loop, uncertainty, load, error)
         return _tight(loop, uncertainty, cases, seen or _alone(loop), limits, halfway)
     load = None if load is None or load.size < limits.least_steps else load
-    return _valve(loop, uncertainty, load, limits, alike)
+    return _valve(loop, uncertainty, load, limits, indistinguishable)
 
 
 def _tight(
@@ -264,7 +264,11 @@ def _simc_settings(
 
 
 def _valve(
-    loop: Loop, others: Sequence[Loop], load: Floats | None, limits: TuningLimits, alike: Sequence[Case]
+    loop: Loop,
+    others: Sequence[Loop],
+    load: Floats | None,
+    limits: TuningLimits,
+    indistinguishable: Sequence[LoadedLoop],
 ) -> Proposal:
     """Settings with the least travel and error within the limits, for a loop with backlash or stick-slip."""
     if band(loop.valve) <= 0.0:
@@ -275,7 +279,7 @@ def _valve(
         return Proposal(Action.REPAIR_VALVE, WHY["sticks_on_short_lag"].format(**known), before=before)
     if load is None:
         load = standard_load(loop, limits.most_steps)
-    table = bench(loop, others, load, limits, alike)
+    table = bench(loop, others, load, limits, indistinguishable)
     now = maximum_sensitivity(loop)
     if table.travel[0] <= 0.0:
         why = WHY["no_travel"].format(fault=fault)

@@ -94,20 +94,24 @@ def mean_error(loops: Sequence[Loop], controller: Pid, load: Floats) -> float:
     return float(np.mean([_figures(replace(one, controller=controller), load)[1] for one in loops]))
 
 
-Case = tuple[Loop, Floats]
+LoadedLoop = tuple[Loop, Floats]
 """A loop with the load [% PV] that the record leaves to it."""
 
 
 def bench(
-    loop: Loop, others: Sequence[Loop], load: Floats, limits: TuningLimits, alike: Sequence[Case] = ()
+    loop: Loop,
+    others: Sequence[Loop],
+    load: Floats,
+    limits: TuningLimits,
+    indistinguishable: Sequence[LoadedLoop] = (),
 ) -> Bench:
-    """The present tuning on every loop, as a reference for candidates; alike, other loops that the record
+    """The present tuning on every loop, as a reference for candidates; indistinguishable, other loops that the record
     cannot tell from the first, each with its own load."""
     cut = in_digits(load[-limits.most_steps :])
     loops = tuple(replace(one, controller=loop.controller) for one in (loop, *others))
     loads = tuple(cut if k % 2 == 0 else np.ascontiguousarray(cut[::-1]) for k in range(len(loops)))
-    loops += tuple(one for one, _ in alike)
-    loads += tuple(in_digits(own[-limits.most_steps :]) for _, own in alike)
+    loops += tuple(one for one, _ in indistinguishable)
+    loads += tuple(in_digits(own[-limits.most_steps :]) for _, own in indistinguishable)
     figures = np.array([_figures(*case) for case in zip(loops, loads, strict=True)])
     return Bench(loops, loads, figures[:, 0], figures[:, 1], most_ms(loops, limits), limits)
 

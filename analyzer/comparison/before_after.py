@@ -17,7 +17,7 @@ from scipy.special import ndtri
 
 from analyzer.columns import BY_NAME
 from analyzer.comparison.block_bootstrap import Difference, Floats, Side, difference
-from analyzer.comparison.equal_load import NO_PART, EqualLoad, Part, Weeks
+from analyzer.comparison.equal_load import NO_RATIO, EqualLoad, LogRatio, Weeks
 from analyzer.config import ComparisonLimits
 from analyzer.history.plant_clock import HOUR_S
 from identification.signals.robust import robust_deviation
@@ -150,10 +150,10 @@ class Parts:
     """Components of a difference, as logarithms of ratios: the change's own part, that of load and set point, the
     residual; and the predicted effect of the settings under the load of before."""
 
-    change: Part
-    load: Part
-    left: Part
-    promised: Part
+    change: LogRatio
+    load: LogRatio
+    left: LogRatio
+    promised: LogRatio
 
 
 @dataclass(frozen=True, slots=True)
@@ -291,7 +291,9 @@ LEAST_DEVIATION = 1e-3
 """Minimum standard deviation of a measured logarithm of a ratio; ours: constant figures are not more certain."""
 
 
-def _measured(found: Difference, measure: Measure, level: float, reference: Reference | None) -> Part | None:
+def _measured(
+    found: Difference, measure: Measure, level: float, reference: Reference | None
+) -> LogRatio | None:
     """A difference as the logarithm of a ratio, less that of unchanged loops, with its deviation towards zero; None
     if before or after is zero."""
     if min(found.before, found.after) <= measure.least:
@@ -301,11 +303,13 @@ def _measured(found: Difference, measure: Measure, level: float, reference: Refe
     deviation = abs(value - math.log(max(near, 0.01 * found.before) / found.before)) / float(
         ndtri(0.5 + level / 2)
     )
-    common = NO_PART if reference is None else reference.of.get(measure.name, NO_PART)
-    return Part(value - common.value, max(math.hypot(deviation, common.deviation), LEAST_DEVIATION))
+    common = NO_RATIO if reference is None else reference.of.get(measure.name, NO_RATIO)
+    return LogRatio(value - common.value, max(math.hypot(deviation, common.deviation), LEAST_DEVIATION))
 
 
-def parts_of(measured: Part, simulated: EqualLoad, name: str, alike: bool, limits: ComparisonLimits) -> Parts:
+def parts_of(
+    measured: LogRatio, simulated: EqualLoad, name: str, alike: bool, limits: ComparisonLimits
+) -> Parts:
     """The components of a measured change.
 
     Without a change of settings or valve the change's own part is zero. In comparable weeks it combines measurement
@@ -313,22 +317,24 @@ def parts_of(measured: Part, simulated: EqualLoad, name: str, alike: bool, limit
     change.
     """
     own = simulated.change[name]
-    days = Part(0.0, measured.deviation)  # loads of comparable weeks differ as days do
+    days = LogRatio(0.0, measured.deviation)  # loads of comparable weeks differ as days do
     if simulated.same:
-        left, load = (measured, days) if alike else (NO_PART, measured)
-        return Parts(NO_PART, load, left, NO_PART)
+        left, load = (measured, days) if alike else (NO_RATIO, measured)
+        return Parts(NO_RATIO, load, left, NO_RATIO)
     load = days if alike else simulated.load[name]
     if alike:
         most = max(abs(part.value) for part in simulated.change.values())
         share = min(most / limits.beside_change, 1.0)  # nearly equal settings have nearly equal effects
-        sure = Part(own.value, math.hypot(own.deviation, share * limits.beside_measured))
+        sure = LogRatio(own.value, math.hypot(own.deviation, share * limits.beside_measured))
         weight = measured.deviation**-2, sure.deviation**-2
-        own = Part((measured.value * weight[0] + sure.value * weight[1]) / sum(weight), sum(weight) ** -0.5)
+        own = LogRatio(
+            (measured.value * weight[0] + sure.value * weight[1]) / sum(weight), sum(weight) ** -0.5
+        )
         if abs(measured.value - sure.value) > 2.0 * math.hypot(measured.deviation, sure.deviation):
             far = max(abs(own.value - x.value) for x in (measured, sure))
-            own = Part(own.value, max(own.deviation, far / float(ndtri(0.95))))  # 90 % then includes both
+            own = LogRatio(own.value, max(own.deviation, far / float(ndtri(0.95))))  # 90 % then includes both
     deviation = math.hypot(measured.deviation, own.deviation, 0.0 if alike else load.deviation)
-    left = Part(measured.value - own.value - load.value, deviation)
+    left = LogRatio(measured.value - own.value - load.value, deviation)
     return Parts(own, load, left, simulated.promised[name])
 
 
@@ -358,7 +364,7 @@ def change_of(
     found = Difference(*(x * measure.scale for x in (d.before, d.after, d.low, d.high)))
     own = _change(measure, found, level, evidence, limits)
     stem = None if evidence.simulated is None else evidence.simulated.stem
-    if measure is not TRAVEL or stem is None or stem == NO_PART or evidence.stem_recorded:
+    if measure is not TRAVEL or stem is None or stem == NO_RATIO or evidence.stem_recorded:
         return [own]
     return [_of_stem(found, level, evidence, limits), replace(own, measure=OP_TRAVEL)]
 
@@ -437,7 +443,7 @@ class Reference:
     """Change in loops without a change between the same spans: their number, and logs of ratios by figure."""
 
     loops: int
-    of: Mapping[str, Part]
+    of: Mapping[str, LogRatio]
 
 
 def reference(
@@ -445,7 +451,7 @@ def reference(
 ) -> Reference | None:
     """The common change of unchanged loops, figure by figure: their median ratio if significant; None with too few of
     them (difference in differences, Card and Krueger 1994)."""
-    of: dict[str, Part] = {}
+    of: dict[str, LogRatio] = {}
     for m in (m for m in MEASURES if m.primary):
         ratios = []
         for hours in others:
@@ -460,7 +466,7 @@ def reference(
         value, spread = float(np.median(ratios)), robust_deviation(np.array(ratios) - np.median(ratios))
         deviation = math.sqrt(math.pi / 2 / len(ratios)) * spread  # of a median
         if abs(value) > 2.0 * deviation:
-            of[m.name] = Part(value, deviation)
+            of[m.name] = LogRatio(value, deviation)
     return Reference(len(others), of) if len(others) >= limits.controls else None
 
 

@@ -161,7 +161,7 @@ def _constants(row: Mapping[str, Any], said: Mapping[str, Any]) -> tuple[tuple[F
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class LogRatio:
     """A logarithm of a ratio with its standard deviation [-]."""
 
     value: float
@@ -172,7 +172,7 @@ class Part:
         return self.value - times * self.deviation, self.value + times * self.deviation
 
 
-NO_PART = Part(0.0, 0.0)
+NO_RATIO = LogRatio(0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,10 +184,10 @@ class EqualLoad:
     fault-free valve, and stem_share, its value before [-]; same, whether neither settings nor valve changed.
     """
 
-    change: Mapping[str, Part]
-    load: Mapping[str, Part]
-    promised: Mapping[str, Part]
-    stem: Part
+    change: Mapping[str, LogRatio]
+    load: Mapping[str, LogRatio]
+    promised: Mapping[str, LogRatio]
+    stem: LogRatio
     stem_share: float = 1.0
     same: bool = False
 
@@ -226,8 +226,8 @@ def equal_load(weeks: Weeks, limits: ComparisonLimits, figures: FigureLimits) ->
     """Both loops under both weeks' loads; None if no process was identified, or if the simulation with present
     settings does not reproduce the recorded error."""
     if weeks.same:
-        nothing = dict.fromkeys(FIGURES, NO_PART)
-        return EqualLoad(nothing, {}, nothing, NO_PART, same=True)
+        nothing = dict.fromkeys(FIGURES, NO_RATIO)
+        return EqualLoad(nothing, {}, nothing, NO_RATIO, same=True)
     rng, drawn = np.random.default_rng(0), []
     models = _models(weeks, rng)
     for k, model in zip(range(MOST_TRIED), models, strict=False):
@@ -257,17 +257,17 @@ def equal_load(weeks: Weeks, limits: ComparisonLimits, figures: FigureLimits) ->
         named[0],
         named[1],
         named[2],
-        _part(ratio[:, 1, 1] - ratio[:, 0, 0], 0.0, limits) if np.any(ratio) else NO_PART,
+        _part(ratio[:, 1, 1] - ratio[:, 0, 0], 0.0, limits) if np.any(ratio) else NO_RATIO,
         math.exp(float(np.median(ratio[:, 0, 0]))),
     )
 
 
-def _part(x: Floats, missed: float, limits: ComparisonLimits) -> Part:
+def _part(x: Floats, missed: float, limits: ComparisonLimits) -> LogRatio:
     """The median of draws; their spread, plus the simulation error of each present loop against the record, and a
     share of the part itself for unmodelled effects."""
     value = float(np.median(x))
     spread = max(robust_deviation(x - value), 0.5 * float(np.std(np.clip(x, -4, 4))))
-    return Part(value, math.hypot(spread, missed, limits.model_share * abs(value), limits.model_floor))
+    return LogRatio(value, math.hypot(spread, missed, limits.model_share * abs(value), limits.model_floor))
 
 
 Model = tuple[Fopdt, LoopNight | None]

@@ -176,8 +176,8 @@ def case(
     series = snapped(series, spec.pv or "")
     whole = prepare(spec, series, config.quality)
     taught = learned(spec, series, whole, config, beside=ops_beside(spec, specs, series, whole, config))
-    by_hand = taught if controller(spec, whole.scale.span) is None else in_manual(taught)
-    coarse = whole if most is None or len(whole.record) <= most else coarser(whole, by_hand, config)
+    known = controller(spec, whole.scale.span) is not None
+    coarse = whole if most is None or len(whole.record) <= most else coarser(whole, taught, config, known)
     prepared, shortened = telling_stretch(as_given(coarse), most)
     if coarse is not whole:
         stated = f"each {coarse.record.dt_s:.3g} s: its experiments need no more."
@@ -210,17 +210,10 @@ def case(
     return Case(spec, thin, subject, f"{shortened} {said}".strip(), taught)
 
 
-def in_manual(taught: Learned | None) -> Learned | None:
-    """What experiments in manual tell, None where there are none: in automatic a known controller acts between the
-    samples of a coarser record."""
-    if taught is None or taught.model is None or taught.model.used[0].experiment.course.closed:
-        return None
-    return taught
-
-
-def coarser(whole: Prepared, taught: Learned | None, config: Config) -> Prepared:
-    """A record that is too fast for its experiments, with a larger step, so that none of them is cut."""
-    if taught is None or taught.model is None:
+def coarser(whole: Prepared, taught: Learned | None, config: Config, known: bool) -> Prepared:
+    """A record that is too fast for its experiments, with a larger step, so that none of them is cut; unchanged for
+    experiments in automatic with a known controller, which acts between the samples of a coarser record."""
+    if taught is None or taught.model is None or (known and taught.model.used[0].experiment.course.closed):
         return whole
     e, record = taught.model.estimates, whole.record
     answer_s = e["dead_time_s"].value + (e["lags_s"].value if "lags_s" in e else 0.0)

@@ -12,7 +12,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from analyzer.finder.law import TINY, Matrix, Moves, blocks, explained, fitted, shared_noise
+from analyzer.finder.law import TINY, Matrix, Moves, blocks, explained_share, fitted, shared_noise
 from analyzer.limits import FINDER
 
 
@@ -114,7 +114,7 @@ def law_of(held: Matrix, each: Sequence[int]) -> tuple[Matrix, Matrix]:
     for k, width in enumerate(each):
         moves, rows = Moves.of(held, width), at_no_limit(held, width)
         some = moves.at(rows) if FINDER.least_moves + FINDER.past <= len(rows) < len(moves.value) else moves
-        law[k] = max(explained(some, some)[0, 1], explained(some, some)[1, 0])
+        law[k] = max(explained_share(some, some)[0, 1], explained_share(some, some)[1, 0])
         noise[k] = shared_noise(some, some)[0, 1]
     return law, noise
 

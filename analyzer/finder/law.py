@@ -61,7 +61,7 @@ def widths(samples: int) -> tuple[int, ...]:
     return tuple(w for w in FINDER.widths if samples // w >= FINDER.least_blocks) or (1,)
 
 
-def explained(causes: Moves, effects: Moves) -> Matrix:
+def explained_share(causes: Moves, effects: Moves) -> Matrix:
     """Share of the moves of each effect explained by the law from each cause, shape (causes, effects), 0 to 1."""
     moved, summed, wanted = _unit(causes.value), _unit(causes.integral), _unit(effects.value)
     a, b = moved.T @ wanted, summed.T @ wanted

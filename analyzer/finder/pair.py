@@ -13,7 +13,7 @@ from analyzer.finder.law import (
     Matrix,
     Moves,
     blocks,
-    explained,
+    explained_share,
     fitted,
     shared_noise,
     widths,
@@ -87,7 +87,7 @@ def known_pair(values: Matrix) -> FoundPair:
     error = values[:, 0] - (0.0 if sp is None else values[:, 2])
     columns, each = np.column_stack([error, values[:, 1]]), widths(len(values))
     moves = [Moves.of(columns, width) for width in each]
-    law = np.array([explained(m, m)[0, 1] for m in moves])
+    law = np.array([explained_share(m, m)[0, 1] for m in moves])
     told = int(np.argmax(law >= min(FINDER.law_told, law.max())))
     noise = float(shared_noise(moves[told], moves[told])[0, 1])
     found = FoundPair(0, 1, sp, float(law[told]), noise, each[told], 1.0, 0.0)

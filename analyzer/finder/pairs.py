@@ -21,7 +21,7 @@ from analyzer.finder.held import (
     nearness,
     resting_level,
 )
-from analyzer.finder.law import Matrix, Moves, explained, widths
+from analyzer.finder.law import Matrix, Moves, explained_share, widths
 from analyzer.finder.pair import FoundPair, with_settings
 from analyzer.finder.scores import Scores, scored
 from analyzer.finder.way import acts, freer, pv_and_sp, resolved, towards
@@ -157,7 +157,7 @@ def _other_pv(bag: Bag, pair: FoundPair, pairs: Sequence[FoundPair]) -> float:
     tags = [k for k in bag.live if k not in {pair.pv, pair.op, bag.same[pair.sp], *slaves}]
     error = bag.values[:, tags] - bag.values[:, [pair.sp]]
     op = Moves.plain(bag.values[:, [pair.op]], pair.width)
-    law = explained(Moves.plain(error, pair.width), op)[:, 0]
+    law = explained_share(Moves.plain(error, pair.width), op)[:, 0]
     for k in np.argsort(-law):
         if not alike(bag.values[:, [pair.pv, pair.op, tags[k]]])[2, :2].any():
             return float(law[k])

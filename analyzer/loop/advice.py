@@ -12,7 +12,7 @@ from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
 from analyzer.loop.decisions import Action, Cause, Due, Fault, MissingData, Requirement, RequirementKind
 from analyzer.loop.fitness import too_thin
-from analyzer.loop.identified import alike, cautious, load_of, recorded_error, tuned, uncertain
+from analyzer.loop.identified import cautious, indistinguishable, load_of, recorded_error, tuned, uncertain
 from analyzer.loop.oscillation import counting
 from analyzer.loop.quality import Prepared
 from analyzer.loop.ringing import between_samples
@@ -31,7 +31,7 @@ from identification.record import Floats
 from tuning.frequency_response import integral_s, is_stable
 from tuning.limit_cycle import Cycle, confirm
 from tuning.recommend import WITHOUT_SETTINGS, Proposal, recommend
-from tuning.search import Case, rounded
+from tuning.search import LoadedLoop, rounded
 
 SAID = sentences("settings")
 """Sentences about settings that are given, or withheld."""
@@ -61,14 +61,14 @@ class Advice:
 
 @dataclass(frozen=True, slots=True)
 class Proposed:
-    """A proposal, its loop and load [% PV], None if no search was made, the other possible loops, and the loops alike
-    of tuning.search.bench."""
+    """A proposal, its loop and load [% PV], None if no search was made, the other possible loops, and the
+    indistinguishable loops of tuning.search.bench."""
 
     proposal: Proposal
     loop: Loop | None = None
     load: Floats | None = None
     others: tuple[Loop, ...] = ()
-    alike: tuple[Case, ...] = ()
+    indistinguishable: tuple[LoadedLoop, ...] = ()
 
 
 def model_of(verdict: Verdict, controller: Pid) -> Loop:
@@ -108,7 +108,7 @@ def advise(
     beside = None
     if proposed.loop is not None and proposed.load is not None:
         known = proposed.loop, proposed.load, held or proposal.new, oscillation.period_s, pv_span
-        beside = compared(*known, config.tuning, proposed.others, proposed.alike)
+        beside = compared(*known, config.tuning, proposed.others, proposed.indistinguishable)
     return replace(_as_advice(proposal, spec, pv_span), compared=beside)
 
 
@@ -309,10 +309,10 @@ def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Con
         if apart is not None:
             differs = SAID["off_by"].format(*apart) if apart[1] > 0.0 else SAID["no_cycle"]
             return Proposed(Proposal(Action.UNDECIDED, SAID["disagrees"].format(differs)))
-    same: tuple[Case, ...] = ()
+    same: tuple[LoadedLoop, ...] = ()
     if period_s is not None and scans_per_row(loop.controller, fit.window.row_s) > 1:
-        same = alike(fit, sought, period_s)
-    found = recommend(sought, verdict.cause, others, load, config.tuning, alike=same)
+        same = indistinguishable(fit, sought, period_s)
+    found = recommend(sought, verdict.cause, others, load, config.tuning, indistinguishable=same)
     return Proposed(found, sought, load, others, same)
 
 

@@ -135,7 +135,7 @@ def _the_right_way(model: Modelled, stated: Pid | None) -> Modelled:
     controller: such a loop would be unstable, so a load has moved PV."""
     closed = model.experiment.course.closed
     if closed and stated is not None and stated.kp * model.process.slope < 0.0:
-        raise NotAssessedError("the fitted process goes against its controller: a load moved PV meanwhile")
+        raise NotAssessedError("the fitted gain has the opposite sign of its controller: a load moved PV")
     return model
 
 

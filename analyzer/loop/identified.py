@@ -26,15 +26,17 @@ from tuning.describing import describe, scaled_valve
 from tuning.forecast import SEED
 from tuning.frequency_response import maximum_sensitivity
 from tuning.rules import simc
+from tuning.search import LoadedLoop
 
 INTEGRATING = 10.0
 """Time constant over a cycle's period [-] from which a lag acts on it as an integrator: its phase is within a degree
 of -90 degrees."""
 WIDER = 1.4
-"""Width of a valve over that fitted to a record of one row in several scans, which is possible [-]; ours: in the two
-loops of benchmarks/world (seeds 97, 99, every 10 s) whose settings raised the error it was 1.15 and 1.43."""
+"""True width of a valve over the width fitted to a record of one row in several scans, a possible value [-]; ours: in
+the two loops of benchmarks/world (seeds 97, 99, every 10 s) whose settings raised the error it was 1.15 and 1.43."""
 MOST_OF_SWING = 0.8
-"""Width over OP's swing up to which a wider valve still moves [-]; ours."""
+"""Largest width over OP's range in a cycle that is tried [-]; ours: the stem does not move at 1, and near it noise
+decides whether it does."""
 COARSE = 2.0
 """Digits of OP within which the median of its jumps is that of whole digits."""
 
@@ -158,19 +160,20 @@ def uncertain(fit: Fit, loop: Loop, samples: int = 6) -> tuple[Loop, ...]:
     return tuple(_drawn(draw, fit, loop) for draw in draws)
 
 
-def alike(fit: Fit, loop: Loop, period_s: float) -> tuple[tuple[Loop, Floats], ...]:
+def indistinguishable(fit: Fit, loop: Loop, period_s: float) -> tuple[LoadedLoop, ...]:
     """Loops that the cycle of a period [s] cannot distinguish from the fitted one, each with its residual load [% PV]
     of the record, as `load_of`.
 
     A limit cycle determines the product of the process and the valve's describing function at its own frequency alone
-    (Astrom, Hagglund 1984). OP between two rows of a record is unknown and biases the rest: the time constant and the
-    width come out too small, and with them the error under a slow load. These loops have the same product, an
-    integrator for a process, and the valve as fitted or WIDER.
+    (Astrom, Hagglund 1984). OP between two rows of a record is unknown and biases the rest: the fitted time constant
+    and width are too small, and with them the error under a slow load. These loops have the same product, an
+    integrating process, and the valve as fitted or WIDER. A dead time that would be negative is 0; the product then
+    differs in phase.
     """
     omega, lag_s = 2.0 * math.pi / period_s, fit.time_constant_s
     slow_s, swing = INTEGRATING * max(lag_s, period_s), 0.5 * fit.window.cycle_range
     found = []
-    for wider in (1.0, min(WIDER, MOST_OF_SWING * 2.0 * swing / max(fit.valve.stickband, 1e-9))):
+    for wider in (1.0, min(WIDER, MOST_OF_SWING * fit.window.cycle_range / max(fit.valve.stickband, 1e-9))):
         valve = scaled_valve(loop.valve, wider)
         response, wide = describe(loop.valve, swing), describe(valve, swing)
         if wider < 1.0 or 0.0 in (response, wide):

@@ -19,7 +19,7 @@ from tuning.harmonic_balance import TravelMap, travel_map
 from tuning.limit_cycle import confirm
 from tuning.limits import TuningLimits
 from tuning.rules import simc
-from tuning.search import Candidate, Case, bench, rejection, try_out
+from tuning.search import Candidate, LoadedLoop, bench, rejection, try_out
 from tuning.trade import Trade, trade
 
 MAP_POINTS, SPREAD = 24, 12.0
@@ -112,18 +112,18 @@ def compared(
     pv_span: float,
     limits: TuningLimits,
     others: Sequence[Loop] = (),
-    alike: Sequence[Case] = (),
+    indistinguishable: Sequence[LoadedLoop] = (),
 ) -> Comparison | None:
     """Present, recommended and textbook settings of an identified loop; None if its load is too short for that.
 
     load is load and noise on the controller's clock [% PV], shape (n,); period_s, of the recorded cycle [s]; pv_span,
-    the span of PV in its own unit; others, other possible loops, on which each is tried too; alike as in
+    the span of PV in its own unit; others, other possible loops, on which each is tried too; indistinguishable as in
     tuning.search.bench.
     """
     if load.size < limits.least_steps or loop.process.slope * loop.controller.kp <= 0.0:
         return None
     loop, load = loop_in_digits(loop), as_held(load)
-    table = bench(loop, others, load, limits, alike)
+    table = bench(loop, others, load, limits, indistinguishable)
     moves = table.travel[0] > 0.0  # a constant stem cannot become calmer, and a ratio means nothing
     found = trade(table) if moves else Trade((), {})
     settings = alternatives(loop, new, {name: c.controller for name, c in found.chosen.items()})

@@ -29,7 +29,7 @@ from analyzer.comparison.before_after import (
     reference,
     spans_around,
 )
-from analyzer.comparison.equal_load import Part, equal_load, weeks_of
+from analyzer.comparison.equal_load import LogRatio, equal_load, weeks_of
 from analyzer.config import ComparisonLimits, Config, FigureLimits
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.loop.decisions import Action, counts
@@ -195,7 +195,7 @@ def _percent(log_ratio: float) -> float:
     return 100.0 * math.expm1(log_ratio)
 
 
-def _told(part: Part) -> parts.Cell:
+def _told(part: LogRatio) -> parts.Cell:
     """A part in percent with its 90 % interval."""
     low, high = (words.signed(_percent(end)) for end in part.interval(NINETY))
     value = _percent(part.value)

@@ -15,7 +15,7 @@ from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.cause import NO_CAUSE, not_assessed
 from analyzer.loop.conclusion import concluded
 from analyzer.loop.decisions import MissingData, Requirement, RequirementKind
-from analyzer.loop.identified import alike, lag_factor, load_of, scan_noise, tuned, uncertain
+from analyzer.loop.identified import indistinguishable, lag_factor, load_of, scan_noise, tuned, uncertain
 from analyzer.loop.oscillation import Oscillations
 from analyzer.loop.quality import prepare
 from analyzer.loop.witness import witness
@@ -317,7 +317,7 @@ def test_loops_that_a_cycle_cannot_tell_apart_have_its_loop_gain(pipe):
         lag = p.gain * np.exp(-1j * omega * p.dead_time_s) / (1.0 + 1j * omega * p.time_constant_s)
         return lag * describe(one.valve, swing)
 
-    found = alike(fit, loop, period_s)
+    found = indistinguishable(fit, loop, period_s)
     widths = [one.valve.width for one, _ in found]
     assert widths[0] == fit.valve.stickband
     assert widths[1] > 1.05 * widths[0]

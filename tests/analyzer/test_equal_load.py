@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from analyzer.comparison.before_after import Change, Grade, Reference, Span, grade, parts_of, reference
-from analyzer.comparison.equal_load import FIGURES, NO_PART, EqualLoad, LoopNight, Part, Weeks
+from analyzer.comparison.equal_load import FIGURES, NO_RATIO, EqualLoad, LogRatio, LoopNight, Weeks
 from analyzer.history.export import open_export
 from analyzer.loop.assessments import travel_of
 from analyzer.loops.changes import TuningChange
@@ -84,7 +84,7 @@ def test_a_load_that_doubles_is_not_the_changes_doing(cases: dict[str, ChangeCas
     assert error.value_pct is not None
     assert error.value_pct > 50
     assert error.parts is not None
-    assert error.parts.change == NO_PART
+    assert error.parts.change == NO_RATIO
     assert error.parts.load.value == pytest.approx(math.log(2.0), abs=0.25)
     assert "different load" in outcome(case.found)
 
@@ -138,22 +138,22 @@ def test_remarks_are_said_once(cases: dict[str, ChangeCase]) -> None:
 
 def simulated(value: float, deviation: float) -> EqualLoad:
     """A simulated change of every figure by so much, under a load of nothing."""
-    of = dict.fromkeys(FIGURES, Part(value, deviation))
-    return EqualLoad(of, dict.fromkeys(FIGURES, NO_PART), of, NO_PART)
+    of = dict.fromkeys(FIGURES, LogRatio(value, deviation))
+    return EqualLoad(of, dict.fromkeys(FIGURES, NO_RATIO), of, NO_RATIO)
 
 
 def test_measured_and_simulated_are_weighed() -> None:
     """In weeks that are alike a precise measurement outweighs the simulation; where both contradict each other the
     interval holds both."""
     limits = CONFIG.before_after
-    found = parts_of(Part(-0.5, 0.05), simulated(-0.4, 0.05), FIGURES[0], True, limits)
+    found = parts_of(LogRatio(-0.5, 0.05), simulated(-0.4, 0.05), FIGURES[0], True, limits)
     assert found.change.value == pytest.approx(-0.5, abs=0.03)
-    apart = parts_of(Part(1.0, 0.02), simulated(0.0, 0.02), FIGURES[0], True, limits)
+    apart = parts_of(LogRatio(1.0, 0.02), simulated(0.0, 0.02), FIGURES[0], True, limits)
     low, high = apart.change.interval(1.96)
     assert low < 0.02
     assert high > 0.98
-    other = parts_of(Part(1.0, 0.02), simulated(-0.3, 0.02), FIGURES[0], False, limits)
-    assert other.change == Part(-0.3, 0.02)
+    other = parts_of(LogRatio(1.0, 0.02), simulated(-0.3, 0.02), FIGURES[0], False, limits)
+    assert other.change == LogRatio(-0.3, 0.02)
     assert other.left.value == pytest.approx(1.3)
 
 

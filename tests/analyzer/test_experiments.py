@@ -195,4 +195,4 @@ def test_a_model_against_the_controller_tells_nothing(tmp_path):
     right, wrong = model(0.8), model(-0.8)
     assert right.model.estimates["gain"].value == pytest.approx(1.2, rel=0.1)
     assert wrong.model is None
-    assert "against its controller" in wrong.untold[0][1]
+    assert "opposite sign of its controller" in wrong.untold[0][1]

@@ -385,7 +385,7 @@ def test_settings_are_no_worse_on_a_loop_that_the_record_cannot_tell_apart():
     level = replace(lag, process=Fopdt(7.5, 2800, 17), valve=Backlash(5.4))
     fast, slow = (load(rng, 12000, size, corner, 0.02) for corner, size in ((60.0, 0.3), (3000.0, 1.5)))
     alone = recommend(lag, "valve", (), load=fast).new
-    tried = recommend(lag, "valve", (), load=fast, alike=[(level, slow)]).new
+    tried = recommend(lag, "valve", (), load=fast, indistinguishable=[(level, slow)]).new
     before, *after = (figures(level, pid, slow)[1] for pid in (lag.controller, alone, tried))
     assert after[0] > 1.15 * before
     assert after[1] < before
