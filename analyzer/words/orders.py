@@ -72,7 +72,7 @@ RETUNED = {Cause.VALVE: "retune worn", Cause.NONE: "retune sluggish", Cause.TUNI
 
 
 EXPECTED = {
-    Cause.VALVE: "the cycle stops in simulation with the valve as it is",
+    Cause.VALVE: "the cycle stops, as in simulation; the valve stays as it is",
     Cause.NONE: "PV returns to its set point several times faster, and OP moves more",
     Cause.TUNING: "the oscillation is smaller and decays sooner after a disturbance",
 }
