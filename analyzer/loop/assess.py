@@ -165,11 +165,11 @@ def _rung(
 
 
 def _made_by_valve(verdict: Verdict, limits: CauseLimits) -> bool:
-    """Whether the valve causes a cycle: high confidence, not dead, a stickband that OP crosses."""
+    """Whether the valve causes a cycle: not dead, and with a stickband that OP crosses."""
     m = verdict.measured
     if verdict.cause is not Cause.VALVE or verdict.dead or m is None:
         return False
-    return verdict.confidence[Cause.VALVE] >= limits.near_pct and m.size <= limits.near_size
+    return m.size <= limits.near_size
 
 
 def verdict_by_measures(

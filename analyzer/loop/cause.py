@@ -1,24 +1,14 @@
-"""Cause of a loop's oscillation: valve, tuning or load, from independent signs.
+"""Cause of a loop's oscillation: valve, tuning or load, each a model of the same record with its likelihood.
 
-1. Likelihood and size of a valve fault: backlash (or stick-slip) on the recorded OP followed by a lag explains PV
-   better than the lag alone, by innovations, in most stretches between two OP reversals, and its width is a large
-   share of OP's travel. Two questions.
-2. Residual load: PV minus the model's response. If the valve model removes the peak from the load, the valve
-   caused it; if the peak remains, the disturbance is external.
-3. Amplification: the identified process and the controller's settings give |S| at the period. A tuning causes
-   its own period only if the loop amplifies there.
-4. The same process on both sides: the process gain from the data outside the period's band, against the gain
-   identified with it. Under a strong load feedback alone is identified, and the gain falls or changes sign.
-5. Rhythm: a load from a machine has a constant frequency; noise through a resonance does not.
-6. Waveform: third harmonic locked to the phase of the fundamental (a triangle has 1/9, a square 1/3), after the
-   idea of harmonics and bicoherence (Choudhury, Shah, Thornhill 2004); a sine is evidence against the valve, and so
-   are harmonics that the valve's model does not explain.
-7. Size: noise through a resonance keeps neither its size nor its phase (Rice 1945), so a cycle with variable phase
-   and constant size is not caused by tuning.
+1. Valve: backlash (or stick-slip) on the recorded OP followed by a lag explains PV better than the lag alone.
+2. Tuning: the identified process with the control law rings at the observed period, and the cycle is no more regular
+   than noise through such a resonance, which keeps neither its size nor its phase (Rice 1945).
+3. Load: the load has a line that keeps its phase, and the cycle keeps its size.
 
-In a loop that oscillates the signs are combined (cause_weights.py); a loop that does not can only have a valve fault,
-by the first two questions. For a valve fault each slip is tested: does the valve stick at distances that scatter,
-instead of backlash?
+The models are compared under one load, a smooth one (ringing.py). A valve also needs evidence under a free noise
+model, and a width that is a large share of OP's travel. Where no model leads by the penalty of its constants the
+cause is undecided. A loop that does not oscillate can only have a valve fault. For a valve fault each slip is tested:
+does the valve stick at distances that scatter, instead of backlash?
 """
 
 from __future__ import annotations
@@ -30,7 +20,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.config import CauseLimits, Config
-from analyzer.loop.cause_weights import chances, measures, signs_of
 from analyzer.loop.decisions import (
     CAUSES,
     Cause,
@@ -42,11 +31,11 @@ from analyzer.loop.decisions import (
     SignKind,
 )
 from analyzer.loop.fitness import compressed
-from analyzer.loop.identified import sensitivity
 from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
 from analyzer.loop.ringing import Regularity, Ringing
+from analyzer.loop.signs import signs_of
 from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import refined
 from identification.estimation.beside_line import BesideLine, beside_line
@@ -109,12 +98,6 @@ class Verdict:
         return self if self.steady is None or self.cause is not Cause.VALVE else self.steady
 
 
-TEMPER_NAT = 50.0
-"""Gain in log likelihood [nat] by which the doubt in a model's verdict falls to a third; a judgement: the resulting
-probabilities are not calibrated."""
-LEAST_AGREED = 0.25
-"""Probability of a cause from the other signs [-] from which they do not contradict the model that names it; ours: on
-benchmarks/world, seeds 115 to 118, the one wrong cause had .17, the right ones that were undecided .30 and more."""
 NO_CAUSE = Verdict(Cause.NONE, dict.fromkeys(CAUSES, 0.0), Fault.NONE)
 
 
@@ -203,40 +186,41 @@ def jump_evidence(m: Measured, limits: CauseLimits) -> tuple[float, float]:
 
 
 def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> Verdict:
-    """The cause of the cycle.
-
-    If the control law is known, the identified loop shows whether it rings by itself. Else the most likely cause of
-    an oscillation is named if its probability is high enough; the valve needs more, and evidence in PV for its fault,
-    because a valve named as the cause is removed for repair. If a sign is unknown no cause is named.
-    """
+    """The cause of the cycle: that whose model is more likely than the others, and than a smooth load, by the penalty
+    of its constants. If a measure is unknown no cause is named."""
     if oscillation is None:
         return _quiet(m, limits)
-    seen_as = Regularity(oscillation.rhythm.first, m.kurtosis, m.saturated >= limits.held)
-    if m.ringing is not None and m.ringing.is_tight(seen_as, m.evidence, limits):
-        return _rings(m, m.ringing, oscillation, limits)
-    seen = measures(m, oscillation)
-    if not np.isfinite(seen).all():
+    if m.ringing is None or any(math.isnan(x) for x in (m.evidence, m.jump, m.size, m.kurtosis)):
         return replace(not_assessed(None), measured=m)
-    found = chances(seen)
-    told = _by_likelihood(m, found, limits)
-    if told is not None:
-        return _likelier(m, *told, limits, signs_of(m, oscillation, seen))
-    first = max(found, key=lambda c: found[c])
-    confidence = {c: 100.0 * p for c, p in found.items()}
-    if not _may_be(first, m, limits):
-        confidence[first] = min(confidence[first], 0.9 * limits.named_pct)
-    if m.ringing is not None and m.ringing.is_seen(limits):  # and the loop does not ring by itself
-        confidence[Cause.TUNING] = min(confidence[Cause.TUNING], 0.9 * limits.named_pct)
-    cause = first if confidence[first] >= _least(first, m, limits) else Cause.UNDECIDED
-    fault = fault_of(m, limits) if cause is Cause.VALVE else Fault.NONE
-    return Verdict(cause, confidence, fault, signs_of(m, oscillation, seen), measured=m)
+    seen_as = Regularity(oscillation.rhythm.first, m.kurtosis, m.saturated >= limits.held)
+    if m.ringing.is_tight(seen_as, m.evidence, limits):
+        return _rings(m, m.ringing, limits)
+    gains, none = m.ringing.gains(m.evidence, _may_be_cause(m, m.ringing, limits), seen_as, limits)
+    first, second = sorted(gains, key=lambda c: gains[c], reverse=True)[:2]
+    lead = gains[first] - max(gains[second], none)
+    confidence, signs = _chances(gains, limits), signs_of(m, oscillation, limits)
+    if lead < m.ringing.penalty:
+        undecided = Verdict(Cause.UNDECIDED, confidence, Fault.NONE, signs, measured=m)
+        return cap_confidence(undecided, 0.9 * limits.named_pct)
+    why = Sign(first, confidence[first] / 100.0, SignKind.LIKELIER, (str(first), lead))
+    fault = fault_of(m, limits) if first is Cause.VALVE else Fault.NONE
+    return Verdict(first, confidence, fault, (why, *signs), measured=m)
 
 
-def _rings(m: Measured, ringing: Ringing, oscillation: Oscillation, limits: CauseLimits) -> Verdict:
+def _chances(gains: dict[Cause, float], limits: CauseLimits) -> dict[Cause, float]:
+    """Confidence of each cause [%] by the gains of the models [nat]: their odds are tempered, since models of loops
+    are never exact."""
+    odds = {c: math.exp((x - max(gains.values())) / limits.temper) for c, x in gains.items()}
+    least = 0.5 * (100.0 - limits.most_pct)
+    span = (limits.most_pct - least) / sum(odds.values())
+    return {c: least + span * x for c, x in odds.items()}
+
+
+def _rings(m: Measured, ringing: Ringing, limits: CauseLimits) -> Verdict:
     """The verdict on a loop that rings by itself; its process is the one under a smooth load, because a free noise
     model assigns the ringing to the load."""
     clear = min(max(1.0 - ringing.line_nat / ringing.line_needed(limits), 0.0), 1.0)
-    pct = limits.named_pct + (limits.ringing_pct - limits.named_pct) * clear
+    pct = limits.named_pct + (limits.most_pct - limits.named_pct) * clear
     rest = 0.5 * (100.0 - pct)
     confidence = {Cause.VALVE: rest, Cause.TUNING: pct, Cause.LOAD: rest}
     signs = (
@@ -247,44 +231,14 @@ def _rings(m: Measured, ringing: Ringing, oscillation: Oscillation, limits: Caus
     return Verdict(Cause.TUNING, confidence, Fault.NONE, signs, measured=told)
 
 
-def _may_be(cause: Cause, m: Measured, limits: CauseLimits) -> bool:
-    """Whether a cause may be named: any but a valve without evidence in PV, or with a fault too small for OP."""
-    return cause is not Cause.VALVE or (m.size >= limits.least_size and speaks(m, limits, True))
-
-
-def _by_likelihood(m: Measured, found: dict[Cause, float], limits: CauseLimits) -> tuple[Cause, float] | None:
-    """The cause whose model is more likely than the others, and by how much [nat]; None if there is none, the other
-    signs contradict it, or it is a valve with so narrow a fault that a neighbour's oscillation explains it too."""
-    told = None if m.ringing is None else m.ringing.likelier(m.evidence, limits)
-    if told is None or found[told[0]] < LEAST_AGREED or not _may_be(told[0], m, limits):
-        return None
-    return None if told[0] is Cause.VALVE and m.size < limits.small_size else told
-
-
-def _likelier(
-    m: Measured, cause: Cause, nat: float, limits: CauseLimits, others: tuple[Sign, ...]
-) -> Verdict:
-    """The verdict on a cycle that one of valve and load explains better than the other, by `nat` [nat]: their odds,
-    tempered, since models of loops are never exact. others, the other signs."""
-    pct = limits.ringing_pct - (limits.ringing_pct - limits.load_pct) * math.exp(-nat / TEMPER_NAT)
-    confidence = {**dict.fromkeys(CAUSES, 0.5 * (100.0 - pct)), cause: pct}
-    signs = (Sign(cause, pct / 100.0, SignKind.LIKELIER, (str(cause), nat)), *others)
-    fault = fault_of(m, limits) if cause is Cause.VALVE else Fault.NONE
-    return Verdict(cause, confidence, fault, signs, measured=m)
-
-
-def _least(cause: Cause, m: Measured, limits: CauseLimits) -> float:
-    """Confidence [%] from which a cause is named.
-
-    A stickband small relative to OP's range makes no square wave of PV, and a cycle of constant size may be external.
-    """
-    if cause is not Cause.VALVE:
-        return limits.named_pct
-    if m.size >= limits.small_size:
-        return limits.valve_pct
-    if m.harmonic > limits.square:
-        return math.inf
-    return limits.small_pct if m.kurtosis < limits.changing else limits.changing_pct
+def _may_be_cause(m: Measured, ringing: Ringing, limits: CauseLimits) -> bool:
+    """Whether a valve fault may be the cause of a cycle: PV shows it, and it is not too small for OP's travel. Beside
+    a periodic load, whose harmonics it explains too, nearly every half-cycle must show a narrow one."""
+    if m.size < limits.least_size or m.evidence < ringing.penalty or not speaks(m, limits, True):
+        return False
+    periodic = ringing.keeps_phase(limits) and ringing.line_nat >= ringing.penalty
+    each = m.trials is not None and m.trials.agreeing >= limits.agreeing
+    return m.size >= limits.small_size or not periodic or each
 
 
 def _quiet(m: Measured, limits: CauseLimits) -> Verdict:
@@ -348,60 +302,32 @@ def with_dead_valve(verdict: Verdict, sign: Sign) -> Verdict:
 def resolve_ambiguity(
     verdict: Verdict, prepared: Prepared, oscillation: Oscillation | None, config: Config
 ) -> Verdict:
-    """The verdict, or none if compressed trends make a likely valve uncertain, if the loop with a tuning cause is
-    robust, and if a load is not likely enough, or the recording too coarse to show another cause: a load is the cause
-    that remains then."""
-    if oscillation is None or verdict.cause not in CAUSES:
+    """The verdict on an oscillation: none if compressed trends make a likely valve uncertain, and with the missing
+    data if it is undecided."""
+    if oscillation is None or verdict.measured is None:
         return verdict
-    lacking = _hides(verdict, prepared, oscillation, config)
+    if verdict.cause is Cause.UNDECIDED:
+        return replace(verdict, needs=_to_decide(prepared, oscillation, config.cause))
+    if verdict.cause is not Cause.VALVE or verdict.confidence[Cause.VALVE] >= config.cause.compressed_pct:
+        return verdict
+    lacking = compressed(prepared, None, config.quality)
     if lacking is None:
         return verdict
-    fault = Fault.UNDECIDED if verdict.cause is Cause.VALVE else verdict.fault
     hint = cap_confidence(verdict, 0.9 * config.cause.named_pct)
-    return replace(hint, cause=Cause.UNDECIDED, fault=fault, needs=lacking)
+    return replace(hint, cause=Cause.UNDECIDED, fault=Fault.UNDECIDED, needs=lacking)
 
 
-def _hides(
-    verdict: Verdict, prepared: Prepared, oscillation: Oscillation, config: Config
-) -> Requirement | None:
-    """Missing data to distinguish the named cause from others; None if there are none."""
-    limits, pct = config.cause, verdict.confidence[verdict.cause]
-    if verdict.cause is Cause.TUNING:
-        return _robust(verdict, oscillation, config)
-    if verdict.cause is Cause.VALVE:
-        return None if pct >= limits.compressed_pct else compressed(prepared, None, config.quality)
-    if any(s.kind is SignKind.LIKELIER for s in verdict.signs):  # by its model, not by what is missing
-        return None
-    unlikely = (
-        None
-        if pct >= limits.load_pct
-        else Requirement(MissingData.MANUAL_TEST, RequirementKind.LOAD_IN_MANUAL, (pct,))
-    )
-    return _too_coarse_for_a_load(prepared, oscillation, limits) or unlikely
-
-
-def _too_coarse_for_a_load(
-    prepared: Prepared, oscillation: Oscillation, limits: CauseLimits
-) -> Requirement | None:
-    """Requirement of a recording in which every cause looks like a load: a cycle of few samples, or of few steps of
-    PV's grid, no longer shows a valve's effect; None if it is sufficient."""
+def _to_decide(prepared: Prepared, oscillation: Oscillation, limits: CauseLimits) -> Requirement:
+    """Missing data of an oscillation whose cause is undecided: finer values or faster samples if a valve's effect is
+    not visible in these, else some periods in manual."""
     steps = oscillation.amplitude_pct / max(prepared.pv_step, 1e-12)
     if steps < limits.steps_told:
-        return Requirement(
-            MissingData.FINER, RequirementKind.FINER, (prepared.pv_step, oscillation.amplitude_pct)
-        )
+        figures = prepared.pv_step, oscillation.amplitude_pct
+        return Requirement(MissingData.FINER, RequirementKind.FINER, figures)
     samples = oscillation.period_s / prepared.record.dt_s
     if samples < limits.samples_told:
-        return Requirement(MissingData.FASTER, RequirementKind.OF_A_LOAD, (limits.samples_told, samples))
-    return None
-
-
-def _robust(verdict: Verdict, oscillation: Oscillation, config: Config) -> Requirement | None:
-    """A test in manual, if signs indicate the tuning and the identified loop is robust; None if it is not."""
-    ms = None if verdict.measured is None else sensitivity(verdict.measured, oscillation.period_s)
-    if ms is None or ms > config.tuning.ms_most:
-        return None
-    return Requirement(MissingData.MANUAL_TEST, RequirementKind.TUNING_IN_MANUAL, (ms,))
+        return Requirement(MissingData.FASTER, RequirementKind.OF_A_CAUSE, (limits.samples_told, samples))
+    return Requirement(MissingData.MANUAL_TEST, RequirementKind.CAUSE_IN_MANUAL)
 
 
 def with_worn_valve(verdict: Verdict, period_s: float, limits: CauseLimits) -> Verdict:

@@ -24,22 +24,16 @@ CAUSES = (Cause.VALVE, Cause.TUNING, Cause.LOAD)
 
 
 class SignKind(StrEnum):
-    """Kinds of signs of a cause; those of a loop that oscillates have the name of their first measure."""
+    """Kinds of signs of a cause."""
 
     EVIDENCE = "evidence"
     WIDTH = "size"
-    LOAD_LEFT = "line_linear"
     AMPLIFICATION = "amplification"
-    LOOP_GAIN = "loop_gain"
-    PROCESS = "consistency"
-    HARMONIC = "harmonic"
-    WAVE_LEFT = "wave_left"
     REGULARITY = "kurtosis"
     RINGING = "ringing"
     SMOOTH_LOAD = "smooth load"
+    PERIODIC_LOAD = "periodic load"
     LIKELIER = "likelier model"
-    LIMITS = "saturated"
-    DEAD_TIME = "dead_time_share"
     CALM_EVIDENCE = "evidence of a calm loop"
     CALM_WIDTH = "size in a calm loop"
     AGAIN = "stretch after stretch of a calm loop"
@@ -49,9 +43,6 @@ class SignKind(StrEnum):
     OF_ABOVE = "loop above cycles"
 
 
-OF_LOAD = (SignKind.LOAD_LEFT, SignKind.PROCESS, SignKind.WAVE_LEFT, SignKind.REGULARITY)
-"""Signs of a load itself: a peak in the model's residual, another process away from the period, harmonics that no
-faulty valve makes, constant size and rhythm; missing signs of a valve or a limit do not count."""
 COUNTS_PCT = 20.0
 """Share of the time from which a loop counts as oscillating [%]; contract of the ranking."""
 
@@ -149,13 +140,12 @@ class RequirementKind(StrEnum):
     MODEL = auto()
     OF_A_CYCLE = auto()
     UNFOLDED = auto()
-    OF_A_LOAD = auto()
+    OF_A_CAUSE = auto()
     OF_SETTINGS = auto()
     FINER = auto()
     HOURS = auto()
     STEP_TEST = auto()
-    LOAD_IN_MANUAL = auto()
-    TUNING_IN_MANUAL = auto()
+    CAUSE_IN_MANUAL = auto()
     AS_TOLD = auto()
 
 

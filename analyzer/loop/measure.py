@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.config import CauseLimits
-from analyzer.limits import LOOP
 from analyzer.loop.assessments import at_limits_share
 from analyzer.loop.candidates import Question, check_judged, fits_of, hopeful, refined
 from analyzer.loop.fit_window import due_to_answer, scans_of, window_of
@@ -22,25 +21,15 @@ from identification.estimation.evidence import (
     trials,
     trials_between_moves,
 )
-from identification.estimation.gauss_newton import residual
-from identification.estimation.search import prepare, score
 from identification.estimation.window import Fit, Window
 from identification.models import Fopdt, Loop, Pid
-from identification.record import Floats, LoopRecord, Mask
+from identification.record import LoopRecord, Mask
 from identification.signals.spectrum import (
     Spectrum,
-    locked_harmonic,
-    peak_prominence,
     size_kurtosis,
-    spectrum,
-    tapered_power,
 )
-from identification.simulation.valve import IDEAL
 from tuning.frequency_response import is_stable, loop_response
 from tuning.ringing import ObservedRinging, observed_ringing
-
-HARMONICS = (2, 3)
-"""Harmonics of a cycle that a valve's model must explain: beyond the third too few samples a cycle remain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,18 +37,15 @@ class Measured:
     """The measures for the signs.
 
     linear, play, stick_slip : the fits; evidence [nat] of the better valve over none; size, its stickband over OP's
-    range [-]; jump [nat], stick-slip over backlash; line_linear and line_valve, prominence at the period of the
-    residual load of the model without a valve fault and of the valve model [-]; amplification |S| there [-], None
-    without settings; stable, the identified loop; consistency [-], gain outside the period's band over gain with it;
-    harmonic [-], locked third over the fundamental; saturated, share of time at limits [-]; controller, stated or
-    recovered; moves, number of moves of
-    the better valve's stem; excited, whether set point moves drove the loop; trials, agreement of the stretches
-    between OP reversals on the better valve, None with too few; kurtosis [-] of the band at the period, 3 for noise,
-    1.5 for a constant size; wave_left [-], harmonics of PV's cycle in the residual of the better valve, over its
-    fundamental; steady [-], of a calm loop, agreement of the stretches between moves of the stem on the better valve:
-    their mean gain over its standard error, and asked, its gain while a response of PV to set point moves is expected
-    [nat]; ringing, whether the loop itself makes the cycle, None without settings; observed, the ringing seen
-    in the error, None without a cycle; scale_s, the period or another time scale of the loop [s].
+    range [-]; jump [nat], stick-slip over backlash; amplification |S| at the period [-], None without settings;
+    stable, the identified loop; saturated, share of time at limits [-]; controller, stated or recovered; moves,
+    number of moves of the better valve's stem; excited, whether set point moves drove the loop; trials, agreement of
+    the stretches between OP reversals on the better valve, None with too few; kurtosis [-] of the band at the period,
+    3 for noise, 1.5 for a constant size; steady [-], of a calm loop, agreement of the stretches between moves of the
+    stem on the better valve: their mean gain over its standard error, and asked, its gain while a response of PV to
+    set point moves is expected [nat]; ringing, the models of a cycle under a smooth load, None without a cycle;
+    observed, the ringing seen in the error, None without a cycle; scale_s, the period or another time scale of the
+    loop [s].
     """
 
     linear: Fit
@@ -74,13 +60,8 @@ class Measured:
     controller: Pid | None
     moves: int
     excited: bool
-    line_linear: float = 0.0
-    line_valve: float = 0.0
-    consistency: float = 1.0
-    harmonic: float = 0.0
     trials: Trials | None = None
     kurtosis: float = 3.0
-    wave_left: float = 0.0
     steady: float = 0.0
     asked: float = 0.0
     ringing: Ringing | None = None
@@ -91,27 +72,6 @@ class Measured:
     def window(self) -> Window:
         """The data of all the fits."""
         return self.linear.window
-
-
-def _prominence(x: Floats, dt_s: float, period_s: float) -> float:
-    s = spectrum(x, dt_s)
-    return peak_prominence(tapered_power(s), s.duration_s / period_s)
-
-
-def _harmonics_left(fit: Fit, period_s: float) -> float:
-    """Second and third harmonic locked to PV's cycle in the residual of a fit, over PV's fundamental."""
-    window = fit.window
-    if window.duration_s < LOOP.harmonic_cycles * period_s:
-        return 0.0
-    left, cycle = spectrum(residual(fit), window.dt_s), spectrum(window.centred, window.dt_s)
-    return math.hypot(*(locked_harmonic(left, period_s, order, cycle) for order in HARMONICS))
-
-
-def _consistency(fit: Fit, period_s: float) -> float:
-    """Gain of the identified process outside the period's band over its gain with it."""
-    prepared = prepare(fit.window, IDEAL, fit.ar, period_s / fit.window.dt_s)
-    gain = float(score(prepared, fit.time_constant_s, fit.dead_time_s)[2][0])
-    return gain / fit.gain if fit.gain else 0.0
 
 
 def measure(
@@ -172,25 +132,16 @@ def _without_a_cycle(m: Measured, best: Fit, linear: Fit, due: Mask | None) -> M
 
 
 def _of_a_cycle(m: Measured, best: Fit, linear: Fit, law: Pid | None, error: Spectrum | None) -> Measured:
-    """Further measures of a cycle of this period: in the residual load of the fits, in the waveform of the error and,
-    if the control law is known, in the margins of the loop."""
-    dt_s, scale = linear.window.dt_s, m.scale_s
-    found = replace(
-        m,
-        ringing=ringing_of(linear, (best,) if m.evidence > 0.0 else (), law, scale),
-        line_linear=_prominence(residual(linear), dt_s, scale),
-        line_valve=_prominence(residual(best), dt_s, scale),
-        consistency=_consistency(linear, scale),
-    )
+    """Further measures of a cycle of this period: its models under a smooth load, and its regularity in the error."""
+    scale = m.scale_s
+    found = replace(m, ringing=ringing_of(linear, (best,) if m.evidence > 0.0 else (), law, scale))
     if error is None:
         return found
     return replace(
         found,
         observed=observed_ringing(scale, error),
-        harmonic=locked_harmonic(error, scale),
         trials=trials(best, linear, scale),
         kurtosis=size_kurtosis(error, error.duration_s / scale),
-        wave_left=_harmonics_left(best, scale),
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from analyzer.config import CauseLimits
 from analyzer.loop.decisions import Cause
-from identification.estimation.smooth_load import SmoothFit, fit_line, fit_smooth, resonant_starts
+from identification.estimation.smooth_load import Dynamics, SmoothFit, fit_line, fit_smooth, resonant_starts
 from identification.estimation.window import Fit, Window
 from identification.models import Loop, Pid, Process
 from tuning.frequency_response import controller_response, maximum_sensitivity, resonance_s
@@ -37,7 +37,7 @@ class Ringing:
     smooth, the process under a smooth load; lined, under one with a line; ms, maximum sensitivity of the loop under
     the smooth load [-], inf if it is unstable, and period_s, at which it rings [s]; cycle_s, the observed period [s];
     line_nat and valve_nat, gain in log likelihood of a line in the load, and of a valve's fault, over the smooth load
-    [nat]; dt_s, interval of the rows [s].
+    [nat].
     """
 
     smooth: SmoothFit
@@ -47,7 +47,6 @@ class Ringing:
     cycle_s: float
     line_nat: float
     valve_nat: float
-    dt_s: float
 
     def is_tight(self, m: Regularity, evidence: float, limits: CauseLimits) -> bool:
         """Whether the loop itself makes the cycle: it rings at the observed period, the cycle is no more regular than
@@ -61,18 +60,26 @@ class Ringing:
             return self.rings(limits) and not faulty
         return self.rings(limits) and not (faulty or self.has_line(limits)) and self.is_as_regular(m, limits)
 
-    def likelier(self, evidence: float, limits: CauseLimits) -> tuple[Cause, float] | None:
-        """Whether a faulty valve or a line of the load explains the cycle, and its gain over the other and over
-        neither [nat]; None if neither leads by the penalty of its constants.
+    def gains(
+        self, evidence: float, is_worn: bool, m: Regularity, limits: CauseLimits
+    ) -> tuple[dict[Cause, float], float]:
+        """Gain in log likelihood of each cause's model over a smooth load, and the gain of no cause [nat].
 
-        evidence, for a faulty valve under a free noise model [nat]; the lower of both counts.
+        evidence, for a valve fault under a free noise model [nat], and is_worn, whether that fault may be the cause.
+        A cause that cannot make such a cycle is below the smooth load by the penalty, and so is the smooth load where
+        its loop rings and the cycle is more regular than ringing. A line that explains less than a valve fault does
+        is no cause.
         """
-        valve, need = min(evidence, self.valve_nat), self.line_needed(limits)
-        if valve - max(self.line_nat, 0.0) >= need:
-            return Cause.VALVE, valve - max(self.line_nat, 0.0)
-        if self.has_line(limits) and self.line_nat - max(valve, 0.0) >= need:
-            return Cause.LOAD, self.line_nat - max(valve, 0.0)
-        return None
+        none = -self.penalty
+        rings, regular = self.rings(limits), self.is_as_regular(m, limits)
+        doubted = self.line_nat < evidence and evidence >= self.penalty
+        periodic = self.keeps_phase(limits) and m.kurtosis < limits.kept_size and not doubted
+        gains = {
+            Cause.VALVE: max(self.valve_nat, none) if is_worn else none,
+            Cause.TUNING: 0.0 if rings and regular else none,
+            Cause.LOAD: max(self.line_nat, 0.0) if periodic else none,
+        }
+        return gains, none if rings and not regular else 0.0
 
     def is_as_regular(self, m: Regularity, limits: CauseLimits) -> bool:
         """Whether the loop makes a cycle as regular as the observed one: any if OP reaches its limit in each cycle.
@@ -83,19 +90,22 @@ class Ringing:
         implied = math.pi / -math.log(min(max(m.correlation, 1e-3), 1.0 - 1e-9))
         return m.kurtosis >= limits.kept_size and implied <= limits.ringing_decay * self.ms
 
-    def is_seen(self, limits: CauseLimits) -> bool:
-        """Whether the rows are close enough to show the ringing of the identified loop."""
-        return self.period_s >= limits.ringing_samples * self.dt_s
+    def keeps_phase(self, limits: CauseLimits) -> bool:
+        """Whether the line of the load has a constant phase."""
+        return self.lined.line is not None and self.lined.line.kept >= limits.line_kept
 
     def has_line(self, limits: CauseLimits) -> bool:
         """Whether the load has a line of constant phase."""
-        line = self.lined.line
-        kept = line is not None and line.kept >= limits.line_kept
-        return kept and self.line_nat >= self.line_needed(limits)
+        return self.keeps_phase(limits) and self.line_nat >= self.line_needed(limits)
+
+    @property
+    def penalty(self) -> float:
+        """Penalty for three constants by Schwarz's criterion (1978) [nat]."""
+        return 1.5 * math.log(self.smooth.count)
 
     def line_needed(self, limits: CauseLimits) -> float:
-        """Required gain of a line [nat]: for three constants by Schwarz's criterion (1978), and a floor."""
-        return limits.line_floor + 1.5 * math.log(self.smooth.count)
+        """Gain from which a line speaks against a ringing loop [nat]: the penalty, and a floor."""
+        return limits.line_floor + self.penalty
 
     def rings(self, limits: CauseLimits) -> bool:
         """Whether the loop has little damping at the observed period."""
@@ -122,41 +132,41 @@ def calm_resonance(linear: Fit, controller: Pid | None, scale_s: float) -> tuple
     window, dead_s = linear.window, max(linear.dead_time_s, 0.0)
     begins = [(linear.time_constant_s, dead_s), *((f * scale_s, 0.05 * scale_s) for f in (0.05, 0.5, 3.0))]
     smooth = fit_smooth(window, scale_s, [(b, None) for b in begins])
-    if controller.kp * smooth.process.gain <= 0.0:
-        return 1.0, scale_s
-    loop = Loop(between_samples(smooth.process, window, controller), controller)
-    return maximum_sensitivity(loop), resonance_s(loop)
+    return _peak(smooth, window, controller, scale_s)
 
 
-def ringing_of(
-    linear: Fit, valves: tuple[Fit, ...], controller: Pid | None, period_s: float
-) -> Ringing | None:
-    """Fits under a smooth load of a loop that cycles at a period [s]; None if no settings are known, or the loop does
-    not act on PV.
+def ringing_of(linear: Fit, valves: tuple[Fit, ...], controller: Pid | None, period_s: float) -> Ringing:
+    """Fits under a smooth load of a loop that cycles at a period [s]; without settings it is not known to ring.
 
     linear, the night's fit with an ideal valve; valves, those with faulty ones that explain PV better.
     """
     window = linear.window
-    if controller is None or controller.kp == 0.0 or not math.isfinite(period_s):
-        return None
-    law = complex(controller_response(controller, np.array([2.0 * math.pi / period_s]))[0])
+    law = None if controller is None or controller.kp == 0.0 else controller
     begins = [(x.time_constant_s, max(x.dead_time_s, 0.0)) for x in (linear, *valves)]
     begins += [(share * period_s, 0.05 * period_s) for share in (0.3, 2.0)]
     plain = [(begin, None) for begin in begins]
-    smooth = fit_smooth(window, period_s, [*resonant_starts(window, period_s, law), *plain])
+    smooth = fit_smooth(window, period_s, [*_resonant(window, period_s, law), *plain])
     away = fit_smooth(window, period_s, plain)
     lined = fit_line(window, period_s, (smooth, away), begins)
     faulty = [fit_smooth(window, period_s, plain, x.valve, smooth) for x in valves]
     best = max((f.log_likelihood for f in faulty), default=-math.inf)
-    loop = Loop(between_samples(smooth.process, window, controller), controller)
-    right_way = controller.kp * smooth.process.gain > 0.0
-    return Ringing(
-        smooth,
-        lined,
-        maximum_sensitivity(loop) if right_way else 1.0,
-        resonance_s(loop),
-        period_s,
-        lined.log_likelihood - smooth.log_likelihood,
-        best - smooth.log_likelihood,
-        window.row_s,
-    )
+    ms, rings_s = _peak(smooth, window, law, period_s)
+    line_nat, valve_nat = (x - smooth.log_likelihood for x in (lined.log_likelihood, best))
+    return Ringing(smooth, lined, ms, rings_s, period_s, line_nat, valve_nat)
+
+
+def _resonant(window: Window, period_s: float, law: Pid | None) -> list[tuple[Dynamics, float]]:
+    """Starts at which a loop under a known law rings at the period."""
+    if law is None:
+        return []
+    omega = np.array([2.0 * math.pi / period_s])
+    return resonant_starts(window, period_s, complex(controller_response(law, omega)[0]))
+
+
+def _peak(smooth: SmoothFit, window: Window, law: Pid | None, scale_s: float) -> tuple[float, float]:
+    """Maximum sensitivity [-] of the loop of a fit, and the period [s] of its peak; 1 without a law, or if it acts
+    the wrong way."""
+    if law is None or law.kp * smooth.process.gain <= 0.0:
+        return 1.0, scale_s
+    loop = Loop(between_samples(smooth.process, window, law), law)
+    return maximum_sensitivity(loop), resonance_s(loop)

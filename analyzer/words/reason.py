@@ -14,7 +14,6 @@ from typing import Any
 from analyzer.lanes.lanes import SAID
 from analyzer.limits import PAGES
 from analyzer.loop.decisions import (
-    OF_LOAD,
     Action,
     Cause,
     Due,
@@ -97,9 +96,9 @@ def _cause(found: Finding) -> str:
     if found.cause is Cause.TUNING:
         return f"{cycle}: tuned too tight; {_strongest(found, 1, SignKind.RINGING, SignKind.AMPLIFICATION)}"
     if found.cause is Cause.LOAD:
-        return f"{cycle}: external disturbance; {_strongest(found, 1, *OF_LOAD)}"
+        return f"{cycle}: external disturbance; {_strongest(found, 1, SignKind.PERIODIC_LOAD, SignKind.REGULARITY)}"
     if found.cause is Cause.UNDECIDED:
-        return f"{cycle}; cause undecided: {found.lacking or 'the signs do not agree'}"
+        return f"{cycle}; cause undecided: {found.lacking or 'no cause explains the cycle better than the others'}"
     return cycle
 
 
@@ -169,7 +168,7 @@ def sign_in_full(sign: Sign) -> str:
 
 
 def as_stored(sign: Sign) -> dict[str, Any]:
-    """A sign as stored; it has no name if none of the weighted measures supports it."""
+    """A sign as stored; only those of a cycle have a name."""
     text, figures = sign_parts(sign)
     name = "" if sign.kind in UNNAMED else sign.kind
     told = {"points_to": sign.points_to, "strength": sign.strength}
@@ -194,9 +193,9 @@ def _amplification(*known: float | None) -> Chosen:
     return ("amplifies", s) if s > 1.0 else ("weakens", 1.0 / max(s, 1e-3))
 
 
-def _regularity(kurtosis: float, third: float) -> Chosen:
-    size, rhythm = kurtosis < 2.0, third >= 0.5
-    if size == rhythm:
+def _regularity(kurtosis: float, third: float, size: float) -> Chosen:
+    rhythm = third >= 0.5
+    if bool(size) == rhythm:
         how = f"{'keeps' if size else 'changes'} its size and its rhythm"
     else:
         how = "keeps its size and changes its rhythm" if size else "keeps its rhythm and changes its size"
@@ -216,23 +215,15 @@ def _of_below(loop: str, cause: str | None, tie: str) -> Chosen:
 
 SAYS: Mapping[SignKind, Callable[..., Chosen]] = {
     SignKind.EVIDENCE: _evidence,
-    SignKind.WIDTH: lambda nat, size: ("no_width" if nat <= 0 else "width", 100 * size),
-    SignKind.LOAD_LEFT: lambda plain, valve: ("load_left" if plain >= 1.0 else "no_load_left", plain, valve),
+    SignKind.WIDTH: lambda size: ("width", 100 * size),
     SignKind.AMPLIFICATION: _amplification,
-    SignKind.LOOP_GAIN: lambda gain=None: ("no_loop_gain" if gain is None else "loop_gain", gain),
-    SignKind.PROCESS: lambda share: ("same_process" if share >= 0.5 else "another_process", share),
-    SignKind.HARMONIC: lambda third: ("harmonic", 100 * third),
-    SignKind.WAVE_LEFT: lambda left: ("wave_left" if left else "no_wave_left", 100 * left),
     SignKind.REGULARITY: _regularity,
     SignKind.RINGING: lambda ms, period_s: (
         ("ringing_unstable",) if math.isinf(ms) else ("ringing", duration(period_s), ms)
     ),
     SignKind.SMOOTH_LOAD: lambda nat: ("smooth_load", nat),
+    SignKind.PERIODIC_LOAD: lambda nat, kept: ("periodic_load", nat, kept),
     SignKind.LIKELIER: lambda cause, nat: (f"likelier_{cause}", nat),
-    SignKind.LIMITS: lambda share: ("at_limits" if 100 * share >= 1 else "off_limits", 100 * share),
-    SignKind.DEAD_TIME: lambda period_s, dead_s: (
-        ("long_period",) if period_s > 50 * dead_s else ("dead_times", period_s / dead_s)
-    ),
     SignKind.CALM_EVIDENCE: _evidence,
     SignKind.CALM_WIDTH: lambda size: ("calm_width", 100 * size),
     SignKind.AGAIN: lambda: ("again",),

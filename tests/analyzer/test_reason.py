@@ -22,7 +22,7 @@ from analyzer.words.reason import in_short, reason
 )
 def test_a_loop_that_cycles_for_a_part_of_the_night_is_not_said_to_be_calm(share: float, said: str) -> None:
     """A cycle of too little time to count is told with its share; only a loop without one does not oscillate."""
-    signs = (Sign(Cause.LOAD, 1.0, SignKind.REGULARITY, (1.5, 0.2)),)
+    signs = (Sign(Cause.LOAD, 1.0, SignKind.REGULARITY, (1.5, 0.2, 1.0)),)
     swing = Swing(1.0, share, 1086.0 if share else None, 1.0)
     cause = Cause.LOAD if share >= 20 else Cause.NONE
     assert reason(Finding("L", "2026-03-02", Status.OK, swing=swing, cause=cause, signs=signs)) == said

@@ -1,0 +1,64 @@
+"""The signs of the cause of a cycle, beside the likelihoods of its models."""
+
+from __future__ import annotations
+
+import math
+
+from analyzer.config import CauseLimits
+from analyzer.limits import LOOP
+from analyzer.loop.decisions import Cause, Sign, SignKind
+from analyzer.loop.measure import Measured
+from analyzer.loop.oscillation import Oscillation
+
+SINE, NOISE = 1.5, 3.0
+"""Kurtosis of a sine and of noise [-]."""
+WEAK = 0.05
+"""Strength of a sign that hardly counts [-]."""
+
+
+def signs_of(m: Measured, o: Oscillation, limits: CauseLimits) -> tuple[Sign, ...]:
+    """Evidence and width of a valve fault, a periodic load, the cycle's regularity, and the loop's amplification."""
+    return (*_of_valve(m, limits), *_of_load(m, limits), _of_size(m, o, limits), *_of_loop(m))
+
+
+def _sure(nat: float, limits: CauseLimits) -> float:
+    """Strength of a gain in log likelihood [-]: one minus the factor on the odds against its cause."""
+    return max(1.0 - math.exp(-max(nat, 0.0) / limits.temper), WEAK)
+
+
+def _of_valve(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
+    """How much better a faulty valve explains PV, and the fault's width."""
+    agreeing = () if m.trials is None else (m.trials.agreeing, m.trials.count)
+    if m.evidence <= 0.0:
+        return (Sign(Cause.LOAD, WEAK, SignKind.EVIDENCE, (m.evidence,)),)
+    wide = m.size >= limits.least_size
+    return (
+        Sign(Cause.VALVE, _sure(m.evidence, limits), SignKind.EVIDENCE, (m.evidence, *agreeing)),
+        Sign(Cause.VALVE if wide else Cause.LOAD, min(max(m.size, WEAK), 1.0), SignKind.WIDTH, (m.size,)),
+    )
+
+
+def _of_load(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
+    """A periodic load that keeps its phase."""
+    line = None if m.ringing is None else m.ringing.lined.line
+    nat = 0.0 if m.ringing is None else m.ringing.line_nat
+    if m.ringing is None or line is None or line.kept < limits.line_kept or nat < m.ringing.penalty:
+        return ()
+    return (Sign(Cause.LOAD, _sure(nat, limits), SignKind.PERIODIC_LOAD, (nat, line.kept)),)
+
+
+def _of_size(m: Measured, o: Oscillation, limits: CauseLimits) -> Sign:
+    """Whether the cycle keeps its size, as a machine's does, or changes it, as noise through a resonance does."""
+    keeps = m.kurtosis < limits.kept_size
+    end = SINE if keeps else NOISE
+    strength = (m.kurtosis - limits.kept_size) / (end - limits.kept_size)
+    cause = Cause.LOAD if keeps else Cause.TUNING
+    figures = m.kurtosis, o.rhythm.third, float(keeps)
+    return Sign(cause, min(max(strength, WEAK), 1.0), SignKind.REGULARITY, figures)
+
+
+def _of_loop(m: Measured) -> tuple[Sign, ...]:
+    """Whether the loop amplifies a load at the period."""
+    if m.stable and (m.amplification or 0.0) < LOOP.amplifies:
+        return ()
+    return (Sign(Cause.TUNING, WEAK, SignKind.AMPLIFICATION, (m.amplification,) if m.stable else ()),)
