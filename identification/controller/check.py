@@ -185,7 +185,7 @@ def judge(x: Trends, said: StatedSettings) -> tuple[Finding | None, ControlLaw |
     if thinned and said.ti < limits.thinned_ti:
         return None, None
     found = recovered_law(x, said.ti, said.kp, late=not thinned)
-    e = x.sp - first_order(x.pv, found.smoothed)
+    e = x.sp - first_order(x.pv, found.smoothed) + found.offset
     wrong = None if obeys(x, said, found) else settings(found, said, limits)
     if thinned:
         return wrong, found

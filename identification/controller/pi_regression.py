@@ -20,8 +20,9 @@ from identification.simulation.lag import first_order
 @dataclass(frozen=True, slots=True)
 class ControlLaw:
     """An identified PI law: kp [% OP/% PV], ki [% OP/(% PV sample)], the PV's lateness in samples, the residual of OP
-    (scatter, in % OP, and per sample, shape (n,), less each span's constant), the share that the law explains, and
-    the time constant of the filter of PV before the controller [samples]."""
+    (scatter, in % OP, and per sample, shape (n,), less each span's constant), the share that the law explains, the
+    time constant of the filter of PV before the controller [samples], and the constant by which the error that the
+    controller acts on exceeds the recorded one [% PV]: digits of SP and PV hide it, and the integral sums it up."""
 
     kp: float
     ki: float
@@ -31,10 +32,11 @@ class ControlLaw:
     length: int
     residual: Floats = field(repr=False)
     smoothed: float = 0.0
+    offset: float = 0.0
 
     def error(self, sp: Floats, pv: Floats) -> Floats:
         """The error that the controller acts on, shape (n,)."""
-        return sp - first_order(shifted(pv, self.late), self.smoothed)
+        return sp - first_order(shifted(pv, self.late), self.smoothed) + self.offset
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,15 +66,16 @@ def centred(x: Floats, length: int) -> Floats:
     return (cut - cut.mean(axis=1, keepdims=True)).ravel()
 
 
-def regress(e: Floats, op: Floats, length: int, keep: Mask) -> tuple[float, float, Floats]:
-    """kp, ki and residual of OP on e and its sum, each span with a constant of its own."""
-    rows = np.stack([centred(e, length), centred(np.cumsum(e), length), centred(op, length)])
+def regress(e: Floats, op: Floats, length: int, keep: Mask) -> tuple[float, float, float, Floats]:
+    """kp, ki, offset of the error and residual of OP, regressed on e, its sum and time, each span with a constant of
+    its own."""
+    rows = np.stack([centred(x, length) for x in (e, np.cumsum(e), np.arange(e.size, dtype=float), op)])
     use = keep[: rows.shape[1]]
     gram = (rows * use) @ rows.T
-    scale = np.sqrt(np.diag(gram)[:2]) + 1e-300
-    both = gram[:2, :2] / np.outer(scale, scale)
-    kp, ki = (float(x) for x in np.linalg.lstsq(both, gram[:2, 2] / scale, rcond=None)[0] / scale)
-    return kp, ki, rows[2] - kp * rows[0] - ki * rows[1]
+    scale = np.sqrt(np.diag(gram)[:3]) + 1e-300
+    both = gram[:3, :3] / np.outer(scale, scale)
+    kp, ki, ramp = (float(x) for x in np.linalg.lstsq(both, gram[:3, 3] / scale, rcond=None)[0] / scale)
+    return kp, ki, ramp / ki if ki else 0.0, rows[3] - kp * rows[0] - ki * rows[1] - ramp * rows[2]
 
 
 def trusted(residual: Floats, length: int, limits: ControllerLimits) -> Mask:
@@ -92,13 +95,21 @@ def law(x: Trends, length: int, late: float, smoothed: float = 0.0) -> ControlLa
     whole = np.repeat(x.usable[:n].reshape(-1, length).all(axis=1), length)
     keep = fit = whole if whole.sum() >= x.limits.spans * length else x.usable[:n]
     for _ in range(3):
-        kp, ki, residual = regress(e[:n], x.op[:n], length, keep)
+        kp, ki, offset, residual = regress(e[:n], x.op[:n], length, keep)
         keep = fit & trusted(residual, length, x.limits)
     moved = centred(x.op[:n], length)
     left = float((residual[keep] ** 2).mean()) if keep.any() else math.inf
     power = float((moved[keep] ** 2).mean()) if keep.any() else 1.0
     return ControlLaw(
-        kp, ki, late, math.sqrt(left), 1.0 - left / max(power, 1e-12), length, residual, smoothed
+        kp,
+        ki,
+        late,
+        math.sqrt(left),
+        1.0 - left / max(power, 1e-12),
+        length,
+        residual,
+        smoothed,
+        offset,
     )
 
 

@@ -154,11 +154,23 @@ def carried_over(found: Explanation) -> Explanation:
         unjudged = is_one_move(found.p) or proof.is_blind
         unproven = not proof.carries and proof.falls and unjudged
         timed = proof.falls and all(EFFECTS[name].timed for name in names[:count])
-        if proof.carries or unproven or cycling or timed:
+        seen = proof.carries and (count == 1 or adds_in_band(kept, proof))
+        if seen or unproven or cycling or timed:
             return replace(kept, proof=proof, refuted=names[count:], unproven=unproven)
     proof = held_out(found.p, found.plain, found.plain, band=found.band)
     outside = None if names else found.outside
     return replace(found, best=found.plain, accepted=(), proof=proof, refuted=names, outside=outside)
+
+
+def adds_in_band(found: Explanation, proof: HeldOut) -> bool:
+    """Whether the last of several effects removes enough of the held-out misfit in the loop's band, if that is known.
+    A second effect takes up what the first one's model leaves, which is a deficit of the model everywhere."""
+    if found.band is None or proof.banded is None:
+        return True
+    less = first_effects(found, len(found.accepted) - 1)
+    before = held_out(less.p, less.plain, less.best, band=found.band).banded
+    least = found.p.limits.proof.least_in_band
+    return before is None or proof.banded[1].rmse ** 2 <= (1.0 - least) * before[1].rmse ** 2
 
 
 def first_effects(found: Explanation, count: int) -> Explanation:

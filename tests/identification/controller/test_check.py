@@ -67,6 +67,27 @@ def filtered_loop(seed: int, lag: float, step: float) -> tuple[np.ndarray, np.nd
     return pv, np.round(law(50.0 - seen, 1.8, 20.0) / step) * step
 
 
+@pytest.mark.parametrize(("stated", "name"), [(28.0, None), (45.0, "controller-settings")])
+def test_a_set_point_between_its_digits_is_no_other_integral_time(stated: float, name: str | None) -> None:
+    """SP of 42.765 is recorded as 42.75, PV in steps of .02: the integral sums the difference of .015 up. The true
+    integral time of 28 samples is still believed, a wrong one still named and the true one given within 3 %."""
+    rng = np.random.default_rng(3)
+    noise, load = rng.normal(0, 0.06, N), np.cumsum(rng.normal(0, 0.02, N))
+    pv, op, y, u, last = np.empty(N), np.empty(N), 42.765, 50.0, 0.0
+    for k in range(N):
+        pv[k] = y + noise[k]
+        e = 42.765 - pv[k]
+        u += 8.0 * (e - last) + 8.0 * e / 28.0
+        op[k], last = u, e
+        y += 0.01 * (u - 50.0 - load[k])
+    pv, op = np.round(pv / 0.02) * 0.02, np.round(op / 0.05) * 0.05
+    found, told = judge(Trends(np.full(N, 42.75), pv, op, GOOD), StatedSettings(8.0, stated))
+    assert told is not None
+    assert told.offset == pytest.approx(0.015, abs=0.001)
+    assert (None if found is None else found.name) == name
+    assert found is None or found.values["ti_samples"] == pytest.approx(28.0, rel=0.03)
+
+
 @pytest.mark.parametrize(("lag", "step"), [(1.5, 0.1), (3.0, 0.2), (6.0, 0.1)])
 def test_filter_of_pv_is_no_fault(lag: float, step: float) -> None:
     """A controller that acts on a filtered PV has neither other settings nor a gap nor a late clock."""
