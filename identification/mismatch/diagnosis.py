@@ -40,6 +40,7 @@ from identification.mismatch.selection import (
     Progress,
     compete,
     integrating_or_first_order,
+    longest_first,
     penalised,
     penalty,
     silent,
@@ -157,7 +158,7 @@ def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explan
             break
         if winner.name in OUTSIDE:
             return replace(found, outside=winner), candidates
-        best = descended(x.p, winner.fit.model, limits.full_steps)
+        best = descended(x.p, longest_first(winner.fit.model), limits.full_steps)
         found = replace(found, p=x.p, best=best, accepted=(*found.accepted, winner))
     return found, candidates
 

@@ -180,6 +180,16 @@ def sticking_candidates(
     return out
 
 
+def longest_first(model: Model) -> Model:
+    """A model whose added lag is shorter than the process's: two lags in series are the same in either order."""
+    slots, c = {q.slot for q in model.params}, model.c
+    if Slot.T2 not in slots or {Slot.T3, Slot.BEGUN} & slots or c[Slot.T2] <= c[Slot.T]:
+        return model
+    swapped = c.copy()
+    swapped[Slot.T], swapped[Slot.T2] = c[Slot.T2], c[Slot.T]
+    return replace(model, c=swapped)
+
+
 def without(model: Model, rows: Iterable[Variant]) -> Model:
     """A model without some of its additions, their constants neutral."""
     c, rest, gone = model.c.copy(), neutral(), list(rows)

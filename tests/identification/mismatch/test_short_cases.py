@@ -11,6 +11,9 @@ from identification.mismatch.answer import Answer, answer
 from identification.mismatch.diagnosis import explain
 from identification.mismatch.model_file import carried, to_data
 from identification.mismatch.recording import Recording
+from identification.mismatch.selection import longest_first
+from identification.simulation.open_loop import simulate
+from identification.simulation.parameters import Slot
 from tests.identification.hand_made import Plant, recording
 
 
@@ -43,6 +46,19 @@ def test_second_lag_is_named_with_its_time() -> None:
     found = said(recording(Plant(second_lag_s=8.0), 3))
     assert found.verdict == "second-lag"
     assert value(found, "second_lag_s") == pytest.approx(8.0, rel=0.2)
+
+
+def test_the_shorter_of_two_lags_is_the_added_one() -> None:
+    """Two lags in series answer alike in either order; a model with the longer one added is told with the shorter."""
+    found = explain(recording(Plant(second_lag_s=8.0), 3))
+    model = found.best.model
+    c = model.c.copy()
+    c[Slot.T], c[Slot.T2] = model.c[Slot.T2], model.c[Slot.T]
+    turned = longest_first(replace(model, c=c))
+    assert turned.c[Slot.T] == max(c[Slot.T], c[Slot.T2])
+    courses = [simulate(found.p.inputs, x)[200:] for x in (c, turned.c)]  # both at rest at the start
+    assert courses[0] == pytest.approx(courses[1], abs=0.001)
+    assert longest_first(turned) is turned
 
 
 def test_load_step_is_a_load() -> None:
