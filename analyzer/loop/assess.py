@@ -156,9 +156,9 @@ def _rung(
     prepared: Prepared, period_s: float, controller: Pid | None, config: Config, kind: str
 ) -> tuple[Oscillations, Verdict] | None:
     """Oscillations and cause of a loop whose identified model rings at a period [s]; None if the error does not."""
-    near = detect(prepared.record, config.oscillation.nearly(), whole=True)
+    near, row_s = detect(prepared.record, config.oscillation.nearly(), whole=True), prepared.record.dt_s
     first = counting(near)
-    if first is None or not same_period(first.period_s, period_s, config.cause):
+    if first is None or not same_period(first.period_s, period_s, row_s, config.cause):
         return None
     told = cause_of(prepared, near, controller, config, kind)
     return (near, told) if told.cause is Cause.TUNING else None

@@ -37,7 +37,7 @@ class Ringing:
     smooth, the process under a smooth load; lined, under one with a line; ms, maximum sensitivity of the loop under
     the smooth load [-], inf if it is unstable, and period_s, at which it rings [s]; cycle_s, the observed period [s];
     line_nat and valve_nat, gain in log likelihood of a line in the load, and of a valve's fault, over the smooth load
-    [nat].
+    [nat]; row_s, interval of the rows [s].
     """
 
     smooth: SmoothFit
@@ -47,6 +47,7 @@ class Ringing:
     cycle_s: float
     line_nat: float
     valve_nat: float
+    row_s: float
 
     def is_tight(self, m: Regularity, evidence: float, limits: CauseLimits) -> bool:
         """Whether the loop itself makes the cycle: it rings at the observed period, the cycle is no more regular than
@@ -109,12 +110,13 @@ class Ringing:
 
     def rings(self, limits: CauseLimits) -> bool:
         """Whether the loop has little damping at the observed period."""
-        return self.ms >= limits.ringing_ms and same_period(self.period_s, self.cycle_s, limits)
+        return self.ms >= limits.ringing_ms and same_period(self.period_s, self.cycle_s, self.row_s, limits)
 
 
-def same_period(predicted_s: float, seen_s: float, limits: CauseLimits) -> bool:
-    """Whether the period of a model agrees with that of a cycle."""
-    return abs(math.log(predicted_s / seen_s)) <= math.log(limits.ringing_period)
+def same_period(predicted_s: float, seen_s: float, row_s: float, limits: CauseLimits) -> bool:
+    """Whether the period of a model agrees with that of a cycle, in a record with rows every row_s [s], within which
+    the model's dead time is not known."""
+    return abs(math.log(predicted_s / seen_s)) <= math.log(limits.ringing_period) + row_s / seen_s
 
 
 def between_samples(process: Process, window: Window, controller: Pid) -> Process:
@@ -152,7 +154,7 @@ def ringing_of(linear: Fit, valves: tuple[Fit, ...], controller: Pid | None, per
     best = max((f.log_likelihood for f in faulty), default=-math.inf)
     ms, rings_s = _peak(smooth, window, law, period_s)
     line_nat, valve_nat = (x - smooth.log_likelihood for x in (lined.log_likelihood, best))
-    return Ringing(smooth, lined, ms, rings_s, period_s, line_nat, valve_nat)
+    return Ringing(smooth, lined, ms, rings_s, period_s, line_nat, valve_nat, window.row_s)
 
 
 def _resonant(window: Window, period_s: float, law: Pid | None) -> list[tuple[Dynamics, float]]:

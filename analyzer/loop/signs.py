@@ -48,11 +48,13 @@ def _of_load(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
 
 
 def _of_size(m: Measured, o: Oscillation, limits: CauseLimits) -> Sign:
-    """Whether the cycle keeps its size, as a machine's does, or changes it, as noise through a resonance does."""
+    """Whether the cycle keeps its size, as a machine's or a faulty valve's does, or changes it, as noise through a
+    resonance does."""
     keeps = m.kurtosis < limits.kept_size
+    of_valve = m.ringing is not None and m.evidence >= m.ringing.penalty
     end = SINE if keeps else NOISE
     strength = (m.kurtosis - limits.kept_size) / (end - limits.kept_size)
-    cause = Cause.LOAD if keeps else Cause.TUNING
+    cause = Cause.TUNING if not keeps else Cause.VALVE if of_valve else Cause.LOAD
     figures = m.kurtosis, o.rhythm.third, float(keeps)
     return Sign(cause, min(max(strength, WEAK), 1.0), SignKind.REGULARITY, figures)
 

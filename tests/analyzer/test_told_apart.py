@@ -83,3 +83,12 @@ def test_no_valve_is_told_without_evidence_of_its_own(loaded):
     verdict = told(loaded, valve_nat=500.0)
     assert verdict.cause != "valve"
     assert verdict.confidence[Cause.VALVE] < 50.0
+
+
+def test_a_model_rings_at_the_period_of_a_cycle_as_far_as_the_rows_tell(loaded):
+    """A model that rings 20 % slower is of another period in rows of a second, and of the same one where ten rows
+    make a cycle: its dead time is known no better than to a row."""
+    ringing, limits = loaded[1].verdict.measured.ringing, CONFIG.cause
+    slower = replace(ringing, ms=5.0, period_s=1.2 * ringing.cycle_s)
+    assert not replace(slower, row_s=1.0).rings(limits)
+    assert replace(slower, row_s=0.1 * ringing.cycle_s).rings(limits)
