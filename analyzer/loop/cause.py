@@ -34,7 +34,7 @@ from analyzer.loop.fitness import compressed
 from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
-from analyzer.loop.ringing import Regularity, Ringing
+from analyzer.loop.ringing import Regularity, Ringing, between_samples
 from analyzer.loop.signs import signs_of
 from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import refined
@@ -46,7 +46,10 @@ from identification.estimation.noise import generic_noise
 from identification.estimation.smooth_load import as_fit
 from identification.estimation.window import Fit
 from identification.limits import FIT
+from identification.models import Backlash, Loop
 from identification.record import LoopRecord
+from tuning.describing import describe
+from tuning.frequency_response import loop_response
 
 NO_MODEL = Requirement(None, RequirementKind.MODEL)
 
@@ -232,13 +235,26 @@ def _rings(m: Measured, ringing: Ringing, limits: CauseLimits) -> Verdict:
 
 
 def _may_be_cause(m: Measured, ringing: Ringing, limits: CauseLimits) -> bool:
-    """Whether a valve fault may be the cause of a cycle: PV shows it, and it is not too small for OP's travel. Beside
-    a periodic load, whose harmonics it explains too, nearly every half-cycle must show a narrow one."""
+    """Whether a valve fault may be the cause of a cycle: PV shows it, it is not too small for OP's travel, and the
+    loop's harmonic balance is not far from a limit cycle. Beside a periodic load, whose harmonics it explains too,
+    nearly every half-cycle must show a narrow one."""
     if m.size < limits.least_size or m.evidence < ringing.penalty or not speaks(m, limits, True):
+        return False
+    if imbalance(m) > limits.imbalance:
         return False
     periodic = ringing.keeps_phase(limits) and ringing.line_nat >= ringing.penalty
     each = m.trials is not None and m.trials.agreeing >= limits.agreeing
     return m.size >= limits.small_size or not periodic or each
+
+
+def imbalance(m: Measured) -> float:
+    """Distance of the harmonic balance G C N of a loop with backlash from -1 at its cycle [-]: 0 of a limit cycle;
+    where the loop attenuates a load at the period, the factor by which it does; 0 without settings."""
+    if m.controller is None:
+        return 0.0
+    loop = Loop(between_samples(m.play.process, m.window, m.controller), m.controller)
+    response = complex(loop_response(loop, np.array([2.0 * math.pi / m.scale_s]))[0])
+    return abs(1.0 + response * describe(Backlash(m.play.valve.stickband), 0.5 * m.window.cycle_range))
 
 
 def _quiet(m: Measured, limits: CauseLimits) -> Verdict:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analyzer.loop.assess import assess
-from analyzer.loop.cause import judge, resolve_ambiguity
+from analyzer.loop.cause import imbalance, judge, resolve_ambiguity
 from analyzer.loop.decisions import Cause, MissingData
 from analyzer.loop.oscillation import counting
 from proofs.plant import CONFIG, Sketch, prepared, simulate
@@ -92,3 +92,13 @@ def test_a_model_rings_at_the_period_of_a_cycle_as_far_as_the_rows_tell(loaded):
     slower = replace(ringing, ms=5.0, period_s=1.2 * ringing.cycle_s)
     assert not replace(slower, row_s=1.0).rings(limits)
     assert replace(slower, row_s=0.1 * ringing.cycle_s).rings(limits)
+
+
+def test_a_valve_causes_no_cycle_at_a_period_at_which_its_loop_attenuates_loads():
+    """At its limit cycle the harmonic balance of a level with backlash is -1 (Gelb, Vander Velde 1968). At a period
+    twenty times as long its loop gain is large, no backlash balances, and none is the cause."""
+    worn = Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5)
+    found = assess(prepared(simulate(worn, 6.0)), worn.controller, CONFIG).verdict
+    assert found.cause == "valve"
+    assert imbalance(found.measured) < 0.1
+    assert imbalance(replace(found.measured, scale_s=20.0 * found.measured.scale_s)) > CONFIG.cause.imbalance
