@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 from analyzer.cli import main as triage
 from analyzer.explain.text import answer_lines
-from analyzer.explain.words import held_out
+from analyzer.explain.words import TOLD, held_out
 from analyzer.pages.night import pages_of_night
 from analyzer.store.store import Store
 from analyzer.words.reason import in_short
@@ -79,7 +79,12 @@ def of_explain(asked: tuple[str, ...], row: dict[str, Any], store: str) -> Itera
     if "night" in found:
         yield from parted(row, found["night"], "explain")
     named = {VALVE_EFFECTS[e["name"]] for e in found["effects"] if e["name"] in VALVE_EFFECTS}
-    if row["valve_fault"] in ("none", "backlash", "stiction") and named - {row["valve_fault"]}:
+    said_so = TOLD["beside_verdict"]["calm_valve"] in " ".join(answer_lines(found))
+    if (
+        row["valve_fault"] in ("none", "backlash", "stiction")
+        and named - {row["valve_fault"]}
+        and not said_so
+    ):
         yield f"explain: {', '.join(sorted(named))} where the night has valve_fault {row['valve_fault']}"
     if found["moved"]:
         plain, better = held_out(found)

@@ -236,7 +236,7 @@ def beside_night(row: Mapping[str, Any], verdict: str, block: str) -> str:
     if row["cause"] == Cause.LOAD and block not in (Block.VALVE, Block.LOAD):
         return str(told["load"])
     if row["cause"] == Cause.NONE and row["action"] == Action.NONE and verdict != "none":
-        return str(told["calm"])
+        return str(told["calm_valve" if block == Block.VALVE else "calm"])
     return agreement(row, verdict, block)
 
 

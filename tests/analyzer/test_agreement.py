@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analyzer.explain.words import TOLD, agreement
+from analyzer.explain.words import TOLD, agreement, beside_night
 
 
 @pytest.mark.parametrize(
@@ -34,3 +34,14 @@ def test_no_valve_no_sentence(verdict: str) -> None:
 def test_words_nobody_knows_do_no_harm() -> None:
     """A store written by another version may hold a name that the catalogue lacks."""
     assert agreement({"cause": "none", "valve_fault": "none"}, "no such effect", "none") == ""
+
+
+@pytest.mark.parametrize(("block", "told"), [("valve", "calm_valve"), ("process", "calm")])
+def test_an_explanation_of_a_calm_loop_says_that_the_night_asks_for_nothing(block: str, told: str) -> None:
+    """Of a loop with nothing to do the explanation of a valve says why the night reports none, others that they are
+    about the model."""
+    night = {"cause": "none", "action": "none", "valve_fault": "none", "lanes": None}
+    assert (
+        beside_night(night, "backlash" if block == "valve" else "second-lag", block)
+        == (TOLD["beside_verdict"][told])
+    )
