@@ -52,6 +52,7 @@ from tuning.describing import describe
 from tuning.frequency_response import loop_response
 
 NO_MODEL = Requirement(None, RequirementKind.MODEL)
+CAUSE_IN_MANUAL = Requirement(MissingData.MANUAL_TEST, RequirementKind.CAUSE_IN_MANUAL)
 
 
 @dataclass(frozen=True, slots=True)
@@ -318,24 +319,35 @@ def with_dead_valve(verdict: Verdict, sign: Sign) -> Verdict:
 def resolve_ambiguity(
     verdict: Verdict, prepared: Prepared, oscillation: Oscillation | None, config: Config
 ) -> Verdict:
-    """The verdict on an oscillation: none if compressed trends make a likely valve uncertain, and with the missing
-    data if it is undecided."""
+    """The verdict on an oscillation, with the missing data if it is undecided: no valve if compressed trends make it
+    uncertain, and no load if the recording does not show the waveform of a valve's cycle."""
     if oscillation is None or verdict.measured is None:
         return verdict
     if verdict.cause is Cause.UNDECIDED:
-        return replace(verdict, needs=_to_decide(prepared, oscillation, config.cause))
-    if verdict.cause is not Cause.VALVE or verdict.confidence[Cause.VALVE] >= config.cause.compressed_pct:
+        lacking = _too_coarse(prepared, oscillation, config.cause) or CAUSE_IN_MANUAL
+        return replace(verdict, needs=lacking)
+    hides = _hides(verdict, prepared, oscillation, config)
+    if hides is None:
         return verdict
-    lacking = compressed(prepared, None, config.quality)
-    if lacking is None:
-        return verdict
+    fault = Fault.UNDECIDED if verdict.cause is Cause.VALVE else verdict.fault
     hint = cap_confidence(verdict, 0.9 * config.cause.named_pct)
-    return replace(hint, cause=Cause.UNDECIDED, fault=Fault.UNDECIDED, needs=lacking)
+    return replace(hint, cause=Cause.UNDECIDED, fault=fault, needs=hides)
 
 
-def _to_decide(prepared: Prepared, oscillation: Oscillation, limits: CauseLimits) -> Requirement:
-    """Missing data of an oscillation whose cause is undecided: finer values or faster samples if a valve's effect is
-    not visible in these, else some periods in manual."""
+def _hides(
+    verdict: Verdict, prepared: Prepared, oscillation: Oscillation, config: Config
+) -> Requirement | None:
+    """Missing data to distinguish the named cause from others; None if there are none."""
+    limits = config.cause
+    if verdict.cause is Cause.LOAD:
+        return _too_coarse(prepared, oscillation, limits)
+    unsure = verdict.cause is Cause.VALVE and verdict.confidence[Cause.VALVE] < limits.compressed_pct
+    return compressed(prepared, None, config.quality) if unsure else None
+
+
+def _too_coarse(prepared: Prepared, oscillation: Oscillation, limits: CauseLimits) -> Requirement | None:
+    """Requirement of a recording in which every regular cycle looks like a periodic load, because its samples or the
+    steps of PV's grid do not show the third harmonic of a valve's; None if it is sufficient."""
     steps = oscillation.amplitude_pct / max(prepared.pv_step, 1e-12)
     if steps < limits.steps_told:
         figures = prepared.pv_step, oscillation.amplitude_pct
@@ -343,7 +355,7 @@ def _to_decide(prepared: Prepared, oscillation: Oscillation, limits: CauseLimits
     samples = oscillation.period_s / prepared.record.dt_s
     if samples < limits.samples_told:
         return Requirement(MissingData.FASTER, RequirementKind.OF_A_CAUSE, (limits.samples_told, samples))
-    return Requirement(MissingData.MANUAL_TEST, RequirementKind.CAUSE_IN_MANUAL)
+    return None
 
 
 def with_worn_valve(verdict: Verdict, period_s: float, limits: CauseLimits) -> Verdict:
