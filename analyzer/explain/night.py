@@ -34,7 +34,7 @@ Row = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Question:
+class FlaggedLoop:
     """One loop of a night to be explained, with the loop that leads it if known, and the night's valve fault."""
 
     export: Export
@@ -52,7 +52,7 @@ def flagged(row: Mapping[str, Any]) -> bool:
     return counts(row["oscillating_pct"]) or row["cause"] not in QUIET or row["action"] not in QUIET
 
 
-def answered(q: Question, began: Callable[[int], None] = lambda at: None) -> Row:
+def answered(q: FlaggedLoop, began: Callable[[int], None] = lambda at: None) -> Row:
     """The row of one loop, in any case; runs in a worker process."""
     from analyzer.explain.explained import abstained
 
@@ -66,7 +66,7 @@ def answered(q: Question, began: Callable[[int], None] = lambda at: None) -> Row
     return answer_row(data, q.night.name, page)
 
 
-def _answer_and_page(q: Question) -> tuple[dict[str, Any], str]:
+def _answer_and_page(q: FlaggedLoop) -> tuple[dict[str, Any], str]:
     """The answer as data, and its page."""
     from analyzer.explain.case import case
     from analyzer.explain.explained import explained
@@ -87,12 +87,12 @@ def answer_row(data: Mapping[str, Any], night: str, page: str = "") -> Row:
     return {**texts, "night": night, "answer": json.dumps(data), "page": page}
 
 
-def questions(plant: Plant, rows: Sequence[Mapping[str, Any]], night: Night) -> list[Question]:
+def questions(plant: Plant, rows: Sequence[Mapping[str, Any]], night: Night) -> list[FlaggedLoop]:
     """The flagged loops of a night, the most significant first."""
     by_name, config = {s.loop: s for s in plant.specs}, plant.config
     chosen = sorted((r for r in rows if flagged(r)), key=lambda r: -(r["oscillation_significance"] or 0.0))
     return [
-        Question(
+        FlaggedLoop(
             plant.export,
             by_name[r["loop"]],
             by_name.get(r["source_loop"] or ""),

@@ -35,7 +35,7 @@ from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
 from analyzer.loop.ringing import Regularity, Ringing, between_samples
-from analyzer.loop.signs import signs_of
+from analyzer.loop.signs import WEAK, signs_of
 from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import refined
 from identification.estimation.beside_line import BesideLine, beside_line
@@ -229,7 +229,7 @@ def _rings(m: Measured, ringing: Ringing, limits: CauseLimits) -> Verdict:
     confidence = {Cause.VALVE: rest, Cause.TUNING: pct, Cause.LOAD: rest}
     signs = (
         Sign(Cause.TUNING, pct / 100.0, SignKind.RINGING, (ringing.ms, ringing.period_s)),
-        Sign(Cause.TUNING, max(clear, 0.05), SignKind.SMOOTH_LOAD, (ringing.line_nat,)),
+        Sign(Cause.TUNING, max(clear, WEAK), SignKind.SMOOTH_LOAD, (ringing.line_nat,)),
     )
     told = replace(m, linear=as_fit(ringing.smooth, m.window))
     return Verdict(Cause.TUNING, confidence, Fault.NONE, signs, measured=told)
@@ -243,9 +243,8 @@ def _may_be_cause(m: Measured, ringing: Ringing, limits: CauseLimits) -> bool:
         return False
     if imbalance(m) > limits.imbalance:
         return False
-    periodic = ringing.keeps_phase(limits) and ringing.line_nat >= ringing.penalty
     each = m.trials is not None and m.trials.agreeing >= limits.agreeing
-    return m.size >= limits.small_size or not periodic or each
+    return m.size >= limits.small_size or not ringing.is_periodic(limits) or each
 
 
 def imbalance(m: Measured) -> float:

@@ -24,7 +24,6 @@ from identification.simulation.pi import kept
 from identification.simulation.valve import StemLaw
 from tuning.describing import describe, scaled_valve
 from tuning.forecast import SEED
-from tuning.frequency_response import maximum_sensitivity
 from tuning.rules import simc
 from tuning.search import LoadedLoop
 
@@ -69,18 +68,6 @@ def cautious(process: Fopdt, period_s: float | None) -> Fopdt:
     """
     t = max(process.time_constant_s, 2.0 * (period_s or 0.0))
     return Fopdt(process.slope * t, t, process.dead_time_s)
-
-
-def sensitivity(m: Measured, period_s: float) -> float | None:
-    """Ms of the identified loop [-], inf if it is unstable; None if no settings are known, or they act the wrong way.
-    The smaller of those with the process as identified and as used for settings, of a cycle of period_s [s].
-    """
-    process, controller = m.linear.process, m.controller
-    if controller is None or process.gain * controller.kp <= 0.0:
-        return None
-    return min(
-        float(maximum_sensitivity(Loop(x, controller))) for x in (process, cautious(process, period_s))
-    )
 
 
 def gain_room(m: Measured) -> float | None:

@@ -24,10 +24,7 @@ from identification.estimation.evidence import (
 from identification.estimation.window import Fit, Window
 from identification.models import Fopdt, Loop, Pid
 from identification.record import LoopRecord, Mask
-from identification.signals.spectrum import (
-    Spectrum,
-    size_kurtosis,
-)
+from identification.signals.spectrum import Spectrum, size_kurtosis
 from tuning.frequency_response import is_stable, loop_response
 from tuning.ringing import ObservedRinging, observed_ringing
 

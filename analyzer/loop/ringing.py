@@ -95,8 +95,12 @@ class Ringing:
         """Whether the line of the load has a constant phase."""
         return self.lined.line is not None and self.lined.line.kept >= limits.line_kept
 
+    def is_periodic(self, limits: CauseLimits) -> bool:
+        """Whether such a line gains more than the penalty of its constants."""
+        return self.keeps_phase(limits) and self.line_nat >= self.penalty
+
     def has_line(self, limits: CauseLimits) -> bool:
-        """Whether the load has a line of constant phase."""
+        """Whether such a line gains enough to speak against a ringing loop."""
         return self.keeps_phase(limits) and self.line_nat >= self.line_needed(limits)
 
     @property

@@ -11,9 +11,9 @@ from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillation
 
 SINE, NOISE = 1.5, 3.0
-"""Kurtosis of a sine and of noise [-]."""
+"""Kurtosis of a sine and of Gaussian noise [-] (Rice 1945)."""
 WEAK = 0.05
-"""Strength of a sign that hardly counts [-]."""
+"""Least strength of a listed sign [-]; ours: it moves nothing, and sorts the sign last."""
 
 
 def signs_of(m: Measured, o: Oscillation, limits: CauseLimits) -> tuple[Sign, ...]:
@@ -40,11 +40,11 @@ def _of_valve(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
 
 def _of_load(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
     """A periodic load that keeps its phase."""
-    line = None if m.ringing is None else m.ringing.lined.line
-    nat = 0.0 if m.ringing is None else m.ringing.line_nat
-    if m.ringing is None or line is None or line.kept < limits.line_kept or nat < m.ringing.penalty:
+    if m.ringing is None or not m.ringing.is_periodic(limits):
         return ()
-    return (Sign(Cause.LOAD, _sure(nat, limits), SignKind.PERIODIC_LOAD, (nat, line.kept)),)
+    nat, line = m.ringing.line_nat, m.ringing.lined.line
+    kept = 0.0 if line is None else line.kept
+    return (Sign(Cause.LOAD, _sure(nat, limits), SignKind.PERIODIC_LOAD, (nat, kept)),)
 
 
 def _of_size(m: Measured, o: Oscillation, limits: CauseLimits) -> Sign:

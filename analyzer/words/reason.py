@@ -182,15 +182,11 @@ def _evidence(nat: float, agreeing: float = 0.0, count: int | None = None) -> Ch
     return "evidence" if count is None else "evidence_in_stretches", nat, 100 * agreeing, count
 
 
-def _amplification(*known: float | None) -> Chosen:
+def _amplification(*known: float) -> Chosen:
     if not known:
         return ("unstable",)
     (s,) = known
-    if s is None:
-        return ("no_amplification",)
-    if s > MOST_AMPLIFIED:
-        return ("amplifies_much", MOST_AMPLIFIED)
-    return ("amplifies", s) if s > 1.0 else ("weakens", 1.0 / max(s, 1e-3))
+    return ("amplifies_much", MOST_AMPLIFIED) if s > MOST_AMPLIFIED else ("amplifies", s)
 
 
 def _regularity(kurtosis: float, third: float, size: float) -> Chosen:

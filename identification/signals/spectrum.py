@@ -158,20 +158,19 @@ def analytic(s: Spectrum, line: float, factor: float, size: int) -> Complex:
     return np.fft.ifft(cut) * (size / s.n)
 
 
-def locked_harmonic(s: Spectrum, period_s: float, order: int = 3, cycle: Spectrum | None = None) -> float:
+def locked_harmonic(s: Spectrum, period_s: float, order: int = 3) -> float:
     """Size of a harmonic that is phase-locked to the fundamental, relative to the fundamental.
 
     The mean of z3 exp(-3i phase1) over the mean of |z1|: a triangle gives 1/9, a square 1/3, a sine with noise zero,
     because its third harmonic has no fixed phase.
 
-    s : of the signal with the harmonic; period_s : of the fundamental [s]; order : of the harmonic; cycle : of the
-    signal with the fundamental, on the same times; None: the same signal.
+    s : of the signal; period_s : of the fundamental [s]; order : of the harmonic.
     """
     line = s.duration_s / period_s
     if order * line * 1.15 >= s.lines.size - 1:
         return 0.0
     size = next_fast_len(max(int(line * 4 * order), 16))
-    z1, z3 = analytic(cycle or s, line, 1.3, size), analytic(s, order * line, 1.15, size)
+    z1, z3 = analytic(s, line, 1.3, size), analytic(s, order * line, 1.15, size)
     turned = z3 * np.exp(-1j * order * np.angle(z1))
     weight = float(np.mean(np.abs(z1)))
     return float(np.abs(np.mean(turned))) / weight if weight > 0 else 0.0

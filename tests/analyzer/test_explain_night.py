@@ -13,7 +13,7 @@ from analyzer.config import Config
 from analyzer.explain import night as explain_night
 from analyzer.explain.explained import abstained
 from analyzer.explain.night import (
-    Question,
+    FlaggedLoop,
     answer_row,
     answered,
     explain_flagged,
@@ -46,7 +46,7 @@ def store(tmp_path: Path) -> Store:
     return small_store(tmp_path / "store", hours=False, buckets=50)
 
 
-def told(q: Question) -> tuple[dict[str, Any], str]:
+def told(q: FlaggedLoop) -> tuple[dict[str, Any], str]:
     """An answer that needs no recording, without a page; the second nasty loop fails, the third abstains."""
     if q.spec.loop == NASTY[1]:
         raise ZeroDivisionError("broken")
@@ -58,7 +58,7 @@ def told(q: Question) -> tuple[dict[str, Any], str]:
 class DyingWorkers:
     """Workers of which every second dies over its task."""
 
-    def __init__(self, count: int, function: Callable[[Question], dict[str, Any]], limits: object) -> None:
+    def __init__(self, count: int, function: Callable[[FlaggedLoop], dict[str, Any]], limits: object) -> None:
         self.function, self.tasks = function, []
 
     def __enter__(self) -> DyingWorkers:
@@ -67,10 +67,10 @@ class DyingWorkers:
     def __exit__(self, *_: object) -> None:
         return
 
-    def submit(self, task: Question, alone: bool = False) -> None:
+    def submit(self, task: FlaggedLoop, alone: bool = False) -> None:
         self.tasks.append(task)
 
-    def results(self) -> Iterator[dict[str, Any] | WorkerDeath[Question]]:
+    def results(self) -> Iterator[dict[str, Any] | WorkerDeath[FlaggedLoop]]:
         for at, task in enumerate(self.tasks):
             yield (
                 WorkerDeath(task, 0, "its worker process was ended by SIGKILL", True)
@@ -144,7 +144,7 @@ def test_failure_is_an_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     """An abstention's reason stands as it is, an error's with its kind."""
     monkeypatch.setattr(explain_night, "_answer_and_page", told)
     spec = {s.loop: s for s in SPECS}
-    ask = [answered(Question(EXPORT, spec[n], None, NIGHT, Config()))["reason"] for n in NASTY[1:3]]
+    ask = [answered(FlaggedLoop(EXPORT, spec[n], None, NIGHT, Config()))["reason"] for n in NASTY[1:3]]
     assert ask == ["not explained: ZeroDivisionError: broken", "needs OP, has none"]
 
 

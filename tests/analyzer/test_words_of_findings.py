@@ -72,7 +72,7 @@ def test_each_kind_has_its_words() -> None:
 BOTH_WAYS = {
     SignKind.EVIDENCE: ((0.0,), (9.0,), (9.0, 0.5, 4)),
     SignKind.WIDTH: ((0.3,),),
-    SignKind.AMPLIFICATION: ((), (None,), (2.0,), (0.5,), (50.0,)),
+    SignKind.AMPLIFICATION: ((), (2.0,), (50.0,)),
     SignKind.REGULARITY: ((1.5, 0.9, 1.0), (1.5, 0.1, 1.0), (2.9, 0.9, 0.0), (2.9, 0.1, 0.0)),
     SignKind.RINGING: ((math.inf, 90.0), (5.0, 90.0)),
     SignKind.SMOOTH_LOAD: ((2.0,),),

@@ -111,14 +111,6 @@ def test_harmonic_that_is_not_locked_counts_little():
     assert locked_harmonic(spectrum(np.sin(2 * np.pi * T / PERIOD) + other, 1.0), PERIOD) < 0.05
 
 
-def test_locked_harmonic_of_what_is_left_is_measured_by_the_cycle_it_is_left_of():
-    """A third harmonic of 0.2 that is left of a cycle of 2 is a tenth of it; of noise, none."""
-    cycle = spectrum(2 * np.sin(2 * np.pi * T / PERIOD) + 0.1 * noise(9), 1.0)
-    left = spectrum(0.2 * np.sin(3 * 2 * np.pi * T / PERIOD + 0.4) + 0.1 * noise(10), 1.0)
-    assert locked_harmonic(left, PERIOD, 3, cycle) == pytest.approx(0.1, abs=0.01)
-    assert locked_harmonic(spectrum(0.1 * noise(11), 1.0), PERIOD, 3, cycle) < 0.01
-
-
 def test_band_signal_of_a_sine_is_the_sine():
     """The band about a sine returns its power and none of the noise outside the band."""
     s = spectrum(2 * np.sin(2 * np.pi * T / PERIOD) + 0.01 * noise(8), 1.0)
