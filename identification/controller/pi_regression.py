@@ -67,8 +67,8 @@ def centred(x: Floats, length: int) -> Floats:
 
 
 def regress(e: Floats, op: Floats, length: int, keep: Mask) -> tuple[float, float, float, Floats]:
-    """kp, ki, offset of the error and residual of OP, regressed on e, its sum and time, each span with a constant of
-    its own."""
+    """kp [% OP/% PV], ki [% OP/(% PV sample)], offset of the error [% PV] and residual of OP [% OP], shape (m *
+    length,): OP on e, its sum and time, shape (n,) each, with a constant for each span."""
     rows = np.stack([centred(x, length) for x in (e, np.cumsum(e), np.arange(e.size, dtype=float), op)])
     use = keep[: rows.shape[1]]
     gram = (rows * use) @ rows.T
