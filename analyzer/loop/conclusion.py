@@ -130,7 +130,9 @@ def _measured(a: Assessment, limits: AdviceLimits) -> Known:
         "duration_s": a.duration_s,
         "harris_index": a.harris,
         **as_row(a.moves),
-        "notes": "; ".join((*a.notes, f"cause not assessed: {v.needs}") if v.needs else a.notes),
+        "notes": "; ".join(
+            (*a.notes, f"cause not assessed: {v.needs}") if v.needs and m is None else a.notes
+        ),
     }
     if m is not None:
         out |= {

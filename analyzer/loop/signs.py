@@ -27,13 +27,19 @@ def _sure(nat: float, limits: CauseLimits) -> float:
 
 
 def _of_valve(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
-    """How much better a faulty valve explains PV, and the fault's width."""
+    """How much better a faulty valve explains PV, which counts little of a fault too small for OP's travel, and its
+    width."""
     agreeing = () if m.trials is None else (m.trials.agreeing, m.trials.count)
     if m.evidence <= 0.0:
         return (Sign(Cause.LOAD, WEAK, SignKind.EVIDENCE, (m.evidence,)),)
     wide = m.size >= limits.least_size
     return (
-        Sign(Cause.VALVE, _sure(m.evidence, limits), SignKind.EVIDENCE, (m.evidence, *agreeing)),
+        Sign(
+            Cause.VALVE,
+            _sure(m.evidence, limits) if wide else WEAK,
+            SignKind.EVIDENCE,
+            (m.evidence, *agreeing),
+        ),
         Sign(Cause.VALVE if wide else Cause.LOAD, min(max(m.size, WEAK), 1.0), SignKind.WIDTH, (m.size,)),
     )
 
@@ -51,7 +57,8 @@ def _of_size(m: Measured, o: Oscillation, limits: CauseLimits) -> Sign:
     """Whether the cycle keeps its size, as a machine's or a faulty valve's does, or changes it, as noise through a
     resonance does."""
     keeps = m.kurtosis < limits.kept_size
-    of_valve = m.ringing is not None and m.evidence >= m.ringing.penalty
+    seen = m.ringing is not None and m.evidence >= m.ringing.penalty
+    of_valve = seen and m.size >= limits.least_size
     end = SINE if keeps else NOISE
     strength = (m.kurtosis - limits.kept_size) / (end - limits.kept_size)
     cause = Cause.TUNING if not keeps else Cause.VALVE if of_valve else Cause.LOAD

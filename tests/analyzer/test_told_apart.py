@@ -9,8 +9,9 @@ import pytest
 
 from analyzer.loop.assess import assess
 from analyzer.loop.cause import imbalance, judge, resolve_ambiguity
-from analyzer.loop.decisions import Cause, MissingData
+from analyzer.loop.decisions import Cause, MissingData, SignKind
 from analyzer.loop.oscillation import counting
+from analyzer.loop.signs import signs_of
 from proofs.plant import CONFIG, Sketch, prepared, simulate
 
 SINE = Sketch("load", (1.4, 90.0, 10.0), 0.8, 60.0, sine=1.0, sine_s=840.0, load_std=0.05)
@@ -102,3 +103,14 @@ def test_a_valve_causes_no_cycle_at_a_period_at_which_its_loop_attenuates_loads(
     assert found.cause == "valve"
     assert imbalance(found.measured) < 0.1
     assert imbalance(replace(found.measured, scale_s=20.0 * found.measured.scale_s)) > CONFIG.cause.imbalance
+
+
+@pytest.mark.parametrize(("size", "strong"), [(0.05, False), (0.6, True)])
+def test_evidence_of_a_fault_too_small_for_op_counts_little(loaded, size, strong):
+    """Evidence of 60 nat for a fault of a twentieth of OP's range is listed last, and a constant size is then no sign
+    of the valve; of more than half the range both are."""
+    _, found = loaded
+    m, cycle = found.verdict.measured, counting(found.oscillations)
+    told = {s.kind: s for s in signs_of(replace(m, evidence=60.0, size=size), cycle, CONFIG.cause)}
+    assert (told[SignKind.EVIDENCE].strength > 0.9) == strong
+    assert (told[SignKind.REGULARITY].points_to is Cause.VALVE) == strong
