@@ -1,8 +1,9 @@
 """What a run does alone, and what a store of many nights takes to read: python -m benchmarks.joining
 
 The pieces that workers wrote of a small plant are repeated under other names, each time with other phases, so that
-copies share no oscillation. A process of its own puts each night together; then a store of several nights is checked
-and made into pages. Processor time and memory are those of that process alone. Writes joining.md here.
+copies share no oscillation. A process of its own puts each night together; then a store of several nights, each with
+the first one's results, is checked and made into pages. Processor time and memory are those of that process alone.
+Writes joining.md here.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from analyzer.belief.nights import settle_anew
 from analyzer.config import Config
 from analyzer.history.export import open_export
 from analyzer.loops.tags import match, read_loops
@@ -28,7 +30,7 @@ from analyzer.plantwide.structure import moves_in, moves_table
 from analyzer.plantwide.wave import waves_in, waves_table
 from analyzer.store.draft import drafted
 from analyzer.store.store import Store
-from analyzer.store.table import read_stored, tables_beside, write_table
+from analyzer.store.table import KEPT, read_stored, tables_beside, write_table
 from benchmarks import Own, own_of
 from benchmarks.plant_night import DISTINCT, make, tenth
 from proofs.common import command, command_line, publish, table
@@ -81,12 +83,17 @@ def repeat(small: Store, of: str, big: Store, night: str, loops: int) -> None:
 
 def _renamed(held: pa.Table, copy: int, of: str, night: str) -> pa.Table:
     """A piece with other names of loops, of another night."""
-    later = 86400.0 * (date.fromisoformat(night) - date.fromisoformat(of)).days
     names = pa.array([f"U{copy:04d}{loop}" for loop in held.column("loop").to_pylist()])
+    encoded = pa.types.is_dictionary(held.schema.field("loop").type)
+    at = held.column_names.index("loop")
+    held = held.set_column(at, "loop", names.dictionary_encode() if encoded else names)
+    return _moved(held, of, night)
+
+
+def _moved(held: pa.Table, of: str, night: str) -> pa.Table:
+    """A table of a night, or a part of it, as that of another night."""
+    later = 86400.0 * (date.fromisoformat(night) - date.fromisoformat(of)).days
     fresh = {
-        "loop": names.dictionary_encode() if pa.types.is_dictionary(held.schema.field("loop").type) else names
-    }
-    fresh |= {
         t: pc.add(held.column(t), later)
         for t in TIMES
         if t in held.column_names and held.schema.names[0] != "period_s"
@@ -145,9 +152,12 @@ def joinings(small: Store, of: str, sizes: Sequence[int], folder: Path) -> str:
 def readings(small: Store, of: str, loops: int, nights: int, folder: Path) -> str:
     """A table of commands on a store of many nights."""
     store = Store(folder / "nights")
-    for night in nights_from(of, nights):
-        repeat(small, of, store, night, loops)
-        joined(store, night)
+    repeat(small, of, store, of, loops)
+    joined(store, of)
+    for night in list(nights_from(of, nights))[1:]:
+        for kept in KEPT:
+            store.write(kept.name, night, (_moved(t, of, night) for t in store.parts_if_there(kept.name, of)))
+    settle_anew(store, Config())
     place, rows, triage = str(store.path), [], [sys.executable, "-m", "analyzer.cli"]
     pages = ["pages", place, "--out", str(folder / "pages")]
     first = [*pages, "--top", "20"]
