@@ -112,7 +112,7 @@ class Pid:
     inf: none). pv_filter_s : time constant of the filter of PV before the law [s]. gap : size of the error [% PV]
     inside which the gain is gap_gain times the gain outside [-]; the law has no jump at its edge. error_form : as
     above. op_rate : largest rate of OP [% OP/s] (inf or 0: no limit). sp_weight and td_sp_weight : set point weights
-    of gain and derivative [-].
+    of gain and derivative [-]. gain_share : factor of the stated gain in kp, 1 but where a schedule changes it [-].
     """
 
     kp: float
@@ -129,6 +129,7 @@ class Pid:
     op_rate: float = math.inf
     sp_weight: float = 1.0
     td_sp_weight: float = 0.0
+    gain_share: float = 1.0
 
     @property
     def ki(self) -> float:

@@ -21,7 +21,8 @@ class LoopRecord:
     sample must not be used (gap, bad quality), values there are filled, never NaN; position : stem position [% of OP
     span] where recorded; sp_estimated : whether no SP was recorded and one was estimated from PV; masks : True where
     the named thing happens: gap, stale, compressed, quantized, saturated, manual, idle; feed : feedforward signal of
-    OP, in its own unit, where stated and recorded.
+    OP, in its own unit, where stated and recorded; gain_share : gain of the controller over that of most of the
+    record [-], where a schedule changes it.
     """
 
     tag: str
@@ -35,6 +36,7 @@ class LoopRecord:
     sp_estimated: bool = False
     masks: Mapping[str, Mask] = field(default_factory=dict)
     feed: Floats | None = None
+    gain_share: Floats | None = None
 
     def __len__(self) -> int:
         return self.pv.size
@@ -103,5 +105,6 @@ class LoopRecord:
             bad=mask(self.bad),
             position=None if self.position is None else trend(self.position),
             feed=None if self.feed is None else trend(self.feed),
+            gain_share=None if self.gain_share is None else trend(self.gain_share),
             masks={name: mask(x) for name, x in self.masks.items()},
         )

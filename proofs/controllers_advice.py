@@ -1,8 +1,9 @@
 """Does advice hold for controllers as plants have them? python -m proofs.controllers_advice [--seed 1 2] [--days 1]
 
 Loops of proofs/controllers_plant.py with a gap, limits of OP and of its rate, a filter of PV or a slow scan, of which
-gain and integral time alone are stated: worn, tuned too tight, and unstable. What is advised is typed into the same
-controller on the same plant under the same load. Writes controllers_advice.md here.
+gain and integral time alone are stated, and with a gain schedule that is stated too: worn, tuned too tight, and
+unstable. What is advised is typed into the same controller on the same plant under the same load. Writes
+controllers_advice.md here.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ from analyzer.night.chunk import assess_loop
 from proofs.common import command, command_line, publish, table
 from proofs.controllers_plant import Controlled, controlled
 
-ASKED = ("gap", "limit of OP", "limit of OP's rate", "PV filter", "slow scan")
+ASKED = ("gap", "limit of OP", "limit of OP's rate", "PV filter", "slow scan", "gain schedule")
+STATED = ("gain schedule",)
+"""Controllers of which all is stated."""
 CASES = {"worn": ("worn", 1.5), "too tight": ("healthy", 3.0), "unstable": ("healthy", 5.0)}
 """Scene, and times the usual gain."""
 
@@ -32,7 +35,8 @@ def advised(c: Controlled, every: int) -> tuple[float, float] | None:
         folder = Path(name)
         (folder / "trends").mkdir()
         c.trends("L", every).to_parquet(folder / "trends" / "trends.parquet")
-        pd.DataFrame([{"loop": "L", **c.row}]).to_csv(folder / "loops.csv", index=False)
+        row = {"loop": "L", **c.row, **(c.extras if c.form in STATED else {})}
+        pd.DataFrame([row]).to_csv(folder / "loops.csv", index=False)
         export, config = open_export([folder / "trends"]), Config()
         (spec,), *_ = match(read_loops(folder / "loops.csv"), export.tags)
         _, advice = assess_loop(spec, prepare(spec, export.read(spec.tags), config.quality), config)
@@ -67,7 +71,8 @@ def main() -> None:
         __file__,
         "Does advice hold for controllers as plants have them?",
         command(__file__, seed=asked.seed, days=asked.days),
-        "Loops of which gain and integral time are stated and nothing else, recorded every 1 and 10 s. New settings "
+        "Loops of which gain and integral time are stated and nothing else, but for a gain schedule, which is stated "
+        "too; recorded every 1 and 10 s. New settings "
         "are typed into the same controller on the same plant under the same load.",
         table(
             "controller | case | recordings | new settings | error, median % | error, worst % | over 10 %",

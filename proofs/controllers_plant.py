@@ -189,6 +189,7 @@ def _with_form(law: _Law, form: str, plant: Plant, load: np.ndarray, rng: np.ran
             law.extra = {"sp_weight": law.weight}
         case "gain schedule":  # the gain stated is that below an OP of 50 %
             law.upper = round(rng.uniform(0.2, 0.6), 1)
+            law.extra = {"gain_schedule": f"op 50:{law.upper}"}
 
 
 Plant = tuple[float, float, float]

@@ -63,9 +63,10 @@ def tags_of(spec: LoopSpec, specs: Sequence[LoopSpec]) -> list[str]:
 
 
 def stated_law(spec: LoopSpec, prepared: Prepared) -> StatedSettings | None:
-    """The controller as stated, integral time in samples; None if it is unknown or not a PI."""
-    pid = controller(spec, prepared.scale.span)
-    if pid is None or pid.td_s > 0 or not math.isfinite(pid.ti_s):
+    """The controller as stated, integral time in samples; None if it is unknown, not a PI, or one whose gain changed
+    by its schedule."""
+    pid = controller(spec, prepared.scale.span, prepared.gain_share)
+    if pid is None or pid.td_s > 0 or not math.isfinite(pid.ti_s) or prepared.record.gain_share is not None:
         return None
     dt_s = prepared.record.dt_s
     return StatedSettings(pid.kp, pid.ti_s / dt_s, dt_s / (spec.scan_s or dt_s))
@@ -116,7 +117,7 @@ def verdict_on(spec: LoopSpec, prepared: Prepared, config: Config) -> tuple[Verd
     """The verdict on the whole recording as by a night: the cause of its oscillation, or its valve fault; and the
     period of its cycle [s], 0 without one."""
     seen, span = detect_where_it_cycles(prepared.record, config.oscillation)
-    stated = controller(spec, prepared.scale.span)
+    stated = controller(spec, prepared.scale.span, prepared.gain_share)
     found, said = judged_where(prepared, seen, span, stated, config, spec.type)
     cycle = counting(found)
     if cycle is None:

@@ -245,5 +245,5 @@ def chosen(of: Learned, present: Pid | None) -> Pid | None:
     """New settings in place of the present ones; None if these are as good, or there are none."""
     if of.settings is None or present is None:
         return None
-    new = replace(of.settings.robust, scan_s=present.scan_s)
+    new = replace(of.settings.robust, scan_s=present.scan_s, gain_share=present.gain_share)
     return new if farther(present, new) > EXPERIMENTS.as_good else None

@@ -52,8 +52,9 @@ class Stretch:
 
 
 def controller_of(spec: LoopSpec, prepared: Prepared) -> Pid | None:
-    """The controller of a row, in percent and seconds, its scan that of the record if none is stated."""
-    stated = stated_controller(spec, prepared.scale.span)
+    """The controller of a row, in percent and seconds, its scan that of the record if none is stated, its gain that
+    in force at most of the record."""
+    stated = stated_controller(spec, prepared.scale.span, prepared.gain_share)
     if stated is None or spec.scan_s is not None:
         return stated
     return replace(stated, scan_s=prepared.record.dt_s)

@@ -27,6 +27,7 @@ from analyzer.loop.sample_clock import (
     without_stray_ends,
 )
 from analyzer.loop.shared_valve import Shared, half, selected
+from analyzer.loops.gain_schedule import in_force
 from analyzer.loops.spec import STATED, LoopSpec
 from identification.controller.check import runs
 from identification.controller.pi_regression import fed_back
@@ -70,7 +71,8 @@ class Prepared:
     pv_step : resolution of PV [% of span], 0 if none was found; compressed_share : share of samples on straight
     segments [-]; op_known : False if no OP was recorded; op_scaled : False if the recorded OP cannot be in percent of
     its stated or assumed range; archived_share : share of samples that a compressing historian kept [-], the smaller
-    of PV and OP; shared : the loop's part of a valve that it shares, None if it has its own valve.
+    of PV and OP; shared : the loop's part of a valve that it shares, None if it has its own valve; gain_share :
+    factor of Kp by the schedule of the gain in most of the record, 1 without a schedule [-].
     """
 
     record: LoopRecord
@@ -82,6 +84,7 @@ class Prepared:
     op_scaled: bool = True
     archived_share: float = 1.0
     shared: Shared | None = None
+    gain_share: float = 1.0
 
 
 def scale_of(spec: LoopSpec, pv: Floats) -> Scale:
@@ -139,6 +142,8 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
         not sp_known,
         feed=None if no_feed.all() else feed,
     )
+    share, gain_share = _scheduled(spec, record, scale)
+    record = replace(record, gain_share=gain_share)
     step = resolution(pv)
     masked = _masked(record, clock, series.get(spec.mode or ""), op_known, step, limits)
     if spec.gap and spec.mode is None:
@@ -150,7 +155,21 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
         saturated = masked.mask("saturated") & ~shared.idle  # an idle loop has no limit
         masks = {**masked.masks, "saturated": saturated, "idle": shared.idle}
         masked = replace(masked, masks=MappingProxyType(masks))
-    return replace(_described(masked, scale, op_known, spec.in_ma, step, limits), shared=shared)
+    described = _described(masked, scale, op_known, spec.in_ma, step, limits)
+    return replace(described, shared=shared, gain_share=share)
+
+
+def _scheduled(spec: LoopSpec, record: LoopRecord, scale: Scale) -> tuple[float, Floats | None]:
+    """Factor of Kp by the stated schedule in most of a record, and its factor at each sample over that one; None
+    where it is constant. The last OP decides on its own next move."""
+    schedule = spec.schedule
+    if schedule is None:
+        return 1.0, None
+    low, span = (scale.op_low, scale.op_span) if schedule.over == "op" else (scale.low, scale.span)
+    signal = low + span * getattr(record, schedule.over) / 100.0
+    share = schedule.share(np.concatenate((signal[:1], signal[:-1])) if schedule.over == "op" else signal)
+    most = in_force(share, ~record.bad)
+    return most, None if np.ptp(share) == 0.0 else share / most
 
 
 def _shared(

@@ -35,7 +35,7 @@ SETTINGS = (
         "error_form",
         "pv_filter_s",
     ),
-    *("op_rate", "op_lo_limit", "op_hi_limit", "sp_weight", "td_filter"),
+    *("op_rate", "op_lo_limit", "op_hi_limit", "sp_weight", "td_filter", "gain_schedule"),
 )
 """Columns that a dated row of loops.csv changes; tags, ranges and texts are those of the last row."""
 

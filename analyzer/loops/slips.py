@@ -35,7 +35,7 @@ def slip(spec: LoopSpec, found: Pid, pv_span: float | None) -> dict[str, str]:
     """
     for changed, reading in _readings(spec):
         try:
-            pid = controller(reading, pv_span)
+            pid = controller(reading, pv_span, found.gain_share)
         except InputError:  # gain in engineering units without a range
             continue
         if pid is not None and _apart(pid.kp, found.kp) <= WITHIN and _apart(pid.ti_s, found.ti_s) <= WITHIN:

@@ -17,6 +17,7 @@ from analyzer.history.files import detect_encoding
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.history.stamps import parse_time
 from analyzer.limits import HISTORY
+from analyzer.loops.gain_schedule import GainSchedule, gain_schedule
 from identification.errors import InputError
 from identification.models import ErrorForm, Form
 
@@ -57,6 +58,7 @@ class LoopSpec:
     the limits of OP and of its rate (per second) in the OP's. `kp` is 0 for integral action alone.
     `upstream` is the loop (its PV) or tag of this loop's measured load, `load` its tag if the export has it.
     `in_ma` is True if OP looks like a current of 4 to 20 mA without a stated range.
+    `gain_schedule` states a gain that depends on OP, PV or SP.
     `extra` are columns of the plant's own, `stated` the names of the filled columns. `valid_from_s` is the time from
     which the row's settings are valid [s since 1970-01-01 UTC], None if not stated; `earlier` are the
     loop's rows before it, oldest first.
@@ -98,6 +100,7 @@ class LoopSpec:
     op_hi_limit: float | None = None
     sp_weight: float = 1.0
     td_filter: float | None = None
+    gain_schedule: str = ""
     importance: float | None = None
     extra: Mapping[str, str] = field(default_factory=dict)
     stated: frozenset[str] = frozenset()
@@ -119,6 +122,11 @@ class LoopSpec:
     def op_unit(self) -> str:
         """Name of the unit of OP: percent if its range is 0 to 100, else OP, in its own unit."""
         return "%" if (self.op_lo, self.op_hi) == (0.0, 100.0) else "OP"
+
+    @property
+    def schedule(self) -> GainSchedule | None:
+        """The stated schedule of the gain."""
+        return gain_schedule(self.gain_schedule, self.loop) if self.gain_schedule else None
 
     @property
     def has_pv_range(self) -> bool:
@@ -233,6 +241,8 @@ def _spec(where: str, cells: Mapping[str, str], zone: str, day_first: bool | Non
     if VALID_FROM in filled:
         place = f"{where}, column '{VALID_FROM}'"
         given["valid_from_s"] = parse_time(filled[VALID_FROM], place, zone, day_first)
+    if "gain_schedule" in filled:
+        gain_schedule(filled["gain_schedule"], f"{where}, column 'gain_schedule'")
     extra = {name: cell for name, cell in cells.items() if name and name not in COLUMNS}
     spec = LoopSpec(**given, extra=extra, stated=frozenset(given))
     for signal, low, high in (("pv", spec.pv_lo, spec.pv_hi), ("op", spec.op_lo, spec.op_hi)):

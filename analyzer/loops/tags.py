@@ -124,7 +124,7 @@ def _missing(before: LoopSpec, after: LoopSpec, alike: Mapping[str, str]) -> lis
     ]
 
 
-def controller(spec: LoopSpec, pv_span: float | None) -> Pid | None:
+def controller(spec: LoopSpec, pv_span: float | None, gain_share: float = 1.0) -> Pid | None:
     """The stated controller in percent, seconds and ideal form; None without gain or integral time.
 
     Laws, with Kp, Ti, Td as in loops.csv and e = SP - PV:
@@ -140,6 +140,8 @@ def controller(spec: LoopSpec, pv_span: float | None) -> Pid | None:
     spec : LoopSpec
     pv_span : float or None
         Span of the PV in its own unit; needed if the gain is stated in engineering units.
+    gain_share : float
+        Factor of Kp by the schedule of the gain [-].
 
     Raises
     ------
@@ -148,17 +150,19 @@ def controller(spec: LoopSpec, pv_span: float | None) -> Pid | None:
     """
     if spec.kp is None or spec.ti is None or (spec.kp == 0 and not spec.ti):
         return None
-    kp = 100 / spec.kp if spec.gain_unit == "band" and spec.kp else spec.kp
+    kp = gain_share * (100 / spec.kp if spec.gain_unit == "band" and spec.kp else spec.kp)
     repeats = spec.ti_unit == "repeats/min"
     ti_s = math.inf if spec.ti == 0 else 60 / spec.ti if repeats else spec.ti * _unit_s(spec)
     td_s = (spec.td or 0.0) * _unit_s(spec)
     if kp == 0.0:
-        return _with_extras(Pid(0.0, ti_s / unit_ratio(spec, pv_span)), spec, pv_span)
+        alone = Pid(0.0, ti_s / (gain_share * unit_ratio(spec, pv_span)), gain_share=gain_share)
+        return _with_extras(alone, spec, pv_span)
     if spec.form is Form.PARALLEL:
-        ti_s, td_s = abs(kp) * ti_s, td_s / abs(kp)
+        ti_s, td_s = abs(kp / gain_share) * ti_s, td_s / abs(kp / gain_share)
     elif spec.form is Form.SERIES and td_s != 0 and math.isfinite(ti_s):
         kp, ti_s, td_s = kp * (1 + td_s / ti_s), ti_s + td_s, ti_s * td_s / (ti_s + td_s)
-    return _with_extras(Pid(kp * unit_ratio(spec, pv_span), ti_s, td_s), spec, pv_span)
+    pid = Pid(kp * unit_ratio(spec, pv_span), ti_s, td_s, gain_share=gain_share)
+    return _with_extras(pid, spec, pv_span)
 
 
 def _with_extras(pid: Pid, spec: LoopSpec, pv_span: float | None) -> Pid:
@@ -188,9 +192,9 @@ def as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> tuple[float, f
     nearest settings, with both times equal, are used.
     """
     if pid.kp == 0.0:
-        alone_s = pid.ti_s * unit_ratio(spec, pv_span)
+        alone_s = pid.ti_s * pid.gain_share * unit_ratio(spec, pv_span)
         return 0.0, 60 / alone_s if spec.ti_unit == "repeats/min" else alone_s / _unit_s(spec)
-    gain = pid.kp / unit_ratio(spec, pv_span)
+    gain = pid.kp / (pid.gain_share * unit_ratio(spec, pv_span))
     share = _series_share(pid, spec)
     ti_s = pid.ti_s / abs(gain) if spec.form is Form.PARALLEL else pid.ti_s * share
     kp = 100 / (gain * share) if spec.gain_unit == "band" else gain * share
@@ -201,7 +205,7 @@ def as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> tuple[float, f
 
 def derivative_as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> float:
     """Derivative time of `pid` in the unit of time and the form of `spec`; 0 for none."""
-    ratio = abs(pid.kp / unit_ratio(spec, pv_span)) if spec.form is Form.PARALLEL else 1.0
+    ratio = abs(pid.kp / (pid.gain_share * unit_ratio(spec, pv_span))) if spec.form is Form.PARALLEL else 1.0
     return pid.td_s * ratio / _series_share(pid, spec) / _unit_s(spec)
 
 
