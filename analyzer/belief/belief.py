@@ -11,9 +11,8 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from itertools import repeat
 from operator import attrgetter
-from types import UnionType
+from types import NoneType, UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -117,23 +116,29 @@ def _as_fields(value: Any) -> dict[str, Any]:
 
 def belief_of(text: str) -> Belief:
     """A stored belief; KeyError, TypeError or ValueError for one of another version."""
-    return _read_as(Belief, {"phases": []} | json.loads(text))  # type: ignore[no-any-return]
+    return _reader(Belief)({"phases": []} | json.loads(text))  # type: ignore[no-any-return]
 
 
-def _read_as(kind: Any, kept: Any) -> Any:
-    """A value from JSON converted to its declared type."""
+@cache
+def _reader(kind: Any) -> Callable[[Any], Any]:
+    """A function that converts a value from JSON to a declared type."""
     if kind in (float, int, str, bool):
-        return kept
+        return lambda kept: kept
     if hasattr(kind, "__dataclass_fields__"):
-        return kind(**{name: _read_as(of, kept[name]) for name, of in _types(kind).items()})
+        named = [(name, _reader(of)) for name, of in _types(kind).items()]
+        return lambda kept: kind(**{name: read(kept[name]) for name, read in named})
     origin, of = get_origin(kind), get_args(kind)
-    if origin is UnionType:
-        return None if kept is None else _read_as(of[0], kept)
-    if origin is tuple:
-        return tuple(map(_read_as, repeat(of[0]) if of[-1] is ... else of, kept))
     if origin is None:
-        return kind(kept)
-    return {_read_as(of[0], k): _read_as(of[1], v) for k, v in kept.items()}
+        return kind  # type: ignore[no-any-return]
+    each = [_reader(x) for x in of if x not in (NoneType, ...)]
+    first = each[0]
+    if origin is UnionType:
+        return lambda kept: None if kept is None else first(kept)
+    if origin is tuple and of[-1] is ...:
+        return lambda kept: tuple(map(first, kept))
+    if origin is tuple:
+        return lambda kept: tuple(read(x) for read, x in zip(each, kept, strict=False))
+    return lambda kept: {first(k): each[1](v) for k, v in kept.items()}
 
 
 def step(before: Belief | None, row: Row, repaired_s: Sequence[float], config: Config) -> Belief | None:

@@ -7,7 +7,7 @@ and it limits the precision of the pooled value. Sums are stored, not nights, so
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 from identification.estimation.descent import NINETY
 from identification.limits import INTERVALS
@@ -41,7 +41,8 @@ class Pool:
 
     def faded(self, share: float) -> Pool:
         """The same with the weight reduced for the nights since."""
-        return Pool(**{name: share * x for name, x in asdict(self).items()} | {"sign": self.sign})
+        sums = share * self.count, share * self.total, share * self.weight
+        return Pool(*sums, share * self.first, share * self.second, share * self.squares, self.sign)
 
     def plus(self, value: float, deviation: float, least: float, most: float) -> Pool:
         """With one more night: its value and the standard deviation of its logarithm, at least `least`; above `most`
@@ -49,9 +50,8 @@ class Pool:
         if value == 0.0 or not math.isfinite(value) or not deviation <= most:
             return self
         x, w = math.log(abs(value)), 1.0 / max(INTERVALS.wider * deviation, least) ** 2
-        more = {"count": 1.0, "total": x, "weight": w, "first": w * x, "second": w * x * x, "squares": w * w}
-        sums = {name: getattr(self, name) + term for name, term in more.items()}
-        return Pool(**sums | {"sign": math.copysign(1.0, value)})
+        sums = self.count + 1.0, self.total + x, self.weight + w, self.first + w * x, self.second + w * x * x
+        return Pool(*sums, self.squares + w * w, math.copysign(1.0, value))
 
     @property
     def pooled(self) -> Pooled | None:
