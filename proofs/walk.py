@@ -64,7 +64,7 @@ def of_tune(asked: tuple[str, ...], row: dict[str, Any], store: str) -> Iterator
             continue
         found = json.loads(text)
         yield from parted(row, found["decision"], "tune" + (" with the store" if more else ""))
-        if f"action: {row['action']}" not in found["text"]:
+        if not any(line.startswith(f"action: {row['action']}") for line in found["text"]):
             yield f"tune: its text lacks the action {row['action']}"
 
 

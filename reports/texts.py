@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import re
 import unicodedata
+from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
+from functools import cache
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -39,11 +41,19 @@ def visible_parts(part: T) -> T:
     elif isinstance(part, tuple):
         shown = tuple(map(visible_parts, part))
         shown = part if all(a is b for a, b in zip(part, shown, strict=True)) else shown
-    elif is_dataclass(part) and not isinstance(part, type):
-        held = {f.name: getattr(part, f.name) for f in fields(part)}
-        changed = {name: new for name, old in held.items() if (new := visible_parts(old)) is not old}
-        shown = replace(part, **changed) if changed else part
+    elif names := _field_names(type(shown)):
+        held = ((name, getattr(part, name)) for name in names)
+        changed = {name: new for name, old in held if (new := visible_parts(old)) is not old}
+        shown = replace(shown, **changed) if changed else part
     return shown  # type: ignore[no-any-return]
+
+
+def _names_of(kind: Any) -> tuple[str, ...]:
+    return tuple(f.name for f in fields(kind)) if is_dataclass(kind) else ()
+
+
+_field_names: Callable[[Any], tuple[str, ...]] = cache(_names_of)
+"""Names of the fields of a dataclass, none of another type."""
 
 
 def harmless(text: str) -> str:

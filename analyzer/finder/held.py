@@ -24,16 +24,24 @@ def nearness(values: Matrix, tags: Sequence[int], set_points: Sequence[int]) -> 
     return near + tracked(x, s)
 
 
-def deviation_of_mean(error: Matrix) -> Matrix:
-    """Standard errors of the means of drifting tags, shape (n, tags), from averages over long blocks."""
-    slow = blocks(error, max(len(error) // FINDER.drift_blocks, 1))
+def long_blocks(values: Matrix) -> Matrix:
+    """Averages over blocks so long that drifting tags show their drift, shape (blocks, tags)."""
+    return blocks(values, max(len(values) // FINDER.drift_blocks, 1))
+
+
+def deviation_of_mean(slow: Matrix) -> Matrix:
+    """Standard errors of the means of drifting tags from their averages over long blocks, shape (blocks, tags)."""
     return np.asarray(slow.std(axis=0) / np.sqrt(len(slow)))
 
 
-def by_chance(x: Matrix, set_points: Matrix) -> Matrix:
-    """Part of the nearness of a tag's mean to set points, shape (n, set points), that is due to chance: a distance
-    below its standard error is no further evidence."""
-    away, error = np.abs(x.mean() - set_points.mean(axis=0)), deviation_of_mean(x[:, None] - set_points)
+def by_chance(x: Matrix, level: Matrix, slow: Matrix) -> Matrix:
+    """Part of the nearness of a tag's mean to set points that is due to chance: a distance below its standard error
+    is no further evidence.
+
+    x : shape (n,); level : mean of each set point, shape (set points,); slow : averages of the tag's error at each
+    set point over long blocks, shape (blocks, set points).
+    """
+    away, error = np.abs(x.mean() - level), deviation_of_mean(slow)
     return closeness(away, x.std()) - closeness(np.maximum(away, error), x.std())
 
 

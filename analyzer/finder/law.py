@@ -8,6 +8,7 @@ compared (Haugh 1976, J. Am. Stat. Assoc. 71: cross-correlation of prewhitened s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,9 +65,44 @@ def widths(samples: int) -> tuple[int, ...]:
 def explained_share(causes: Moves, effects: Moves) -> Matrix:
     """Share of the moves of each effect explained by the law from each cause, shape (causes, effects), 0 to 1."""
     moved, summed, wanted = _unit(causes.value), _unit(causes.integral), _unit(effects.value)
-    a, b = moved.T @ wanted, summed.T @ wanted
-    c = (moved * summed).sum(axis=0)[:, None]
+    return _share(moved.T @ wanted, summed.T @ wanted, (moved * summed).sum(axis=0)[:, None])
+
+
+def explained_either_way(moves: Moves, count: int) -> Matrix:
+    """The larger of `explained_share` of the first `count` tags from each, and of each from the first `count`, shape
+    (tags, count)."""
+    value, summed = _unit(moves.value), _unit(moves.integral)
+    cross, alike = (value * summed).sum(axis=0), value.T @ value[:, :count]
+    forth = _share(alike, summed.T @ value[:, :count], cross[:, None])
+    return np.maximum(forth, _share(alike, value.T @ summed[:, :count], cross[:count]))
+
+
+def _share(a: Matrix, b: Matrix, c: Matrix) -> Matrix:
+    """Share that a move and an integral explain: correlation of the effect with each, and of both."""
     return np.clip((a**2 + b**2 - 2 * a * b * c) / np.maximum(1 - c**2, ALIKE), 0.0, 1.0)
+
+
+def explained_by_errors(moves: Moves, set_points: Sequence[int], effects: Sequence[int]) -> Matrix:
+    """Share of the moves of effects explained by the law from the error of each tag at that effect's set point, shape
+    (tags, effects): `explained_share` of the differences, from products of the tags alone."""
+    value, summed = moves.value, moves.integral
+    wanted = _unit(value[:, list(effects)])
+    sp_value, sp_summed = value[:, list(set_points)], summed[:, list(set_points)]
+
+    a = value.T @ wanted - (sp_value * wanted).sum(axis=0)
+    b = summed.T @ wanted - (sp_summed * wanted).sum(axis=0)
+    cross = (value * summed).sum(axis=0)[:, None] + (sp_value * sp_summed).sum(axis=0)
+    cross = cross - value.T @ sp_summed - summed.T @ sp_value
+    one, other = _size(value, sp_value), _size(summed, sp_summed)
+    return _share(a / one, b / other, cross / (one * other))
+
+
+def _size(x: Matrix, y: Matrix) -> Matrix:
+    """Lengths of the differences of the columns of x and y, shape (columns of x, columns of y), inf where they are
+    rounding."""
+    both = (x**2).sum(axis=0)[:, None] + (y**2).sum(axis=0)
+    squared = both - 2.0 * x.T @ y
+    return np.where(squared > TINY * both, np.sqrt(np.maximum(squared, 0.0)), np.inf)
 
 
 def shared_noise(causes: Moves, effects: Moves) -> Matrix:

@@ -18,10 +18,11 @@ from analyzer.finder.held import (
     closeness,
     law_of,
     limited,
+    long_blocks,
     nearness,
     resting_level,
 )
-from analyzer.finder.law import Matrix, Moves, explained_share, widths
+from analyzer.finder.law import Matrix, explained_by_errors, widths
 from analyzer.finder.pair import FoundPair, with_settings
 from analyzer.finder.scores import Scores, scored
 from analyzer.finder.way import acts, freer, pv_and_sp, resolved, towards
@@ -50,7 +51,7 @@ def found_pairs(values: Matrix) -> list[FoundPair]:
         )
         for c, j in chosen
     ]
-    return _with_set_points(bag, pairs)
+    return _with_set_points(bag, scores, pairs)
 
 
 def _taken(
@@ -126,7 +127,7 @@ def _enough(weight: NDArray[Any], noise: NDArray[Any], asked: Matrix) -> Matrix:
     return np.asarray(np.minimum(weight / asked, noise / FINDER.least_noise))
 
 
-def _with_set_points(bag: Bag, pairs: Sequence[FoundPair]) -> list[FoundPair]:
+def _with_set_points(bag: Bag, scores: Scores, pairs: Sequence[FoundPair]) -> list[FoundPair]:
     """The pairs in the direction with more evidence, each with the set point of most evidence, one-to-one: the one in
     its law, or one at the level of a tag with the tag's slow moves."""
     from scipy.optimize import linear_sum_assignment  # takes half a second; needed only by the finder
@@ -136,43 +137,65 @@ def _with_set_points(bag: Bag, pairs: Sequence[FoundPair]) -> list[FoundPair]:
     taken = {p.sp for p in pairs if p.sp is not None}
     free = [k for k in (*bag.still, *bag.moving) if k not in taken and k not in bag.live]
     tags = sorted({k for p in pairs for k in (p.pv, p.op)})
-    known = nearness(bag.values, tags, free)
+    known, level, slow = (
+        nearness(bag.values, tags, free),
+        bag.values[:, free].mean(axis=0),
+        long_blocks(bag.values),
+    )
     place = {tag: k for k, tag in enumerate(tags)}
-    near = np.array([_near_both(bag, p, free, known[[place[p.pv], place[p.op]]]) for p in pairs])
+    near = np.array([_near_both(bag, p, free, known[[place[p.pv], place[p.op]]], level, slow) for p in pairs])
     alone = [i for i, p in enumerate(pairs) if p.sp is None]
     gain = np.array([min(pairs[i].weight / pairs[i].asked, 1.0) * _gain(pairs[i], near[i]) for i in alone])
     rows, columns = linear_sum_assignment(gain.reshape(len(alone), len(free)), maximize=True)
     held = {alone[i]: int(k) for i, k in zip(rows, columns, strict=True)}
     out = [_with_set_point(bag, p, near[i], held.get(i), free) for i, p in enumerate(pairs)]
-    out = [replace(p, other=_other_pv(bag, p, out)) for p in out]
+    out = [replace(p, other=other) for p, other in zip(out, _other_pvs(bag, scores, out), strict=True)]
     return sorted((with_settings(bag, p) for p in out), key=lambda p: -p.weight)
 
 
-def _other_pv(bag: Bag, pair: FoundPair, pairs: Sequence[FoundPair]) -> float:
-    """The largest share of OP explained by another tag with a moving set point, in blocks of the pair's width: a tag
-    that only follows SP is also controlled there. Tags equal to PV or OP, or following OP, are excluded."""
-    if pair.sp is None or pair.sp in bag.still:
-        return 0.0
+def _other_pvs(bag: Bag, scores: Scores, pairs: Sequence[FoundPair]) -> list[float]:
+    """Of each pair the largest share of OP explained by another tag with its moving set point, in blocks of its
+    width: a tag that only follows SP is also controlled there."""
+    out, place = [0.0] * len(pairs), {c[0]: k for k, c in enumerate(scores.causes) if len(c) == 1}
+    asked = [i for i, p in enumerate(pairs) if p.sp is not None and p.sp not in bag.still]
+    for width in {pairs[i].width for i in asked}:
+        at = [i for i in asked if pairs[i].width == width]
+        columns = [
+            [place[bag.same[tag]] for tag in tags]
+            for tags in zip(*((pairs[i].sp, pairs[i].op) for i in at), strict=True)
+        ]
+        law = explained_by_errors(scores.moves[scores.widths.index(width)].of_tags(len(place)), *columns)
+        for i, own in zip(at, law[: len(bag.live)].T, strict=True):
+            out[i] = _largest_of_others(bag, pairs[i], pairs, own)
+    return out
+
+
+def _largest_of_others(bag: Bag, pair: FoundPair, pairs: Sequence[FoundPair], law: Matrix) -> float:
+    """The largest of the shares of the live tags, shape (tags,), without those of the pair, those equal to PV or OP,
+    and those following OP."""
     slaves = {p.pv for p in pairs if p.sp is not None and bag.same[p.sp] == bag.same[pair.op]}
-    tags = [k for k in bag.live if k not in {pair.pv, pair.op, bag.same[pair.sp], *slaves}]
-    error = bag.values[:, tags] - bag.values[:, [pair.sp]]
-    op = Moves.plain(bag.values[:, [pair.op]], pair.width)
-    law = explained_share(Moves.plain(error, pair.width), op)[:, 0]
+    none = {pair.pv, pair.op, bag.same[pair.sp], *slaves}
     for k in np.argsort(-law):
-        if not alike(bag.values[:, [pair.pv, pair.op, tags[k]]])[2, :2].any():
+        tag = bag.live[k]
+        if tag not in none and not alike(bag.values[:, [pair.pv, pair.op, tag]])[2, :2].any():
             return float(law[k])
     return 0.0
 
 
-def _near_both(bag: Bag, pair: FoundPair, free: Sequence[int], known: Matrix) -> Matrix:
+def _near_both(
+    bag: Bag, pair: FoundPair, free: Sequence[int], known: Matrix, level: Matrix, slow: Matrix
+) -> Matrix:
     """Evidence for each free set point as that of PV, and as that of OP, shape (2, set points): what is `known` of
-    both by their means and slow moves, or the level at which the other is constant by the law."""
-    near, level, still = known.copy(), bag.values[:, free].mean(axis=0), np.isin(free, bag.still)
+    both by their means and slow moves, or the level at which the other is constant by the law.
+
+    level : mean of each free set point; slow : averages of all tags over long blocks, shape (blocks, tags).
+    """
+    near, still = known.copy(), np.isin(free, bag.still)
     for at, (tag, other) in enumerate(((pair.pv, pair.op), (pair.op, pair.pv))):
         x = bag.values[:, tag]
         rest, error = resting_level(x, bag.values[:, other], pair.told_width)
         by_law = closeness(np.maximum(np.abs(level - rest), error), x.std())
-        near[at] -= by_chance(x, bag.values[:, free])
+        near[at] -= by_chance(x, level, slow[:, [tag]] - slow[:, free])
         near[at, still] = np.maximum(near[at], by_law)[still]
         if free:
             near[at, np.argmax(near[at])] += apart(x, level, near[at])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from analyzer.finder.bag import Bag, Cause, errors, held_at
 from analyzer.finder.held import alike
-from analyzer.finder.law import Moves, explained_share, shared_noise, widths
+from analyzer.finder.law import Moves, explained_either_way, shared_noise, widths
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ def scored(bag: Bag) -> Scores:
     law = np.empty((len(each), len(causes), count), dtype=np.float32)
     noise = np.empty_like(law)
     for k, m in enumerate(moves):
-        law[k] = np.maximum(explained_share(m, m.of_tags(count)), explained_share(m.of_tags(count), m).T)
+        law[k] = explained_either_way(m, count)
         noise[k] = shared_noise(m, m.of_tags(count))
     one = alike(bag.values[:, bag.live])
     place = {tag: k for k, tag in enumerate(bag.live)}

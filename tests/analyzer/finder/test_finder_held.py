@@ -7,7 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analyzer.finder.held import answers, apart, closeness, deviation_of_mean, nearness, resting_level
+from analyzer.finder.held import (
+    answers,
+    apart,
+    closeness,
+    deviation_of_mean,
+    long_blocks,
+    nearness,
+    resting_level,
+)
 from analyzer.finder.pair import FoundPair
 from analyzer.finder.pairs import found_pairs
 from analyzer.limits import FINDER
@@ -92,7 +100,9 @@ def test_a_mean_that_drifts_is_known_to_its_standard_error() -> None:
     x[0] = 0.0
     for k in range(1, n):
         x[k] = a * x[k - 1] + rng.normal()
-    assert deviation_of_mean(x[:, None])[0] == pytest.approx(1.0 / (1.0 - a) / np.sqrt(n), rel=1 / 3)
+    assert deviation_of_mean(long_blocks(x[:, None]))[0] == pytest.approx(
+        1.0 / (1.0 - a) / np.sqrt(n), rel=1 / 3
+    )
 
 
 @pytest.mark.parametrize(("spread", "exact"), [(0.5, False), (5.0, True), (50.0, False)])
