@@ -17,7 +17,7 @@ from analyzer.finder.clock import Sampled, sampled
 from analyzer.finder.pair import FoundPair, known_pair
 from analyzer.finder.pairs import found_pairs
 from analyzer.history.export import Export
-from analyzer.limits import FINDER
+from analyzer.limits import FINDER, HISTORY
 from analyzer.loops.spec import COLUMNS as STATED_COLUMNS
 from analyzer.loops.spec import RECORDED, ROLES, STATED, LoopSpec
 from analyzer.loops.tags import find_loops, match
@@ -55,12 +55,14 @@ MOST_NAMES = 5
 @dataclass(frozen=True, slots=True)
 class Row:
     """A loop of the draft: its row, its source ('names', 'data', 'stated', or 'recorded' if the loop is stated and
-    its settings are identified from data), its confidence [%], and the evidence for it."""
+    its settings are identified from data), its confidence [%], the evidence for it, and whether its range of OP is
+    known: not where OP looks like a current."""
 
     spec: LoopSpec
     found_by: str
     sure_pct: float
     says: str = ""
+    op_ranged: bool = True
 
     @property
     def sure(self) -> bool:
@@ -99,7 +101,26 @@ def draft(
     rows += [_named(held, spec) for spec in whole]
     found = by_data(held.of(free))
     rows += _joined(found, [spec for spec in named if spec.op is None])
-    return rows
+    return _without_ranges_of_currents(held, rows)
+
+
+def _without_ranges_of_currents(held: Sampled, rows: Sequence[Row]) -> list[Row]:
+    """The rows, without a range of OP if the OPs of all found loops lie within a signal of 4 to 20 mA, as `run` takes
+    them (opened.in_milliamperes): a draft that states 0 to 100 would make it percent."""
+    own = {row.spec.loop for row in rows if row.found_by in ("names", "data") and row.spec.op in held.tags}
+    found = [row for row in rows if row.spec.loop in own]
+    if len(found) < 2 or not len(held.values):
+        return list(rows)
+    outputs = held.of([str(row.spec.op) for row in found]).values
+    if not (outputs.min() >= HISTORY.ma_low and outputs.max() <= HISTORY.ma_high):
+        return list(rows)
+    said = "its values lie between 4 and 20, like mA: state op_lo and op_hi"
+    return [
+        replace(row, says=f"{row.says}; {row.spec.op}: {said}", op_ranged=False)
+        if row.spec.loop in own
+        else row
+        for row in rows
+    ]
 
 
 def _named(held: Sampled, spec: LoopSpec) -> Row:
@@ -277,6 +298,8 @@ def _cell(row: Row, column: str) -> str:
     }
     if column in own:
         return own[column]
+    if column in ("op_lo", "op_hi") and not row.op_ranged:
+        return ""
     value = getattr(row.spec, column)
     settings = column in ("kp", "ti", "gain_unit", "ti_unit")
     seen = row.spec.kp is not None if settings else row.spec.has_pv_range or column in ("type", "master")

@@ -49,6 +49,23 @@ def test_the_draft_is_read_as_loops_csv(bag: Path, tmp_path: Path) -> None:
     assert found.extra["ranges"] == "recorded"
 
 
+def test_a_draft_states_no_range_of_an_op_in_milliamperes(tmp_path: Path) -> None:
+    """Where all OPs lie within a signal of 4 to 20 mA the draft leaves their range open, and the commands that read
+    it ask for it; stated as 0 to 100 it would be percent."""
+    table = pd.DataFrame({"timestamp": pd.date_range("2026-03-02", periods=6000, freq="s")})
+    for name, gain in (("TIC7", 0.5), ("TIC8", 0.4)):
+        loop = pi_loop(2.0, 60.0, gain, seed=int(name[-1]))
+        loop[:, 2] = 12.0 + 6.0 * (loop[:, 2] - loop[:, 2].mean()) / np.ptp(loop[:, 2])
+        table[[f"{name}.SP", f"{name}.PV", f"{name}.OP"]] = loop.round(4)
+    table.to_csv(tmp_path / "export.csv", index=False)
+    triage("loops", tmp_path / "export.csv", "--out", tmp_path / "loops.csv")
+    specs = read_loops(tmp_path / "loops.csv")
+    assert [s.stated & {"op_lo", "op_hi"} for s in specs] == [set(), set()]
+    assert all("like mA: state op_lo and op_hi" in s.extra["says"] for s in specs)
+    said = triage("check", tmp_path / "export.csv", "--loops", tmp_path / "loops.csv").output
+    assert "OP of 2 loops lies between 4 and 20, like mA" in said
+
+
 def test_settings_that_are_not_stated_are_drafted_as_recorded(bag: Path, tmp_path: Path) -> None:
     """A stated loop without kp and ti gets those that its data show, and keeps all that its row states."""
     (tmp_path / "stated.csv").write_text("loop,description,pv_lo,pv_hi,gap\nTIC7,column's foot,-50,150,0.5\n")
