@@ -22,7 +22,7 @@ from analyzer.loops.slips import slip
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import sentences
-from analyzer.words.units import beside_settings, number, of_controller
+from analyzer.words.units import beside_settings, number, of_controller, schedule_shown
 from identification.estimation.between_samples import scans_per_row
 from identification.estimation.window import Fit
 from identification.limits import FIT
@@ -134,7 +134,10 @@ def with_controller_told(
 ) -> Assessment:
     """The assessment with a note on properties of the controller in the record that loops.csv does not state."""
     if found.scheduled_over is not None:
-        said = SAID["scheduled"].format(found.scheduled_over.upper())
+        said = SAID["scheduled"].format(found.scheduled_over.over.upper())
+        if stated is not None and found.scheduled_over.edge is not None:
+            columns = schedule_shown(found.scheduled_over, stated, spec, prepared.scale)
+            said = f"{said}; the record shows {columns}"
         return replace(found, notes=(*found.notes, said))
     if found.shown is None:
         return found
@@ -220,7 +223,7 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
     if controller is None:
         return _or_repair(found.verdict, Advice(Action.CHECK_SETTINGS, SAID["not_stated"]))
     if found.scheduled_over is not None:
-        said = SAID["scheduled"].format(found.scheduled_over.upper())
+        said = SAID["scheduled"].format(found.scheduled_over.over.upper())
         return _or_repair(found.verdict, Advice(Action.NONE, said))
     if controller.kp == 0.0:
         return _or_repair(found.verdict, Advice(Action.NONE, SAID["integral_alone"]))

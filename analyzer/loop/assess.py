@@ -37,6 +37,7 @@ from analyzer.loop.ringing import same_period
 from analyzer.loop.setpoint_moves import Move, moves
 from analyzer.loop.shared_valve import Shared
 from analyzer.plantwide.wave import Wave, waves_of
+from identification.controller.gain_pieces import ScheduledGain
 from identification.errors import NotAssessedError
 from identification.models import Pid
 from identification.record import LoopRecord
@@ -74,7 +75,7 @@ class Assessment:
     verdict: Verdict
     settings: Pid | None = None
     shown: Pid | None = None
-    scheduled_over: str | None = None
+    scheduled_over: ScheduledGain | None = None
     harris: float | None = None
     moves: tuple[Move, ...] = ()
     waves: tuple[Wave, ...] = ()

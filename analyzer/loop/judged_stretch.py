@@ -24,6 +24,7 @@ from analyzer.loops.changes import TuningChange, settings_before
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller as stated_controller
 from identification.controller.check import runs
+from identification.controller.gain_pieces import ScheduledGain, gain_pieces
 from identification.controller.law_comparison import LawsCompared, best_of, compare_laws, scheduled_over
 from identification.controller.pid_regression import clamped, fit_pi
 from identification.models import Pid
@@ -119,13 +120,13 @@ class Shown:
 
     other, settings that differ from the stated ones, None if they agree or the record is not sufficient; beside, the
     stated ones with the controller's further terms, or the recorded ones if none are stated, None if the record shows
-    no more than is stated; scheduled_over, the signal, 'op', 'pv' or 'sp', that schedules the gain, so that the
+    no more than is stated; scheduled_over, the signal, OP, PV or SP, that schedules the gain, so that the
     stated gain is valid only in a part of its range, None if there is none.
     """
 
     other: Pid | None = None
     beside: Pid | None = None
-    scheduled_over: str | None = None
+    scheduled_over: ScheduledGain | None = None
 
 
 def shown(record: LoopRecord, stated: Pid | None, scale_s: float, limits: SettingsLimits) -> Shown:
@@ -150,7 +151,7 @@ def shown(record: LoopRecord, stated: Pid | None, scale_s: float, limits: Settin
             beside = None if seen.found == stated else seen.found
             return Shown(beside=beside) if best is stated else Shown(best)
         if _plainly(seen, stated, part, limits):
-            over = scheduled_over(part, scale_s, stated)
+            over = gain_pieces(record, stated) or scheduled_over(part, scale_s, stated)
             return Shown(seen.found) if over is None else Shown(scheduled_over=over)
         form = _of_another_form(part, stated, scale_s, limits)
         if form is not None:

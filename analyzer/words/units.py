@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from analyzer.columns import Row
 
 if TYPE_CHECKING:
+    from analyzer.loop.quality import Scale
     from analyzer.loops.spec import LoopSpec
+    from identification.controller.gain_pieces import ScheduledGain
     from identification.models import Pid
 
 
@@ -104,6 +107,19 @@ def beside_settings(stated: Pid, shown: Pid, spec: LoopSpec, pv_span: float) -> 
     )
     form = [] if shown.error_form is stated.error_form else [f"error_form {shown.error_form}"]
     return ", ".join([*form, *(f"{name} {number(x)}" for name, was, now, x in columns if was != now)])
+
+
+def schedule_shown(seen: ScheduledGain, stated: Pid, spec: LoopSpec, scale: Scale) -> str:
+    """The columns of loops.csv that state a schedule with an edge, as the record shows it."""
+    from analyzer.loops.tags import as_stated
+
+    assert seen.edge is not None
+    low, span = (scale.op_low, scale.op_span) if seen.over == "op" else (scale.low, scale.span)
+    columns = f"gain_schedule {seen.over} {number(low + seen.edge * span / 100.0)}:{number(seen.above / seen.below)}"
+    if abs(seen.below - 1.0) <= abs(seen.above - 1.0):
+        return columns
+    kp, _ = as_stated(replace(stated, kp=seen.below * stated.kp), spec, scale.span)
+    return f"kp {number(kp)}, {columns}"
 
 
 def settings_changed(old: LoopSpec, new: LoopSpec, clock: str) -> str:

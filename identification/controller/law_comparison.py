@@ -9,6 +9,7 @@ from itertools import chain
 
 import numpy as np
 
+from identification.controller.gain_pieces import ScheduledGain
 from identification.controller.law_ways import (
     STRAIGHT,
     Look,
@@ -92,9 +93,9 @@ def _way_needed(seen: Seen, before: Seen | None, stated: Pid) -> Way:
     return seen.way if bent else replace(seen.way, shape=own)
 
 
-def scheduled_over(record: LoopRecord, period_s: float, stated: Pid) -> str | None:
-    """The signal, 'op', 'pv' or 'sp', in a part of whose range the stated law reproduces OP; None if there is no such
-    part. A gain scheduled over the signal has the stated value only there.
+def scheduled_over(record: LoopRecord, period_s: float, stated: Pid) -> ScheduledGain | None:
+    """The signal, OP, PV or SP, in a part of whose range the stated law reproduces OP; None if there is no such part.
+    A gain scheduled over the signal has the stated value only there.
 
     A part counts if the integral is visible in it, on increments of half an integral time.
     """
@@ -108,7 +109,7 @@ def scheduled_over(record: LoopRecord, period_s: float, stated: Pid) -> str | No
             if seen is None or (stated.ki and max(seen.moves) * record.dt_s < 0.5 * stated.ti_s):
                 continue
             if seen.does(gains):
-                return name
+                return ScheduledGain(name)
     return None
 
 

@@ -12,8 +12,10 @@ from analyzer.loop.quality import prepare
 from analyzer.loops.gain_schedule import gain_schedule, in_force
 from analyzer.loops.spec import LoopSpec, read_loops
 from analyzer.loops.tags import as_stated, controller, derivative_as_stated, match
+from identification.controller.gain_pieces import gain_pieces
 from identification.errors import InputError
-from identification.models import Form
+from identification.models import Form, Pid
+from identification.record import LoopRecord
 from proofs.controllers_plant import controlled
 
 UPPER = 0.4
@@ -109,3 +111,35 @@ def test_a_record_in_one_piece_has_one_gain(scheduled):
     _, seen = scheduled
     p, *_ = seen(gain_schedule="pv 500:0.1")
     assert (p.gain_share, p.record.gain_share) == (1.0, None)
+
+
+@pytest.mark.parametrize("seed", [5, 6, 7, 8])
+@pytest.mark.parametrize("upper", [False, True])
+def test_an_unstated_schedule_is_shown_with_its_edge(seed, upper):
+    """Of a law whose gain is scheduled over PV, with only the gain of one side stated, edge and factor are found. The
+    law is made from its definition, with no code of the package."""
+    rng = np.random.default_rng(seed)
+    n, edge, factor = 20_000, 52.0, 0.5
+    pv = 50.0 + np.cumsum(rng.normal(0.0, 0.05, n)) % 8.0 + rng.normal(0.0, 0.2, n)
+    error = 51.0 - pv
+    moves = 0.8 * np.diff(error, prepend=error[0]) + 0.8 / 30.0 * error
+    op = 50.0 + np.cumsum(np.where(pv < edge, 1.0, factor) * moves) * 0.05
+    record = LoopRecord("L", 0.0, 1.0, np.full(n, 51.0), pv, op, np.zeros(n, bool))
+    found = gain_pieces(record, Pid(0.8 * 0.05 * (factor if upper else 1.0), 30.0))
+    assert found is not None
+    assert (found.over, found.edge) == ("pv", pytest.approx(edge, abs=0.05))
+    assert found.above / found.below == pytest.approx(factor, rel=0.02)
+    assert (found.above if upper else found.below) == pytest.approx(1.0, rel=0.02)
+
+
+@pytest.mark.parametrize("wrong", [1.0, 0.3, 3.0])
+def test_one_gain_has_no_edge(wrong):
+    """A law with one gain, stated rightly or wrongly, is no schedule, and noise is none."""
+    rng = np.random.default_rng(3)
+    pv = 50.0 + np.cumsum(rng.normal(0.0, 0.05, 20_000)) % 8.0
+    error = 51.0 - pv
+    op = 50.0 + 0.04 * error + 0.04 / 30.0 * np.cumsum(error)
+    record = LoopRecord("L", 0.0, 1.0, np.full(pv.size, 51.0), pv, op, np.zeros(pv.size, bool))
+    assert gain_pieces(record, Pid(wrong * 0.04, 30.0)) is None
+    noise = LoopRecord("L", 0.0, 1.0, record.sp, pv, rng.normal(50.0, 1.0, pv.size), record.bad)
+    assert gain_pieces(noise, Pid(0.04, 30.0)) is None
