@@ -12,6 +12,7 @@ from analyzer.loop.quality import prepare
 from analyzer.loops.gain_schedule import gain_schedule, in_force
 from analyzer.loops.spec import LoopSpec, read_loops
 from analyzer.loops.tags import as_stated, controller, derivative_as_stated, match
+from analyzer.night.chunk import assess_loop
 from identification.controller.gain_pieces import gain_pieces
 from identification.errors import InputError
 from identification.models import Form, Pid
@@ -143,3 +144,20 @@ def test_one_gain_has_no_edge(wrong):
     assert gain_pieces(record, Pid(wrong * 0.04, 30.0)) is None
     noise = LoopRecord("L", 0.0, 1.0, record.sp, pv, rng.normal(50.0, 1.0, pv.size), record.bad)
     assert gain_pieces(noise, Pid(0.04, 30.0)) is None
+
+
+def test_new_settings_under_a_schedule_are_those_of_its_gain(tmp_path):
+    """A loop that always works in a piece of 0.4 times Kp gets the same new settings as one stated with that gain;
+    the new Kp is stated as the old one is: over 0.4."""
+    c = controlled("PI", "healthy", 17, 0.5, 5.0)
+    c.trends("L", 1).to_parquet(tmp_path / "trends.parquet")
+    export, config = open_export([tmp_path / "trends.parquet"]), Config()
+
+    def advised(**row):
+        spec = match((LoopSpec("L", **{**c.row, **row}),), export.tags)[0][0]
+        return assess_loop(spec, prepare(spec, export.read(spec.tags), config.quality), config)[1]
+
+    plain = advised()
+    under = advised(kp=c.row["kp"] / UPPER, gain_schedule=f"op -10:{UPPER}")
+    assert plain.kp_new is not None
+    assert (under.kp_new, under.ti_new) == pytest.approx((plain.kp_new / UPPER, plain.ti_new), rel=0.005)

@@ -258,8 +258,9 @@ def test_an_explanation_adds_to_the_night(loop: str, walked: Walked) -> None:
         assert "within its limits" in told["reason"]
         return
     text = "\n".join(answer_lines(told))
-    assert text.startswith(f"The night of 2026-03-02 found: cause {row['cause']}")
-    held = [told["fit"][k]["held_out"]["rmse"] for k in ("baseline", "explained")]
+    assert text.startswith(f"The night of 2026-03-02 found: cause {row['cause'] or 'not reported'}")
+    fit, banded = told["fit"], told["fit"].get("in_band")
+    held = [(banded[k] if banded else fit[k]["held_out"])["rmse"] for k in ("baseline", "explained")]
     if told["moved"] and held[1] >= held[0]:
         assert "no improvement of the model is claimed" in flat(text)
         assert "improved model" not in text
