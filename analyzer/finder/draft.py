@@ -16,6 +16,7 @@ from analyzer.finder.beside import may_be_mode, modes, positions
 from analyzer.finder.clock import Sampled, sampled
 from analyzer.finder.pair import FoundPair, known_pair
 from analyzer.finder.pairs import found_pairs
+from analyzer.finder.relations import at_rest, equal_at_times, halves, output_behind, ratio_to, scan_of
 from analyzer.history.export import Export
 from analyzer.limits import FINDER, HISTORY
 from analyzer.loops.spec import COLUMNS as STATED_COLUMNS
@@ -27,6 +28,7 @@ COLUMNS = (
         "loop",
         "type",
         "master",
+        "ratio_of",
         *ROLES,
         "pv_lo",
         "pv_hi",
@@ -101,7 +103,51 @@ def draft(
     rows += [_named(held, spec) for spec in whole]
     found = by_data(held.of(free))
     rows += _joined(found, [spec for spec in named if spec.op is None])
-    return _without_ranges_of_currents(held, rows)
+    return _without_ranges_of_currents(held, _with_relations(held, rows))
+
+
+def _with_relations(held: Sampled, rows: Sequence[Row]) -> list[Row]:
+    """The rows with what the data show of each found loop beyond its own tags: a ratio, the scan, its rests, and
+    candidates for a valve that it shares."""
+    own = [k for k, row in enumerate(rows) if row.found_by in ("names", "data") and row.sure]
+    own = [k for k in own if rows[k].spec.pv in held.tags and rows[k].spec.op in held.tags]
+    if not own or len(held.values) < FINDER.least_blocks:
+        return list(rows)
+    specs = [rows[k].spec for k in own]
+    pvs, ops = (held.of([str(getattr(s, role)) for s in specs]).values for role in ("pv", "op"))
+    taken = {tag for s in specs for tag in s.tags}
+    others = held.of([tag for tag in held.tags if tag not in taken])
+    halves_of, out = halves(ops, others.values), list(rows)
+    selects: dict[int, list[int]] = {}
+    for i, j in equal_at_times(ops):
+        selects.setdefault(i, []).append(j)
+        selects.setdefault(j, []).append(i)
+    for i, k in enumerate(own):
+        said = [rows[k].says]
+        if selects.get(i):
+            said.append(f"OP at times that of {', '.join(specs[j].loop for j in selects[i])}: override_with?")
+        if halves_of.get(i):
+            said.append(f"{', '.join(others.tags[j] for j in halves_of[i])}: a half of its split range?")
+        rests = at_rest(ops[:, i])
+        if rests >= FINDER.limited_share:
+            said.append(f"OP rests {100 * rests:.0f} % of the time: in manual, or at a limit")
+        scan = scan_of(ops[:, i])
+        if scan is not None:
+            said.append(f"OP moves every {scan * held.dt_s:g} s: scan_s?")
+        out[k] = replace(rows[k], spec=_led(held, specs, i, pvs, ops), says="; ".join(said))
+    return out
+
+
+def _led(held: Sampled, specs: Sequence[LoopSpec], i: int, pvs: np.ndarray, ops: np.ndarray) -> LoopSpec:
+    """The row of a loop with its master, or the loop to whose PV its set point keeps a ratio."""
+    spec = specs[i]
+    if spec.sp not in held.tags or spec.master:
+        return spec
+    sp, others = held.of([str(spec.sp)]).values[:, 0], [k for k in range(len(specs)) if k != i]
+    master, leader = output_behind(sp, ops[:, others]), ratio_to(sp, pvs[:, others])
+    if master is not None:
+        return replace(spec, master=specs[others[master]].loop)
+    return spec if leader is None else replace(spec, ratio_of=specs[others[leader]].loop)
 
 
 def _without_ranges_of_currents(held: Sampled, rows: Sequence[Row]) -> list[Row]:
@@ -302,7 +348,11 @@ def _cell(row: Row, column: str) -> str:
         return ""
     value = getattr(row.spec, column)
     settings = column in ("kp", "ti", "gain_unit", "ti_unit")
-    seen = row.spec.kp is not None if settings else row.spec.has_pv_range or column in ("type", "master")
+    seen = (
+        row.spec.kp is not None
+        if settings
+        else row.spec.has_pv_range or column in ("type", "master", "ratio_of")
+    )
     spoken = (
         (row.found_by not in ("stated", RECORDED) and seen)
         or column in row.spec.stated

@@ -1,0 +1,64 @@
+"""Relations between loops of a draft, on signals made from their definitions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analyzer.finder.relations import at_rest, equal_at_times, halves, output_behind, ratio_to, scan_of
+
+
+@pytest.fixture(scope="module")
+def walks():
+    """Six tags that wander, shape (6000, 6)."""
+    return 50.0 + np.cumsum(np.random.default_rng(5).normal(0.0, 0.3, (6000, 6)), axis=0)
+
+
+def test_a_ratio_to_a_pv_is_found_and_a_common_drift_is_none(walks):
+    """0.4 times a PV is in ratio to it, to four digits; a set point that wanders by itself is in ratio to none."""
+    assert ratio_to(np.round(0.4 * walks[:, 2], 3), walks) == 2
+    assert ratio_to(walks[:, 0], walks[:, 1:]) is None
+    assert ratio_to(np.full(6000, 7.0), walks) is None
+
+
+def test_a_set_point_that_is_an_output_in_another_scale_has_a_master(walks):
+    """The set point of a slave is its master's output in its own unit; a rounded one still is."""
+    assert output_behind(np.round(20.0 + 1.5 * walks[:, 3], 2), walks) == 3
+    assert output_behind(walks[:, 0], walks[:, 1:]) is None
+    twins = np.column_stack([walks[:, 3], walks[:, 3] + 0.01 * walks[:, 1]])
+    assert output_behind(walks[:, 3], twins) is None
+
+
+@pytest.mark.parametrize("scan", [1, 2, 5, 30])
+def test_the_scan_is_the_spacing_of_the_moves(walks, scan):
+    """An output held for whole scans shows the scan, one that moves at any sample does not."""
+    held = np.repeat(walks[::scan, 0], scan)[:6000].round(1)
+    assert scan_of(held) == (scan if scan > 1 else None)
+
+
+def test_an_output_at_rest_for_a_third_rests_for_a_third(walks):
+    """The time in manual is the share of long rests; an output that always moves has none, a constant is at rest."""
+    op = walks[:, 1].copy()
+    assert at_rest(op) == 0.0
+    op[1000:3000] = op[1000]
+    assert at_rest(op) == pytest.approx(1 / 3, abs=0.01)
+    assert at_rest(np.full(6000, 5.0)) == 1.0
+
+
+def test_two_controllers_of_one_valve_are_equal_at_times(walks):
+    """The lower of two outputs is the output of both where each tracks it; outputs that only rest at 0 together are
+    no candidates, and neither are two independent ones."""
+    a, b = walks[:, 0], walks[:, 1]
+    tracking = np.where(a < b, a, b)
+    outputs = np.column_stack(
+        [a, tracking, walks[:, 3], np.maximum(walks[:, 4] - 50, 0), np.maximum(walks[:, 5] - 50, 0)]
+    )
+    assert equal_at_times(outputs) == [(0, 1)]
+
+
+def test_halves_of_a_split_range_follow_their_controller(walks):
+    """A half moves with OP above 50 % and rests below; a tag that rests at its own limits is none."""
+    op = np.clip(walks[:, 0], 0, 100)
+    middle = float(np.median(op))
+    half, other = np.maximum(op - middle, 0.0) * 2.0, np.maximum(walks[:, 4] - np.median(walks[:, 4]), 0.0)
+    assert halves(np.column_stack([op, walks[:, 2]]), np.column_stack([half, other])) == {0: [0]}
