@@ -32,6 +32,7 @@ COLUMNS = (
         *ROLES,
         "pv_lo",
         "pv_hi",
+        "pv_unit",
         "op_lo",
         "op_hi",
         "kp",
@@ -47,6 +48,7 @@ HEAD = (
 )
 
 
+UNIT = re.compile(r"[(\[]\s*([^()\[\]\d][^()\[\]]{0,14}?)\s*[)\]]\s*$")
 ISA_NAME = re.compile(rf"(?<![A-Za-z])([{''.join(STATED['types'])}])(?:D?[IRT]?C[AV]?|[IT]{{1,2}})[-_ ]?\d")
 WITHIN_PCT = 5.0
 """Tolerance of an OP in percent below 0 and above 100."""
@@ -179,7 +181,8 @@ def _named(held: Sampled, spec: LoopSpec) -> Row:
     pair = known_pair(own.values)
     shown = _shown(own, pair)
     law = f"; {_law(own, pair)}" if pair.told >= FINDER.law_told and pair.kp else ""
-    return Row(replace(spec, type=type_of(spec.loop), **shown), "names", FINDER.surest_pct, said + law)
+    found = replace(spec, type=type_of(spec.loop), pv_unit=unit_of(str(spec.pv)), **shown)
+    return Row(found, "names", FINDER.surest_pct, said + law)
 
 
 def _stated(held: Sampled, spec: LoopSpec, with_tags: LoopSpec | None) -> Row:
@@ -242,6 +245,7 @@ def _row(held: Sampled, pair: FoundPair, outputs: dict[bytes, str], beside: dict
     spec = LoopSpec(
         name,
         type=type_of(held.tags[pair.pv]),
+        pv_unit=unit_of(held.tags[pair.pv]),
         master="" if master == name else master,
         sp=None if pair.sp is None else held.tags[pair.sp],
         pv=held.tags[pair.pv],
@@ -311,6 +315,12 @@ def type_of(tag: str) -> str:
     return "" if letters is None else str(STATED["types"][letters[1]])
 
 
+def unit_of(tag: str) -> str:
+    """The unit in brackets at the end of a tag's name, as in 'PV FIC101 (m3/h)'; '' without one."""
+    unit = UNIT.search(tag)
+    return "" if unit is None or unit[1].upper() in ("PV", "SP", "OP", "CV", "MV") else unit[1]
+
+
 def _extremes(x: np.ndarray) -> tuple[float, float]:
     """Minimum and maximum of the recorded values, in few digits; different even for a constant."""
     low, high = (float(f"{v:.4g}") for v in (x.min(), x.max()))
@@ -351,7 +361,7 @@ def _cell(row: Row, column: str) -> str:
     seen = (
         row.spec.kp is not None
         if settings
-        else row.spec.has_pv_range or column in ("type", "master", "ratio_of")
+        else row.spec.has_pv_range or column in ("type", "master", "ratio_of", "pv_unit")
     )
     spoken = (
         (row.found_by not in ("stated", RECORDED) and seen)

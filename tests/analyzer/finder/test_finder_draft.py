@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from analyzer.cli import main
-from analyzer.finder.draft import Row, as_csv, type_of
+from analyzer.finder.draft import Row, as_csv, type_of, unit_of
 from analyzer.loops.spec import LoopSpec, read_loops
 from tests.analyzer.finder.test_finder_pairs import pi_loop, strangers
 
@@ -114,3 +114,18 @@ def test_a_type_is_told_by_isa_letters(tag: str) -> None:
     """The first letter of an instrument's name tells what it measures; of other names it tells nothing."""
     name, _, kind = tag.partition(" ")
     assert type_of(name) == kind
+
+
+@pytest.mark.parametrize(
+    ("tag", "unit"),
+    [
+        ("PV FIC101 (m3/h)", "m3/h"),
+        ("TIC7.PV [°C]", "°C"),
+        ("FIC101 (PV)", ""),
+        ("AI[12]", ""),
+        ("FIC101.PV", ""),
+    ],
+)
+def test_the_unit_is_that_in_brackets_of_the_name(tag: str, unit: str) -> None:
+    """A unit in brackets at the end of a name is PV's unit; a role or an index there is none."""
+    assert unit_of(tag) == unit
