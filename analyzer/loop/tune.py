@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from analyzer.night.decided import Decided
     from analyzer.night.nights import PlantLoop
 
+SAID = sentences("settings")
 MAP_POINTS = 36
 """Points of the map along each axis."""
 NO_MOVES = Requirement(None, RequirementKind.MOVING_PV)
@@ -135,11 +136,14 @@ def _cycle_lines(t: Tuning) -> list[str]:
         simulated = "unstable, up to OP's limits"
     p = t.cycle.predicted
     predicted = f"{number(p.period_s)} s, ±{p.pv_amplitude:.3g} %" if p else "none"
-    return [
+    lines = [
         f"limit cycle recorded: {recorded}",
         f"  simulated: {simulated}",
         f"  describing function: {predicted}",
     ]
+    if t.period_s is None and p is not None:
+        lines.append(SAID["no_such_cycle"])
+    return lines
 
 
 def _forecast_lines(t: Tuning) -> list[str]:
@@ -314,7 +318,7 @@ def _routine(one: PlantLoop, stated: Pid | None, decision: Decided, drawn: bool)
     if cause not in AGAINST and action is not Action.RETUNE:
         left = [WHY[cause]] if action is WITHOUT_SETTINGS[cause] else []
         kind = "no_model_of_load" if cause is Cause.LOAD else "no_model"
-        return TuningReport([*text, *left, sentences("settings")[kind]], {}, row)
+        return TuningReport([*text, *left, SAID[kind]], {}, row)
     new = None
     if action is Action.RETUNE:
         new = controller_of(replace(spec, kp=row["kp_new"], ti=row["ti_new"]), prepared)
