@@ -16,7 +16,7 @@ from analyzer.finder.beside import may_be_mode, modes, positions
 from analyzer.finder.clock import Sampled, sampled
 from analyzer.finder.pair import FoundPair, known_pair
 from analyzer.finder.pairs import found_pairs
-from analyzer.finder.relations import at_rest, equal_at_times, halves, output_behind, ratio_to, scan_of
+from analyzer.finder.relations import at_rest, equal_at_times, halves, masters_of, ratios_to, scan_of
 from analyzer.history.export import Export
 from analyzer.limits import FINDER, HISTORY
 from analyzer.loops.spec import COLUMNS as STATED_COLUMNS
@@ -119,7 +119,7 @@ def _with_relations(held: Sampled, rows: Sequence[Row]) -> list[Row]:
     pvs, ops = (held.of([str(getattr(s, role)) for s in specs]).values for role in ("pv", "op"))
     taken = {tag for s in specs for tag in s.tags}
     others = held.of([tag for tag in held.tags if tag not in taken])
-    halves_of, out = halves(ops, others.values), list(rows)
+    halves_of, out, led = halves(ops, others.values), list(rows), _with_leaders(held, specs, pvs, ops)
     selects: dict[int, list[int]] = {}
     for i, j in equal_at_times(ops):
         selects.setdefault(i, []).append(j)
@@ -136,20 +136,25 @@ def _with_relations(held: Sampled, rows: Sequence[Row]) -> list[Row]:
         scan = scan_of(ops[:, i])
         if scan is not None:
             said.append(f"OP moves every {scan * held.dt_s:g} s: scan_s?")
-        out[k] = replace(rows[k], spec=_led(held, specs, i, pvs, ops), says="; ".join(said))
+        out[k] = replace(rows[k], spec=led[i], says="; ".join(said))
     return out
 
 
-def _led(held: Sampled, specs: Sequence[LoopSpec], i: int, pvs: np.ndarray, ops: np.ndarray) -> LoopSpec:
-    """The row of a loop with its master, or the loop to whose PV its set point keeps a ratio."""
-    spec = specs[i]
-    if spec.sp not in held.tags or spec.master:
-        return spec
-    sp, others = held.of([str(spec.sp)]).values[:, 0], [k for k in range(len(specs)) if k != i]
-    master, leader = output_behind(sp, ops[:, others]), ratio_to(sp, pvs[:, others])
-    if master is not None:
-        return replace(spec, master=specs[others[master]].loop)
-    return spec if leader is None else replace(spec, ratio_of=specs[others[leader]].loop)
+def _with_leaders(
+    held: Sampled, specs: Sequence[LoopSpec], pvs: np.ndarray, ops: np.ndarray
+) -> list[LoopSpec]:
+    """The rows of loops with their masters, or the loops to whose PVs their set points keep a ratio."""
+    led = [i for i, s in enumerate(specs) if s.sp in held.tags and not s.master]
+    if not led or len(specs) < 2:
+        return list(specs)
+    set_points, out = held.of([str(specs[i].sp) for i in led]).values, list(specs)
+    masters, leaders = masters_of(set_points, ops, led), ratios_to(set_points, pvs, led)
+    for i, master, leader in zip(led, masters, leaders, strict=True):
+        if master is not None:
+            out[i] = replace(specs[i], master=specs[master].loop)
+        elif leader is not None:
+            out[i] = replace(specs[i], ratio_of=specs[leader].loop)
+    return out
 
 
 def _without_ranges_of_currents(held: Sampled, rows: Sequence[Row]) -> list[Row]:

@@ -3,8 +3,9 @@ valve, and when a controller acts. All are candidates to be checked."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
-from numpy.typing import NDArray
 
 from analyzer.finder.held import limited
 from analyzer.finder.law import TINY, Matrix
@@ -33,26 +34,29 @@ MASTER, NEXT = 0.99, 0.97
 rounding of both leaves .002 in the mill's cascade, and outputs of one oscillation are less alike."""
 
 
-def ratio_to(sp: Matrix, pvs: Matrix) -> int | None:
-    """The PV, a column of shape (n, k), to which a set point that moves, shape (n,), keeps a ratio; None if none."""
-    spread = float(sp.var())
-    if spread <= TINY or not pvs.size:
-        return None
-    ratio = sp @ pvs / np.maximum((pvs**2).sum(axis=0), TINY)
-    left = ((sp[:, None] - ratio * pvs) ** 2).mean(axis=0) / spread
-    best = int(np.argmin(left))
-    return best if left[best] <= IN_RATIO else None
+def ratios_to(set_points: Matrix, pvs: Matrix, own: Sequence[int]) -> list[int | None]:
+    """Of each set point that moves, shape (n, m), the PV, a column of shape (n, k), to which it keeps a ratio; None
+    if none. own : the columns of the loops' own PVs."""
+    power, spread = (set_points**2).mean(axis=0), set_points.var(axis=0)
+    both = set_points.T @ pvs / len(pvs)
+    left = power[:, None] - both**2 / np.maximum((pvs**2).mean(axis=0), TINY)
+    left /= np.maximum(spread, TINY)[:, None]
+    left[np.arange(len(own)), own] = np.inf
+    best = left.argmin(axis=1)
+    kept = (spread > TINY) & (left.min(axis=1) <= IN_RATIO)
+    return [int(k) if good else None for k, good in zip(best, kept, strict=True)]
 
 
-def output_behind(sp: Matrix, outputs: Matrix) -> int | None:
-    """The output, a column of shape (n, k), that a set point that moves, shape (n,), is in another scale; None if
-    none."""
-    if not outputs.size or float(sp.var()) <= TINY:
-        return None
-    agree = _correlation(outputs, sp)
-    best = int(np.argmax(agree))
-    alone = np.delete(agree, best).max(initial=0.0) <= NEXT
-    return best if agree[best] >= MASTER and alone else None
+def masters_of(set_points: Matrix, outputs: Matrix, own: Sequence[int]) -> list[int | None]:
+    """Of each set point that moves, shape (n, m), the output, a column of shape (n, k), that it is in another scale;
+    None if none, or if several outputs are alike. own : the columns of the loops' own outputs."""
+    agree = _correlations(set_points, outputs)
+    agree[np.arange(len(own)), own] = 0.0
+    best = agree.argmax(axis=1)
+    first = agree[np.arange(len(best)), best]
+    agree[np.arange(len(best)), best] = 0.0
+    alone = (first >= MASTER) & (agree.max(axis=1) <= NEXT)
+    return [int(k) if good else None for k, good in zip(best, alone, strict=True)]
 
 
 def scan_of(op: Matrix) -> int | None:
@@ -100,15 +104,15 @@ def halves(outputs: Matrix, others: Matrix) -> dict[int, list[int]]:
         free = (x > x.min()) & (x < x.max())
         if not limited(x) or not SHARED[0] <= free.mean() <= SHARED[1]:
             continue
-        agree = _correlation(outputs[free], x[free])
+        agree = _correlations(x[free, None], outputs[free])[0]
         best = int(np.argmax(agree))
         if agree[best] >= HALF:
             found.setdefault(best, []).append(k)
     return found
 
 
-def _correlation(columns: Matrix, x: Matrix) -> NDArray[np.float64]:
-    """Squared correlation of each column with a signal."""
-    a, b = columns - columns.mean(axis=0), x - x.mean()
-    size = np.maximum((a**2).sum(axis=0) * float(b @ b), TINY)
-    return np.asarray((a.T @ b) ** 2 / size)
+def _correlations(x: Matrix, y: Matrix) -> Matrix:
+    """Squared correlation of each column of x, shape (n, m), with each of y, shape (n, k), 0 of a constant."""
+    a, b = x - x.mean(axis=0), y - y.mean(axis=0)
+    size = np.outer((a**2).sum(axis=0), (b**2).sum(axis=0))
+    return np.where(size > TINY, (a.T @ b) ** 2 / np.maximum(size, TINY), 0.0)

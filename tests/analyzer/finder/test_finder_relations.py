@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analyzer.finder.relations import at_rest, equal_at_times, halves, output_behind, ratio_to, scan_of
+from analyzer.finder.relations import at_rest, equal_at_times, halves, masters_of, ratios_to, scan_of
 
 
 @pytest.fixture(scope="module")
@@ -15,18 +15,22 @@ def walks():
 
 
 def test_a_ratio_to_a_pv_is_found_and_a_common_drift_is_none(walks):
-    """0.4 times a PV is in ratio to it, to four digits; a set point that wanders by itself is in ratio to none."""
-    assert ratio_to(np.round(0.4 * walks[:, 2], 3), walks) == 2
-    assert ratio_to(walks[:, 0], walks[:, 1:]) is None
-    assert ratio_to(np.full(6000, 7.0), walks) is None
+    """0.4 times a PV is in ratio to it, to three decimals; a set point that wanders by itself, or rests, is in ratio
+    to none, and none to its own PV."""
+    set_points = np.column_stack(
+        [np.round(0.4 * walks[:, 2], 3), walks[:, 0], np.full(6000, 7.0), walks[:, 4]]
+    )
+    assert ratios_to(set_points, walks[:, 1:], [3, 0, 1, 3]) == [1, None, None, None]
 
 
 def test_a_set_point_that_is_an_output_in_another_scale_has_a_master(walks):
-    """The set point of a slave is its master's output in its own unit; a rounded one still is."""
-    assert output_behind(np.round(20.0 + 1.5 * walks[:, 3], 2), walks) == 3
-    assert output_behind(walks[:, 0], walks[:, 1:]) is None
-    twins = np.column_stack([walks[:, 3], walks[:, 3] + 0.01 * walks[:, 1]])
-    assert output_behind(walks[:, 3], twins) is None
+    """The set point of a slave is its master's output in its own unit; a rounded one still is. Of two outputs that
+    are alike neither is the master."""
+    set_points = np.column_stack([np.round(20.0 + 1.5 * walks[:, 3], 2), np.full(6000, 7.0)])
+    assert masters_of(set_points, walks, [0, 1]) == [3, None]
+    assert masters_of(walks[:, [0]], walks[:, 1:], [1]) == [None]
+    twins = np.column_stack([walks[:, 3], walks[:, 3] + 0.01 * walks[:, 1], walks[:, 2]])
+    assert masters_of(walks[:, [3]], twins, [2]) == [None]
 
 
 @pytest.mark.parametrize("scan", [1, 2, 5, 30])
