@@ -15,6 +15,7 @@ from click.testing import CliRunner
 from analyzer.cli import main as triage
 from analyzer.explain.text import answer_lines
 from analyzer.explain.words import TOLD, held_out
+from analyzer.loop.decisions import Due
 from analyzer.pages.night import pages_of_night
 from analyzer.store.store import Store
 from analyzer.words.reason import in_short
@@ -64,7 +65,8 @@ def of_tune(asked: tuple[str, ...], row: dict[str, Any], store: str) -> Iterator
             continue
         found = json.loads(text)
         yield from parted(row, found["decision"], "tune" + (" with the store" if more else ""))
-        if not any(line.startswith(f"action: {row['action']}") for line in found["text"]):
+        due = f" at the {Due.SHUTDOWN}" if row["due"] == Due.SHUTDOWN else ""
+        if f"action: {row['action']}{due}" not in found["text"]:
             yield f"tune: its text lacks the action {row['action']}"
 
 

@@ -137,11 +137,8 @@ def _with_set_points(bag: Bag, scores: Scores, pairs: Sequence[FoundPair]) -> li
     taken = {p.sp for p in pairs if p.sp is not None}
     free = [k for k in (*bag.still, *bag.moving) if k not in taken and k not in bag.live]
     tags = sorted({k for p in pairs for k in (p.pv, p.op)})
-    known, level, slow = (
-        nearness(bag.values, tags, free),
-        bag.values[:, free].mean(axis=0),
-        long_blocks(bag.values),
-    )
+    known, level = nearness(bag.values, tags, free), bag.values[:, free].mean(axis=0)
+    slow = long_blocks(bag.values)
     place = {tag: k for k, tag in enumerate(tags)}
     near = np.array([_near_both(bag, p, free, known[[place[p.pv], place[p.op]]], level, slow) for p in pairs])
     alone = [i for i, p in enumerate(pairs) if p.sp is None]

@@ -91,9 +91,7 @@ def rows_of(record: LoopRecord, error: Floats, slope: Floats | None = None) -> F
     whole, lacking = np.cumsum(error) * record.dt_s, np.cumsum(error - coarser) * record.dt_s
     feed = () if record.feed is None else (record.feed,)
     terms = np.stack((error, whole, none, lacking))
-    if (
-        record.gain_share is not None
-    ):  # in velocity form the gain of a sample multiplies the moves of that sample
+    if record.gain_share is not None:  # velocity form: the gain of a sample multiplies its moves
         terms = np.cumsum(record.gain_share * np.diff(terms, prepend=terms[:, :1]), axis=1)
     return np.stack((*terms[:3], record.op, terms[3], *feed))
 
