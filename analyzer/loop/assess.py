@@ -127,7 +127,7 @@ def cause_of(
         verdict = verdict_by_measures(measured, prepared, oscillation, config)
         if oscillation is not None:
             verdict = refine_stick_slip(verdict, oscillation.period_s, config.cause)
-            verdict = with_worn_valve(verdict, oscillation.period_s, config.cause)
+            verdict = with_worn_valve(verdict, record, oscillation.period_s, config.cause)
     dead = dead_valve(record, config.cause) if prepared.op_known else None
     return with_dead_valve(verdict, dead) if dead and verdict.cause is not Cause.VALVE else verdict
 

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.config import CauseLimits, Config
+from analyzer.loop.candidates import SEARCHED
 from analyzer.loop.decisions import (
     CAUSES,
     Cause,
@@ -30,6 +31,7 @@ from analyzer.loop.decisions import (
     Sign,
     SignKind,
 )
+from analyzer.loop.fit_window import further_windows, scans_of
 from analyzer.loop.fitness import compressed
 from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillation
@@ -38,13 +40,13 @@ from analyzer.loop.ringing import Regularity, Ringing, between_samples
 from analyzer.loop.signs import WEAK, signs_of
 from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import refined
-from identification.estimation.beside_line import BesideLine, beside_line
-from identification.estimation.between_samples import scans_per_row
+from identification.estimation.beside_line import BesideLine, beside_line, with_further
+from identification.estimation.between_samples import scans_per_row, with_scans
 from identification.estimation.gauss_newton import descend
 from identification.estimation.irregular_slips import SlipPath, fit_irregular, near_path, path_evidence
 from identification.estimation.noise import generic_noise
 from identification.estimation.smooth_load import as_fit
-from identification.estimation.window import Fit
+from identification.estimation.window import Fit, Window
 from identification.limits import FIT
 from identification.models import Backlash, Loop
 from identification.record import LoopRecord
@@ -52,6 +54,8 @@ from tuning.describing import describe
 from tuning.frequency_response import loop_response
 
 NO_MODEL = Requirement(None, RequirementKind.MODEL)
+FURTHER = 4
+"""Further windows of a record in which backlash beside a load is tested: ours, for time."""
 CAUSE_IN_MANUAL = Requirement(MissingData.MANUAL_TEST, RequirementKind.CAUSE_IN_MANUAL)
 
 
@@ -357,28 +361,49 @@ def _too_coarse(prepared: Prepared, oscillation: Oscillation, limits: CauseLimit
     return None
 
 
-def with_worn_valve(verdict: Verdict, period_s: float, limits: CauseLimits) -> Verdict:
-    """The verdict on a loop that cycles at a period [s] for another cause, its valve worn if backlash is seen outside
-    the cycle's line: the valve needs repair regardless of the cause."""
+def with_worn_valve(verdict: Verdict, record: LoopRecord, period_s: float, limits: CauseLimits) -> Verdict:
+    """The verdict on a loop that cycles at a period [s] for another cause, its valve worn if the joint model of its
+    load and backlash shows it: the valve needs repair regardless of the cause."""
     m = verdict.measured
-    if m is None or verdict.cause is Cause.VALVE or m.window.position is not None:
+    if m is None or m.ringing is None or verdict.cause is Cause.VALVE or m.window.position is not None:
         return verdict
-    # ringing is no line: both methods must show the backlash
+    # ringing is no line: the free noise model must show the backlash too
     if verdict.cause is Cause.TUNING and m.evidence <= 0.0:
         return verdict
-    found = beside_line(m.linear, m.play, period_s)
+    begins = [(x.time_constant_s, max(x.dead_time_s, 0.0)) for x in (m.linear, m.play)]
+    begins += [(share * period_s, 0.05 * period_s) for share in (0.3, 2.0, 20.0)]
+    found = beside_line(m.window, m.ringing.lined, begins, m.play.valve.stickband, period_s)
+    if found.evidence >= m.ringing.penalty and is_crossed_beside(found, m, limits):
+        found = with_further(found, _further(m, record), period_s)
     if not is_worn_beside(found, m, limits):
         return verdict
     return replace(verdict, fault=fault_of(m, limits), measured=replace(m, play=found.play))
 
 
-def is_worn_beside(found: BesideLine, m: Measured, limits: CauseLimits) -> bool:
-    """Whether backlash is seen outside the cycle's line: enough evidence on which the half-cycles agree, a process
-    gain of the controller's sign, and a width that OP crosses."""
+def _further(m: Measured, record: LoopRecord) -> list[Window]:
+    """Further windows of the record, with OP at the controller's scan as in the first."""
+    windows = further_windows(record, m.window, m.scale_s, FURTHER)
+    if m.window.steps == 1:
+        return windows
+    scans = (scans_of(record, w, m.controller) for w in windows)
+    return [
+        with_scans(replace(m.play, window=w), s, SEARCHED).window
+        for w, s in zip(windows, scans, strict=True)
+        if s is not None
+    ]
+
+
+def is_crossed_beside(found: BesideLine, m: Measured, limits: CauseLimits) -> bool:
+    """Whether OP crosses the backlash, and the process gain has the controller's sign."""
     right_way = m.controller is None or m.controller.kp * found.play.gain > 0.0
-    steady = found.trials is not None and found.trials.steadiness >= limits.beside_steady
-    crossed = limits.beside_size <= found.play.valve.stickband / max(m.window.reach, 1e-9) <= 1.0
-    return found.evidence >= limits.beside_evidence and steady and crossed and right_way
+    return right_way and limits.beside_size <= found.play.valve.stickband / max(m.window.reach, 1e-9) <= 1.2
+
+
+def is_worn_beside(found: BesideLine, m: Measured, limits: CauseLimits) -> bool:
+    """Whether backlash is seen beside the load: one that OP crosses, with enough evidence on which the half-cycles
+    agree."""
+    agree = found.trials is not None and found.trials.signs >= limits.beside_signs
+    return found.evidence >= limits.beside_evidence and agree and is_crossed_beside(found, m, limits)
 
 
 def refine_stick_slip(verdict: Verdict, period_s: float, limits: CauseLimits) -> Verdict:

@@ -61,16 +61,29 @@ def window_of(
     factor = max(round(scale_s / limits.blocks_per_period / record.dt_s), 1)
     n = min(len(record) // factor, limits.window) * factor
     first = latest_fit_stretch(record, n, calm)
+    known = {name: (t, dead) for name, t, dead in limits.fast_process}
+    most = known.get(kind.lower(), (math.inf, math.inf))
+    turn = 0 if calm else max(round(2 * scale_s / record.dt_s), 2)
+    return _cut(record, first, n, factor, scale_s, most, turn)
+
+
+def _cut(
+    record: LoopRecord,
+    first: int,
+    n: int,
+    factor: int,
+    scale_s: float,
+    most: tuple[float, float],
+    turn: int,
+) -> Window:
+    """The window of n samples that begins at `first`."""
     part = record.span(first, first + n)
     whole = bridged(part.usable, scale_s / record.dt_s)
     usable = block_means(whole.astype(np.float64), factor) > 0.99
-    known = {name: (t, dead) for name, t, dead in limits.fast_process}
-    most = known.get(kind.lower(), (math.inf, math.inf))
-    op = np.ascontiguousarray(part.op)
     stem = None if part.position is None else np.ascontiguousarray(part.position)
     return Window(
         block_means(across(part.pv, whole & ~part.usable), factor),
-        op,
+        np.ascontiguousarray(part.op),
         usable,
         record.dt_s * factor,
         factor,
@@ -78,8 +91,17 @@ def window_of(
         position=stem,
         first=first,
         sp=None if part.sp_estimated or not np.ptp(part.sp) else block_means(part.sp, factor),
-        turn=0 if calm else max(round(2 * scale_s / record.dt_s), 2),
+        turn=turn,
     )
+
+
+def further_windows(record: LoopRecord, window: Window, scale_s: float, count: int) -> list[Window]:
+    """Other windows of the same length, at most `count`, the latest first."""
+    n = window.y.size * window.factor
+    firsts = [*range(window.first + n, len(record) - n + 1, n), *range(window.first - n, -1, -n)]
+    most = window.most_time_constant_s, window.most_dead_time_s
+    latest = sorted(firsts, reverse=True)[:count]
+    return [_cut(record, at, n, window.factor, scale_s, most, window.turn) for at in latest]
 
 
 def scans_of(record: LoopRecord, window: Window, law: Pid | None) -> Scans | None:

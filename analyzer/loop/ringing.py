@@ -36,8 +36,8 @@ class Ringing:
 
     smooth, the process under a smooth load; lined, under one with a line; ms, maximum sensitivity of the loop under
     the smooth load [-], inf if it is unstable, and period_s, at which it rings [s]; cycle_s, the observed period [s];
-    line_nat and valve_nat, gain in log likelihood of a line in the load, and of a valve's fault, over the smooth load
-    [nat]; row_s, interval of the rows [s].
+    line_nat, valve_nat and both_nat, gain in log likelihood of a line in the load, of a valve's fault, and of both,
+    over the smooth load [nat]; row_s, interval of the rows [s].
     """
 
     smooth: SmoothFit
@@ -47,6 +47,7 @@ class Ringing:
     cycle_s: float
     line_nat: float
     valve_nat: float
+    both_nat: float
     row_s: float
 
     def is_tight(self, m: Regularity, evidence: float, limits: CauseLimits) -> bool:
@@ -69,14 +70,16 @@ class Ringing:
         evidence, for a valve fault under a free noise model [nat], and is_worn, whether that fault may be the cause.
         A cause that cannot make such a cycle is below the smooth load by the penalty, and so is the smooth load where
         its loop rings and the cycle is more regular than ringing. A line that explains less than a valve fault does
-        is no cause.
+        is no cause, unless the line remains beside the fault; then a fault that explains no more is none.
         """
         none = -self.penalty
         rings, regular = self.rings(limits), self.is_as_regular(m, limits)
-        doubted = self.line_nat < evidence and evidence >= self.penalty
+        beyond = self.both_nat - max(self.valve_nat, 0.0) >= self.line_needed(limits)
+        doubted = self.line_nat < evidence and evidence >= self.penalty and not beyond
         periodic = self.keeps_phase(limits) and m.kurtosis < limits.kept_size and not doubted
+        external = periodic and beyond and self.line_nat > self.valve_nat - self.penalty
         gains = {
-            Cause.VALVE: max(self.valve_nat, none) if is_worn else none,
+            Cause.VALVE: max(self.valve_nat, none) if is_worn and not external else none,
             Cause.TUNING: 0.0 if rings and regular else none,
             Cause.LOAD: max(self.line_nat, 0.0) if periodic else none,
         }
@@ -155,10 +158,11 @@ def ringing_of(linear: Fit, valves: tuple[Fit, ...], controller: Pid | None, per
     away = fit_smooth(window, period_s, plain)
     lined = fit_line(window, period_s, (smooth, away), begins)
     faulty = [fit_smooth(window, period_s, plain, x.valve, smooth) for x in valves]
-    best = max((f.log_likelihood for f in faulty), default=-math.inf)
+    both = [fit_line(window, period_s, (f, lined), (), f.law) for f in faulty]
+    most = [max((f.log_likelihood for f in x), default=-math.inf) for x in ([lined], faulty, both)]
     ms, rings_s = _peak(smooth, window, law, period_s)
-    line_nat, valve_nat = (x - smooth.log_likelihood for x in (lined.log_likelihood, best))
-    return Ringing(smooth, lined, ms, rings_s, period_s, line_nat, valve_nat, window.row_s)
+    line_nat, valve_nat, both_nat = (x - smooth.log_likelihood for x in most)
+    return Ringing(smooth, lined, ms, rings_s, period_s, line_nat, valve_nat, both_nat, window.row_s)
 
 
 def _resonant(window: Window, period_s: float, law: Pid | None) -> list[tuple[Dynamics, float]]:

@@ -1,122 +1,110 @@
-"""Valve backlash in a loop whose cycle has an external cause, identified from the signal outside the cycle's band.
+"""Valve backlash in a loop whose load has a spectral line: a joint model of process, backlash, smooth load and line.
 
-A load with a spectral line drives PV and, through the controller, OP at one frequency. At that frequency OP follows
-the load, so neither process nor valve can be identified from it. A narrow band about the frequency is removed from PV
-and from the stem behind each valve; a process and a notch commute. A stem with backlash keeps its harmonics and its
-other motion, which differ from those of an ideal valve.
+At the line's frequency OP follows the load, so neither process nor valve can be identified from it alone. The joint
+model assigns to the line what keeps its phase, and to the valve the harmonics and the other motion of its stem. Its
+gain over the same load with an ideal valve is the evidence of the valve. A load that is no sine has harmonics as a
+worn valve does, so the load with an ideal valve may have harmonics.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from identification.estimation.evidence import Trials, agreement_of
-from identification.estimation.noise import every_lag, fitted, generic_noise, judged, lag_means
-from identification.estimation.search import Dynamics, Prepared, level_of, prepare, search, starts
-from identification.estimation.window import Fit, Window, stem_of
-from identification.limits import FIT
+from identification.estimation.search import Dynamics
+from identification.estimation.smooth_load import SmoothFit, as_fit, fit_line, innovations_of, with_harmonics
+from identification.estimation.window import Fit, Window
 from identification.record import Floats
-from identification.signals.filters import notch
 from identification.signals.robust import clipped_gain
 from identification.signals.turns import turns_of
-from identification.simulation.lag import respond, unit_lag
-from identification.simulation.valve import IDEAL, StemLaw, sticking
+from identification.simulation.valve import IDEAL, sticking
 
-SHARES = np.geomspace(0.05, 0.95, 20)
-"""Backlash widths of the first scan, as shares of the range of OP in a cycle."""
-NEAR = (0.9, 1.0, 1.1)
-"""Factors of the second scan about the best width."""
-FOLLOWED, ROUNDS = 4, 3
-"""Number of widths that are refined, and alternations of process and noise model for each."""
+SHARES = np.geomspace(0.08, 0.95, 12)
+"""Backlash widths of the scan, as shares of the range of OP in a cycle."""
+BETWEEN = 1.25
+"""Factor about the best width of the scan within which it is refined: the ratio of two neighbours of the scan."""
+CLOSE = 0.01
+"""Relative precision of the refined width."""
 
 
 @dataclass(frozen=True, slots=True)
 class BesideLine:
-    """The backlash that best explains the signal outside the line: its fit, the gain in log likelihood over an ideal
-    valve [nat] with outliers limited, and the agreement of the half-cycles."""
+    """The joint model: the fit of its process and backlash, `worn`, and the likeliest with an ideal valve, `sound`,
+    and the gain in log likelihood of the first in each half-cycle [nat], shape (t,), outliers limited."""
 
     play: Fit
-    evidence: float
-    trials: Trials | None
+    worn: SmoothFit
+    sound: SmoothFit
+    gained: Floats
+
+    @property
+    def evidence(self) -> float:
+        """Gain in log likelihood of the backlash [nat]."""
+        return float(self.gained.sum())
+
+    @property
+    def trials(self) -> Trials | None:
+        """Agreement of the half-cycles; None with fewer than four."""
+        return agreement_of(self.gained) if self.gained.size > 3 else None
 
 
-@dataclass(frozen=True, slots=True)
-class _Explained:
-    """A valve with process and noise model: innovations and the mask of those that count."""
+def beside_line(
+    window: Window, lined: SmoothFit, begins: Sequence[Dynamics], width: float, period_s: float
+) -> BesideLine:
+    """Backlash under a load with a line of a period [s].
 
-    valve: StemLaw
-    dynamics: Dynamics
-    beta: Floats
-    ar: Floats
-    sigma2: float
-    e: Floats
-    counts: np.ndarray
+    lined : the fit with a line and an ideal valve; begins : time constants and dead times [s], and width : backlash
+    [% of OP], at which the search begins.
+    """
 
+    def behind(width: float, near: SmoothFit) -> SmoothFit:
+        return fit_line(window, period_s, (near,), (), sticking(width, 0.0))
 
-def beside_line(linear: Fit, play: Fit, period_s: float) -> BesideLine:
-    """Backlash outside a line of a period [s]. linear, play : fits of the whole record, used as starts."""
-    window = linear.window
-    begins = [(f.time_constant_s, max(f.dead_time_s, 0.0)) for f in (linear, play)]
-    begins += starts(window, period_s)
-    period = period_s / window.dt_s
-    ideal = _begun(window, IDEAL, period, begins)
-    worn = [_begun(window, sticking(float(s) * window.reach, 0.0), period, begins) for s in SHARES]
-    worn = sorted(worn, key=lambda x: x.sigma2)[:FOLLOWED]
-    sound = min(
-        (_settled(window, replace(x, valve=IDEAL), period) for x in (ideal, worn[0])), key=lambda x: x.sigma2
+    widths = np.append(SHARES * window.reach, width)
+    scanned = [
+        fit_line(window, period_s, (lined,), begins, sticking(float(w), 0.0)) for w in widths if w > 0.0
+    ]
+    first = max(scanned, key=_likelihood)
+    at = math.log(first.law.stickband)
+    near = minimize_scalar(
+        lambda x: -behind(math.exp(x), first).log_likelihood,
+        bounds=(at - math.log(BETWEEN), at + math.log(BETWEEN)),
+        method="bounded",
+        options={"xatol": CLOSE},
     )
-    wider = (replace(x, valve=sticking(f * x.valve.stickband, 0.0)) for x in worn for f in NEAR)
-    best = min((_settled(window, x, period) for x in wider), key=lambda x: x.sigma2)
-    gained = np.zeros(best.e.size)
-    both = best.counts & sound.counts
-    gained[both] = clipped_gain(best.e[both], sound.e[both])
-    at = turns_of(window.op_blocks, period)
-    agree = agreement_of(np.add.reduceat(gained, at)[:-1]) if at.size > 4 else None
-    return BesideLine(_as_fit(best, window), float(gained.sum()), agree)
+    worn = max((first, behind(math.exp(float(near.x)), first)), key=_likelihood)
+    sound = _sound(window, worn, lined, period_s)
+    return BesideLine(as_fit(worn, window), worn, sound, _gained(worn, sound, window, period_s))
 
 
-def _begun(window: Window, valve: StemLaw, period: float, begins: list[Dynamics]) -> _Explained:
-    """The best process behind a valve under the generic noise model."""
-    prepared = prepare(window, valve, generic_noise(), period)
-    return _explained(prepared, valve, *search(prepared, begins, 3))
+def with_further(found: BesideLine, windows: Sequence[Window], period_s: float) -> BesideLine:
+    """The same with the half-cycles of further windows, on which the width is not fitted."""
+    gained = [found.gained]
+    for window in windows:
+        worn = fit_line(window, period_s, (found.worn,), (), found.worn.law)
+        gained.append(_gained(worn, _sound(window, worn, found.sound, period_s), window, period_s))
+    return replace(found, gained=np.concatenate(gained))
 
 
-def _settled(window: Window, x: _Explained, period: float) -> _Explained:
-    """Fit process and noise model alternately from a start."""
-    stem = notch(stem_of(window.stems_in_blocks, x.valve), period, FIT.notch_width)
-    y = notch(window.centred, period, FIT.notch_width)
-    counts = judged(window.usable, FIT.ar_order)
-    counts[: int(period) + FIT.ar_order] = False
-    for _ in range(ROUNDS):
-        left = y - _simulated(stem, x.dynamics, x.beta, window.dt_s)
-        columns = lag_means(left, every_lag(FIT.ar_order))
-        ar, _ = fitted(columns * counts, left * counts)
-        prepared = prepare(window, x.valve, ar, period)
-        x = _explained(prepared, x.valve, *search(prepared, [x.dynamics], 3))
-    return x
+def _likelihood(fit: SmoothFit) -> float:
+    return fit.log_likelihood
 
 
-def _simulated(stem: Floats, dynamics: Dynamics, beta: Floats, dt_s: float) -> Floats:
-    """Simulated PV: response, mean, trend and decay, shape of the stem."""
-    n = stem.size
-    slow = beta[1] + beta[2] * (2.0 * np.arange(n) / n - 1.0)
-    decay = beta[3] * np.exp(-dt_s / dynamics[0] * np.arange(n))
-    return np.asarray(beta[0] * respond(stem, unit_lag(*dynamics, dt_s)) + slow + decay)
+def _sound(window: Window, worn: SmoothFit, near: SmoothFit, period_s: float) -> SmoothFit:
+    """The likeliest fit with an ideal valve, whose load may have harmonics."""
+    lined = fit_line(window, period_s, (near, worn), (), IDEAL)
+    return max((lined, with_harmonics(lined, window, period_s)), key=_likelihood)
 
 
-def _explained(
-    p: Prepared, valve: StemLaw, dynamics: Dynamics, sigma2: float, _: int, beta: Floats
-) -> _Explained:
-    level = level_of(p.pv.ar)
-    white = beta * np.array([1.0, level, level, 1.0])
-    counts = p.pv.rows[1] > 0
-    e = np.where(counts, p.pv.rows[0] - _simulated(p.stem, dynamics, white, p.pv.dt_s), 0.0)
-    return _Explained(valve, dynamics, beta, p.pv.ar, sigma2, e, counts)
-
-
-def _as_fit(x: _Explained, window: Window) -> Fit:
-    base = np.concatenate((x.beta[1:], [0.0]))
-    t, dead = x.dynamics
-    return Fit(float(x.beta[0]), t, dead, x.valve, x.sigma2, int(x.counts.sum()), x.ar, base, window)
+def _gained(worn: SmoothFit, sound: SmoothFit, window: Window, period_s: float) -> Floats:
+    """Gain in log likelihood of the first in each half-cycle of OP [nat], outliers limited."""
+    at, mine = innovations_of(worn, window, period_s)
+    gained: Floats = np.zeros(window.y.size)
+    gained[at] = clipped_gain(mine, innovations_of(sound, window, period_s)[1])
+    turns = turns_of(window.op_blocks, period_s / window.dt_s)
+    return np.asarray(np.add.reduceat(gained, turns)[:-1]) if turns.size > 1 else gained.sum(keepdims=True)

@@ -63,6 +63,11 @@ class Trials:
     agreeing: float
     steadiness: float
 
+    @property
+    def signs(self) -> float:
+        """Excess of the trials in which it is better over half of them, in standard errors [-] (sign test)."""
+        return (2.0 * self.agreeing - 1.0) * math.sqrt(self.count)
+
 
 def gains(ours: Fit, theirs: Fit) -> Floats:
     """Gain in log likelihood of one fit over another at every block [nat], shape (n,), outliers limited."""

@@ -19,7 +19,6 @@ from identification.estimation.window import Stems, Window, stem_of
 from identification.limits import FIT
 from identification.models import Fopdt
 from identification.record import Floats, Mask
-from identification.signals.filters import notch
 from identification.simulation.lag import Lag, stepped, unit_lag
 from identification.simulation.valve import IDEAL, StemLaw, sticking
 
@@ -174,24 +173,16 @@ def level_of(ar: Floats) -> float:
 
 @njit(cache=True)
 def whitened_stem(x: Floats, ar: Floats) -> Floats:
-    """Innovations, zero where incomplete: a lag or a notch would ring from incomplete ones."""
+    """Innovations, zero where incomplete: a lag would ring from incomplete ones."""
     white = whitened(x, ar, every_lag(ar.size))
     white[: ar.size] = 0.0
     return white
 
 
-def white_pv(window: Window, ar: Floats, notch_period: float = 0.0) -> WhitePv:
-    """Whiten PV with one noise model; notch_period in blocks, 0: none."""
-    white = whitened_stem(window.centred, ar)
-    y = white if notch_period <= 0 else notch(white, notch_period, FIT.notch_width)
-    rows, sums = _known(y, judged(window.usable, ar.size), ar.size + int(notch_period))
+def white_pv(window: Window, ar: Floats) -> WhitePv:
+    """Whiten PV with one noise model."""
+    rows, sums = _known(whitened_stem(window.centred, ar), judged(window.usable, ar.size), ar.size)
     return WhitePv(window.stems_in_blocks, rows, sums, ar, window.dt_s, window.bounds)
-
-
-def prepare(window: Window, valve: StemLaw, ar: Floats, notch_period: float) -> Prepared:
-    """Whiten PV and the stem with one noise model, with a period [blocks] removed from both."""
-    whole = behind(white_pv(window, ar, notch_period), valve)
-    return whole._replace(stem=notch(whole.stem, notch_period, FIT.notch_width))  # type: ignore[no-any-return]
 
 
 @register_jitable  # type: ignore[untyped-decorator]

@@ -35,10 +35,12 @@ from identification.simulation.valve import IDEAL, StemLaw
 LOAD, LINE = 5, 8
 """Constants of a model: log time constant [s], dead time [blocks], log corner time [s], inverse hyperbolic tangents
 of both zeros; of a line: log frequency relative to the expected one, log of the coherence time in periods, and log of
-its height."""
-STEPS = np.array([0.01, 0.02, 0.02, 0.02, 0.02, 0.001, 0.02, 0.02])
+its height; of a load that is no sine: log of the height of each of its HARMONICS."""
+HARMONICS = (3, 5)
+"""Harmonics of a line whose load is no sine, but symmetric; their phase wanders with the line's."""
+STEPS = np.array([0.01, 0.02, 0.02, 0.02, 0.02, 0.001, 0.02, 0.02, 0.02, 0.02])
 """Steps of the constants for numeric derivatives."""
-LONGEST = np.array([1.0, 4.0, 1.5, 1.0, 1.0, 0.05, 1.5, 1.5])
+LONGEST = np.array([1.0, 4.0, 1.5, 1.0, 1.0, 0.05, 1.5, 1.5, 1.5, 1.5])
 """Longest steps of a descent in each constant, because the least squares are not convex."""
 CORNERS, ZEROS = (1.0, 10.0, 100.0), ((0.0, 0.2), (0.4, 0.7), (1.0, 1.5))
 """Starts of the load: its corner time [periods] and its zeros, which always differ to be distinguishable."""
@@ -90,19 +92,19 @@ class _Point(NamedTuple):
     loss: float
 
 
-Noise = tuple[float, float, float, float, float]
-"""Sums and products of the load's poles and zeros: -(p + s), p s, -(z1 + z2), z1 z2; and 1 where there is a line."""
-Pair = tuple[float, float, float, float]
-"""Coefficients of a line: of 1/q and 1/q^2 in the poles, and in the zeros."""
+Noise = tuple[float, float, float, float]
+"""Sums and products of the load's poles and zeros: -(p + s), p s, -(z1 + z2), z1 z2."""
 
 
 @njit(cache=True)
-def _whitened(y: Floats, stem: Floats, lag: Lag, noise: Noise, pair: Pair) -> tuple[Floats, Floats]:
-    """PV and the unit response to the stem, both whitened by the load model, shape (n,) each."""
+def _whitened(y: Floats, stem: Floats, lag: Lag, noise: Noise, lines: Floats) -> tuple[Floats, Floats]:
+    """PV and the unit response to the stem, both whitened by the load model, shape (n,) each.
+
+    lines : shape (m, 4), coefficients of each line: of 1/q and 1/q^2 in the poles, and in the zeros.
+    """
     n = y.size
     yw, xw = np.zeros(n), np.zeros(n)
-    a1, a2, b1, b2, lined = noise
-    r1, r2, v1, v2 = pair
+    a1, a2, b1, b2 = noise
     x0, x1, x2 = 0.0, 0.0, 0.0
     m1, m2, k1, k2 = 0.0, 0.0, 0.0, 0.0
     y1, y2 = y[0], y[0]
@@ -113,7 +115,8 @@ def _whitened(y: Floats, stem: Floats, lag: Lag, noise: Noise, pair: Pair) -> tu
         m2, m1, k2, k1 = m1, ym, k1, xm
         yw[k], xw[k] = ym, xm
         x0 = stepped(x0, lag, stem[max(k - lag.delay, 0)], stem[max(k - lag.delay - 1, 0)])
-    if lined > 0.0:
+    for i in range(lines.shape[0]):
+        r1, r2, v1, v2 = lines[i, 0], lines[i, 1], lines[i, 2], lines[i, 3]
         y1, y2, x1, x2, m1, m2, k1, k2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(n):
             ym = yw[k] + r1 * y1 + r2 * y2 - v1 * m1 - v2 * m2
@@ -124,18 +127,25 @@ def _whitened(y: Floats, stem: Floats, lag: Lag, noise: Noise, pair: Pair) -> tu
     return yw, xw
 
 
-def _noise(theta: Floats, pole: float, case: _Case) -> tuple[Noise, Pair]:
+def _noise(theta: Floats, pole: float, case: _Case) -> tuple[Noise, Floats]:
     """The load model of the constants in the kernel's form."""
     slow = math.exp(-case.dt_s / math.exp(theta[2]))
     z1, z2 = math.tanh(theta[3]), math.tanh(theta[4])
-    noise = -(pole + slow), pole * slow, -(z1 + z2), z1 * z2, float(theta.size > LOAD)
+    noise = -(pole + slow), pole * slow, -(z1 + z2), z1 * z2
     if theta.size == LOAD:
-        return noise, (0.0, 0.0, 0.0, 0.0)
+        return noise, np.empty((0, 4))
     angle = 2.0 * math.pi * case.dt_s / case.period_s * math.exp(theta[5])
     rate = case.dt_s / (case.period_s * math.exp(theta[6]))
-    r, v = math.exp(-rate), math.exp(-rate * (1.0 + math.exp(theta[7])))
+    orders = (1, *HARMONICS[: theta.size - LINE])
+    lines = [_line(h * angle, h * h * rate, height) for h, height in zip(orders, theta[7:], strict=True)]
+    return noise, np.array(lines)
+
+
+def _line(angle: float, rate: float, height: float) -> tuple[float, float, float, float]:
+    """Coefficients of a line of this angle [rad/block], rate of decay [1/block] and log of its height."""
+    r, v = math.exp(-rate), math.exp(-rate * (1.0 + math.exp(height)))
     turn = 2.0 * math.cos(angle)
-    return noise, (-turn * r, r * r, -turn * v, v * v)
+    return -turn * r, r * r, -turn * v, v * v
 
 
 def _point(case: _Case, theta: Floats, gain: float | None = None) -> _Point:
@@ -179,16 +189,17 @@ def _judged(usable: Mask) -> NDArray[np.int64]:
     return np.flatnonzero(~out)
 
 
-def _case(window: Window, law: StemLaw, period_s: float, lined: bool) -> _Case:
+def _case(window: Window, law: StemLaw, period_s: float, count: int) -> _Case:
+    """The data of a model with so many constants."""
     stem = stem_of(window.stems_in_blocks, law)
     (most_t, most_dead), dt_s = window.bounds, window.dt_s
     periods = window.duration_s / period_s
     low = [math.log(0.1 * dt_s), 0.0, math.log(0.5 * dt_s), -1.5, -1.5]
     high = [math.log(most_t), most_dead / dt_s, math.log(1e3 * window.duration_s), 3.0, 3.0]
-    if lined:
-        away = math.log(SMOOTH.line_away)
-        low += [-away, math.log(SMOOTH.line_kept), -1.0]
-        high += [away, math.log(10.0 * periods), 8.0]
+    if count > LOAD:
+        away, heights = math.log(SMOOTH.line_away), count - LINE + 1
+        low += [-away, math.log(SMOOTH.line_kept), *heights * [-1.0]]
+        high += [away, math.log(10.0 * periods), *heights * [8.0]]
     ranges = np.array([low, high])
     return _Case(window.centred, stem, _judged(window.usable), dt_s, ranges, period_s)
 
@@ -245,7 +256,7 @@ def fit_smooth(
     starts : time constant and dead time [s] at which the search begins, with the gain if known; like : a fit whose
     load is also a start. Raises ValueError without a start.
     """
-    case = _case(window, law, period_s, False)
+    case = _case(window, law, period_s, LOAD)
     loads = [like.theta[2:LOAD]] if like is not None else []
     loads += [np.array([math.log(c * period_s), *z]) for c in CORNERS for z in ZEROS]
     firsts = []
@@ -266,16 +277,33 @@ def fit_line(
 ) -> SmoothFit:
     """Fit the process behind a valve under a load with a line near a period [s] and a smooth part.
 
-    near : fits under smooth loads at which the search begins, and whose loads are starts; begins : further time
+    near : fits at which the search begins, and whose loads are starts; begins : further time
     constants and dead times [s] at which it begins. If the load has a line, a fit under a smooth load can give a
     process far from the true one.
     """
-    case = _case(window, law, period_s, True)
+    case = _case(window, law, period_s, LINE)
     lines = [np.array([0.0, math.log(kept), 2.0]) for kept in SMOOTH.line_starts]
     heads = [fit.theta[:2] for fit in near] + [np.array([math.log(t), d / case.dt_s]) for t, d in begins]
     loads = [fit.theta[2:LOAD] for fit in (*near, *(near[-1] for _ in begins))]
-    starts = [np.concatenate((h, load, line)) for h, load in zip(heads, loads, strict=True) for line in lines]
+    starts = [fit.theta[:LINE] for fit in near if fit.line is not None]
+    starts += [
+        np.concatenate((h, load, line)) for h, load in zip(heads, loads, strict=True) for line in lines
+    ]
     return _fit(window, law, case, _descended(case, starts))
+
+
+def with_harmonics(lined: SmoothFit, window: Window, period_s: float) -> SmoothFit:
+    """The fit under a load with a line, found at a period [s], fitted anew under one whose line has harmonics too."""
+    count = LINE + len(HARMONICS)
+    case = _case(window, lined.law, period_s, count)
+    starts = [np.append(lined.theta, len(HARMONICS) * [height]) for height in (-1.0, 2.0)]
+    return _fit(window, lined.law, case, _descended(case, starts))
+
+
+def innovations_of(found: SmoothFit, window: Window, period_s: float) -> tuple[NDArray[np.int64], Floats]:
+    """The blocks judged, shape (m,), and the innovations of a fit there [% of PV's span], found at a period [s]."""
+    case = _case(window, found.law, period_s, found.theta.size)
+    return case.at, _point(case, found.theta).e
 
 
 def as_fit(found: SmoothFit, window: Window) -> Fit:

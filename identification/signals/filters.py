@@ -1,26 +1,12 @@
-"""Filters over whole trends: a notch about one period, a band of periods, removal of straight lines."""
+"""Filters over whole trends: a band of periods, removal of straight lines."""
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from identification.record import Floats
-
-
-def notch(x: Floats, period: float, width: float) -> Floats:
-    """The signal, shape (n,), without a narrow band about one period [samples] of relative width `width`.
-
-    Second-order notch, zeros on the unit circle; gain one far from the band.
-    """
-    w = 2 * math.pi / period
-    radius = math.exp(-0.5 * w * width)
-    level = (1 - 2 * radius * math.cos(w) + radius**2) / (2 - 2 * math.cos(w))
-    return _second_order(np.ascontiguousarray(x), math.cos(w), radius, level)
 
 
 def in_band(x: Floats, shortest: float, longest: float) -> Floats:
@@ -30,18 +16,6 @@ def in_band(x: Floats, shortest: float, longest: float) -> Floats:
     slow = min(2.0 / longest, 0.9 * fast)
     cut, kind = (slow, "highpass") if fast >= 0.95 else ([slow, fast], "bandpass")
     return np.asarray(sosfiltfilt(butter(2, cut, kind, output="sos"), x - x.mean()), dtype=np.float64)
-
-
-@njit(cache=True)
-def _second_order(x: Floats, cosine: float, radius: float, level: float) -> Floats:
-    out = np.empty_like(x)
-    base = x[0]
-    x1, x2, y1, y2 = base, base, base, base
-    for k in range(x.size):
-        y = level * (x[k] - 2 * cosine * x1 + x2) + 2 * radius * cosine * y1 - radius * radius * y2
-        x2, x1, y2, y1 = x1, x[k], y1, y
-        out[k] = y
-    return out
 
 
 def stretch_ends(n: int, window: int) -> NDArray[np.int64]:
