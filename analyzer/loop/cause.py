@@ -201,9 +201,14 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
     if m.ringing is None or any(math.isnan(x) for x in (m.evidence, m.jump, m.size, m.kurtosis)):
         return replace(not_assessed(None), measured=m)
     seen_as = Regularity(oscillation.rhythm.first, m.kurtosis, m.saturated >= limits.held)
-    if m.ringing.is_tight(seen_as, m.evidence, limits):
+    worn = _may_be_cause(m, m.ringing, limits)
+    steady = m.trials is not None and m.trials.steadiness >= limits.steady
+    if m.ringing.is_tight(seen_as, m.evidence if worn and steady else 0.0, limits):
         return _rings(m, m.ringing, limits)
-    gains, none = m.ringing.gains(m.evidence, _may_be_cause(m, m.ringing, limits), seen_as, limits)
+    found = (
+        m.evidence if m.size >= limits.least_size else 0.0
+    )  # a narrower fault raises no doubt about a load
+    gains, none = m.ringing.gains(found, worn, seen_as, limits)
     first, second = sorted(gains, key=lambda c: gains[c], reverse=True)[:2]
     lead = gains[first] - max(gains[second], none)
     confidence, signs = _chances(gains, limits), signs_of(m, oscillation, limits)

