@@ -17,7 +17,7 @@ from proofs.plant import CONFIG, START_S, series, spec
 from proofs.untidy.draw import draw
 from proofs.untidy.loop import Plant, Stem, run
 from proofs.untidy.recorder import rounded
-from proofs.untidy_loops import NAMED, recorded
+from proofs.untidy_loops import recorded
 
 
 def verdict_of(sp: np.ndarray, pv: np.ndarray, op: np.ndarray, step_s: float, kind: str) -> str:
@@ -101,8 +101,8 @@ def test_a_tuning_is_told_on_a_grid_of_two_steps_an_amplitude(seed, told):
 
 
 def test_a_cycle_short_of_regular_counts_where_its_valve_is_convicted():
-    """A sticking valve's irregular cycle, which noise of its spectrum would show too, is found by what OP tells: in at
-    least three of six draws, whose friction carries rounding on, and never for another cause."""
+    """A sticking valve's irregular cycle, which noise of its spectrum would show too, is found by what OP tells: in
+    three of six draws at least, whose friction carries rounding on, and never for another cause."""
     causes = []
     for seed in (1504021, 1504052, 1504055, 1504060, 1504084, 1504119):
         drawn = draw(seed, "stiction")
