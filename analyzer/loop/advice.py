@@ -125,7 +125,9 @@ def advise_if_sluggish(
     if slow is None:
         return advice
     kp, ti = as_stated(slow.new, spec, prepared.scale.span)
-    reason = SAID["sluggish"].format(slow.times, 100.0 * slow.change)
+    reason = SAID["first_step"]
+    if slow.change is not None:
+        reason = SAID["sluggish"].format(slow.times, 100.0 * slow.change)
     return Advice(Action.RETUNE, reason, rounded(kp), rounded(ti))
 
 

@@ -2,7 +2,8 @@
 
 Set point moves identify its process, at a finer clock than its own slow settings require. If SIMC's settings for
 every process that the record allows reject loads several times faster, and reduce the error considerably in
-simulation, they are advised.
+simulation, they are advised. If not, but the likeliest process permits several times as much and every process that
+the record allows twice the present gain, that is advised as a first step: the next set point moves then tell more.
 """
 
 from __future__ import annotations
@@ -30,58 +31,85 @@ from tuning.from_test import settings_from
 from tuning.rules import simc
 from tuning.search import mean_error, rounded
 
+FIRST_STEP = 2.0
+"""Factor of a first step of the gain: that of a careful engineer; SIMC's own gain margin is 3 (Skogestad 2003)."""
 CLOCKS = (4.0, 16.0)
 """Factors by which the process is identified on a finer clock than the present settings require: SIMC's integral
 times of sluggish loops are that much shorter."""
 
 
+Known = tuple[Fit, dict[str, Estimate]]
+"""A fit with the intervals of its constants."""
+
+
 @dataclass(frozen=True, slots=True)
 class FasterSettings:
     """New settings [%, s] of a sluggish loop, the factor by which they reject a load faster (Kp/Ti over the present
-    one) [-], and the change of the average absolute error in simulation [-]."""
+    one) [-], and the change of the average absolute error in simulation [-], None of a first step."""
 
     new: Pid
     times: float
-    change: float
+    change: float | None
 
 
 def faster_settings(
     record: LoopRecord, controller: Pid | None, kind: str, config: Config
 ) -> FasterSettings | None:
-    """Settings for a loop without a cycle; None if it is not sluggish, is slow on purpose as levels are, or its
-    process is not known well enough. controller, its present settings [%, s]; kind, its type."""
+    """Settings for a loop without a cycle, or a first step to them; None if it is not sluggish, is slow on purpose as
+    levels are, or its process is not known well enough. controller, its present settings [%, s]; kind, its type."""
     if controller is None or kind.strip().lower() == AVERAGING or record.sp_estimated:
         return None
     if not math.isfinite(controller.ti_s) or controller.kp == 0.0 or controller.td_s > 0.0:
         return None
-    fits = _known_fits(record, controller, kind, config)
-    if not fits:
-        return None
-    fit, known = fits[0], intervals(fits[0], False, config.advice)
-    known["dead_time_s"] = reaching(known["dead_time_s"], *(other.dead_time_s for other in fits[1:]))
+    fits = _fits(record, controller, kind, config)
+    precise = [x for x in fits if _is_precise(x, config)]
+    first_step = _first_step(precise or fits, controller, config)
+    if not precise:
+        return first_step
+    fit, known = precise[0]
+    known["dead_time_s"] = reaching(known["dead_time_s"], *(other.dead_time_s for other, _ in precise[1:]))
     process = between_samples(tuned(fit, False, config.advice), fit.window, controller)
-    return _proposed(fit, process, _allowed(process, known), controller, config)
+    return _proposed(fit, process, _allowed(process, known), controller, config) or first_step
 
 
-def _known_fits(record: LoopRecord, controller: Pid, kind: str, config: Config) -> list[Fit]:
-    """The fits with an ideal valve on the clocks on which slope and dead time are precise, the coarsest first."""
-    found: list[Fit] = []
-    limits, scale_s = config.lanes, time_scale(record, None, controller)
+def _fits(record: LoopRecord, controller: Pid, kind: str, config: Config) -> list[Known]:
+    """The fits with an ideal valve on all clocks, the coarsest first, in which the set point moves."""
+    found: list[Known] = []
+    scale_s = time_scale(record, None, controller)
     for finer in CLOCKS:
         try:
             window = window_of(record, scale_s / finer, config.cause, kind, calm=True)
             fit = fit_linear(window, scale_s / finer)
         except (NotAssessedError, ArithmeticError, ValueError):
             continue
-        if window.sp is None or fit.slope * controller.kp <= 0.0:
-            continue
-        known = intervals(fit, False, config.advice)
-        slope, dead = known["slope_pct_per_s"], known["dead_time_s"]
-        sure = 0.5 * abs(slope.high - slope.low) <= limits.sluggish_unsure * abs(slope.value)
-        late = dead.high <= dead.low * limits.sluggish_late + window.dt_s
-        if sure and late:
-            found.append(fit)
+        if window.sp is not None and fit.slope * controller.kp > 0.0:
+            found.append((fit, intervals(fit, False, config.advice)))
     return found
+
+
+def _is_precise(x: Known, config: Config) -> bool:
+    """Whether slope and dead time are known well enough for settings."""
+    fit, known = x
+    slope, dead, limits = known["slope_pct_per_s"], known["dead_time_s"], config.lanes
+    sure = 0.5 * abs(slope.high - slope.low) <= limits.sluggish_unsure * abs(slope.value)
+    return sure and dead.high <= dead.low * limits.sluggish_late + fit.window.dt_s
+
+
+def _first_step(fits: list[Known], present: Pid, config: Config) -> FasterSettings | None:
+    """A first step of the gain, if the likeliest process of each fit is far from its settings and all that the fits
+    allow permit it."""
+    if not fits or min(known["slope_pct_per_s"].low * present.kp for _, known in fits) <= 0.0:
+        return None
+    likeliest = [between_samples(tuned(fit, False, config.advice), fit.window, present) for fit, _ in fits]
+    allowed = [p for x, (_, known) in zip(likeliest, fits, strict=True) for p in _allowed(x, known)]
+    try:
+        slow = min(abs(simc(p, scan_s=present.scan_s).ki / present.ki) for p in likeliest)
+        room = min(abs(simc(p, scan_s=present.scan_s).kp / present.kp) for p in allowed)
+    except ValueError:  # no significant delay
+        return None
+    if room < FIRST_STEP or slow < config.lanes.sluggish_times:
+        return None
+    return FasterSettings(replace(present, kp=rounded(FIRST_STEP * present.kp)), FIRST_STEP, None)
 
 
 def _allowed(process: Process, known: dict[str, Estimate]) -> tuple[Process, ...]:

@@ -74,3 +74,15 @@ def test_one_clock_alone_is_enough(slow: list[Drawn], monkeypatch: pytest.Monkey
     """Where one clock alone tells the process, its own interval stands: a loop is told as with two, or not."""
     monkeypatch.setattr("analyzer.loop.sluggish.CLOCKS", (4.0,))
     assert sum(faster_settings(recorded(d), stated(d), "", CONFIG) is not None for d in slow) >= 3
+
+
+def test_a_first_step_doubles_the_gain_where_several_times_as_much_is_likely() -> None:
+    """A loop at a sixth of SIMC's gain, whose process the record does not tell well enough for final settings, gets
+    twice its gain at the same integral time, and is robust with it on the true plant."""
+    d = drawn(551, 2, ("sluggish",))[1]
+    found = faster_settings(recorded(d), stated(d), "", CONFIG)
+    assert found is not None
+    assert found.change is None
+    assert found.new.kp == pytest.approx(2.0 * d.controller.kp, rel=0.02)
+    assert found.new.ti_s == d.controller.ti_s
+    assert sensitivity(d.process, replace(d.controller, kp=found.new.kp))[0] <= 1.7
