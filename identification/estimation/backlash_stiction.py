@@ -3,6 +3,7 @@ A profile of likelihood over backlash widths is kept, so that the profiles of se
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from itertools import product
 
@@ -237,7 +238,8 @@ def width_profile(linear: Fit, play: Fit) -> Floats:
     """Log likelihood of backlash at each of WIDTHS over that of an ideal valve [nat], shape of WIDTHS.
 
     Each width has its best process, under the better of two noise models: that of the backlash fit and the generic
-    one.
+    one. The best backlash lies between two widths: it counts for both, less a nat for a whole step of them, so that
+    two records of one valve always agree on one width.
 
     linear, play : the fits to one window behind an ideal valve and behind the best backlash.
     """
@@ -247,11 +249,16 @@ def width_profile(linear: Fit, play: Fit) -> Floats:
     asked = np.flatnonzero((FIT.width_seen * reach < WIDTHS) & (FIT.width_whole * reach > WIDTHS))
     if asked.size == 0:
         return out
-    ideal, least = _ideal(blocks, linear, play, linear.ar), np.full(asked.size, np.inf)
+    ideal, least, own = _ideal(blocks, linear, play, linear.ar), np.full(asked.size, np.inf), math.inf
     for ar in (play.ar, generic_noise()):
+        pv = white_pv(blocks, ar)
         ideal = min(ideal, _ideal(blocks, linear, play, ar))
-        least = np.minimum(least, _swept(white_pv(blocks, ar), WIDTHS[asked], play))
+        least = np.minimum(least, _swept(pv, WIDTHS[asked], play))
+        own = min(own, float(_swept(pv, np.array([play.valve.stickband]), play)[0]))
     out[asked] = 0.5 * play.count * np.log(ideal / least)
+    steps = np.abs(np.log(WIDTHS / max(play.valve.stickband, 1e-9))) / math.log(WIDTHS[1] / WIDTHS[0])
+    beside = asked[steps[asked] < 1.0]
+    out[beside] = np.maximum(out[beside], 0.5 * play.count * math.log(ideal / own) - steps[beside] ** 2)
     out[asked[-1] + 1 :] = out[asked[-1]]
     return out
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -31,6 +33,15 @@ def test_it_peaks_at_the_play_that_is_there(seed: int) -> None:
     assert WIDTHS[int(found.argmax())] == pytest.approx(0.62, rel=0.05)
     assert found.max() == pytest.approx(m.play.log_likelihood - m.linear.log_likelihood, rel=0.25)
     assert found[WIDTHS > 1.1].max() < 0.0
+
+
+@pytest.mark.parametrize("play", [0.66, 0.70, 0.74])
+def test_a_play_between_two_widths_counts_for_both(play: float) -> None:
+    """A play between two widths has its whole evidence at both, so that two nights of one valve agree on one."""
+    m = measured(replace(LEVEL, backlash=play), 3)
+    found = width_profile(m.linear, m.play)
+    assert m.play.valve.stickband == pytest.approx(play, rel=0.05)
+    assert found[(play / 1.26 < WIDTHS) & (play * 1.26 > WIDTHS)].min() >= found.max() - 1.0
 
 
 def test_it_speaks_for_no_play_of_a_sound_valve() -> None:
