@@ -200,10 +200,9 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
         return _quiet(m, limits)
     if m.ringing is None or any(math.isnan(x) for x in (m.evidence, m.jump, m.size, m.kurtosis)):
         return replace(not_assessed(None), measured=m)
-    seen_as = Regularity(oscillation.rhythm.first, m.kurtosis, m.saturated >= limits.held)
+    seen_as = Regularity(oscillation.rhythm.first, m.kurtosis, m.saturated >= limits.held, oscillation.cycles)
     worn = _may_be_cause(m, m.ringing, limits)
-    steady = m.trials is not None and m.trials.steadiness >= limits.steady
-    if m.ringing.is_tight(seen_as, m.evidence if worn and steady else 0.0, limits):
+    if m.ringing.is_tight(seen_as, m.evidence if worn else 0.0, limits):
         return _rings(m, m.ringing, limits)
     found = (
         m.evidence if m.size >= limits.least_size else 0.0
