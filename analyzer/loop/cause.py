@@ -400,7 +400,8 @@ def _further(m: Measured, record: LoopRecord) -> list[Window]:
 def is_crossed_beside(found: BesideLine, m: Measured, limits: CauseLimits) -> bool:
     """Whether OP crosses the backlash, and the process gain has the controller's sign."""
     right_way = m.controller is None or m.controller.kp * found.play.gain > 0.0
-    return right_way and limits.beside_size <= found.play.valve.stickband / max(m.window.reach, 1e-9) <= 1.2
+    size = found.play.valve.stickband / max(m.window.reach, 1e-9)
+    return right_way and limits.beside_size <= size <= limits.widest
 
 
 def is_worn_beside(found: BesideLine, m: Measured, limits: CauseLimits) -> bool:
