@@ -51,9 +51,14 @@ def fits_of(window: Window, q: Question) -> Fits:
     return *found, *_compared(found, q)
 
 
+def judged_count(window: Window) -> int:
+    """Number of blocks that follow as many good ones as the noise model's order."""
+    return int(judged(window.usable, FIT.ar_order).sum())
+
+
 def check_judged(window: Window, limits: CauseLimits) -> None:
     """Raise NotAssessedError if too few blocks follow as many good ones as the noise model's order."""
-    count = int(judged(window.usable, FIT.ar_order).sum())
+    count = judged_count(window)
     if count < limits.judged:
         raise NotAssessedError(
             f"needs {limits.judged} stretches of {FIT.ar_order + 1} good samples in a row, has {count}"
@@ -75,8 +80,7 @@ def refined(fits: Candidates, best: Fit, hopeless: bool) -> Candidates:
 
 def hopeful(window: Window, q: Question) -> float:
     """Evidence [nat] from which a search for a valve fault is worthwhile in a loop that does not oscillate."""
-    count = int(judged(window.usable, FIT.ar_order).sum())
-    return q.limits.hopeless * q.limits.needed(count, bool(q.due.any()), False)
+    return q.limits.hopeless * q.limits.needed(judged_count(window), bool(q.due.any()), False)
 
 
 def _is_searched(linear: Fit, play: Fit, q: Question) -> bool:

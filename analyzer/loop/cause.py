@@ -16,11 +16,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
 from analyzer.config import CauseLimits, Config
-from analyzer.loop.candidates import SEARCHED
+from analyzer.loop.candidates import SEARCHED, judged_count
 from analyzer.loop.decisions import (
     CAUSES,
     Cause,
@@ -54,9 +55,9 @@ from tuning.describing import describe
 from tuning.frequency_response import loop_response
 
 NO_MODEL = Requirement(None, RequirementKind.MODEL)
+CAUSE_IN_MANUAL = Requirement(MissingData.MANUAL_TEST, RequirementKind.CAUSE_IN_MANUAL)
 FURTHER = 4
 """Further windows of a record in which backlash beside a load is tested: ours, for time."""
-CAUSE_IN_MANUAL = Requirement(MissingData.MANUAL_TEST, RequirementKind.CAUSE_IN_MANUAL)
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,10 +205,8 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
     worn = _may_be_cause(m, m.ringing, limits)
     if m.ringing.is_tight(seen_as, m.evidence if worn else 0.0, limits):
         return _rings(m, m.ringing, limits)
-    found = (
-        m.evidence if m.size >= limits.least_size else 0.0
-    )  # a narrower fault raises no doubt about a load
-    gains, none = m.ringing.gains(found, worn, seen_as, limits)
+    wide = m.size >= limits.least_size  # a narrower fault raises no doubt about a load
+    gains, none = m.ringing.gains(m.evidence if wide else 0.0, worn, seen_as, limits)
     first, second = sorted(gains, key=lambda c: gains[c], reverse=True)[:2]
     lead = gains[first] - max(gains[second], none)
     confidence, signs = _chances(gains, limits), signs_of(m, oscillation, limits)
@@ -378,15 +377,16 @@ def with_worn_valve(verdict: Verdict, record: LoopRecord, period_s: float, limit
     begins += [(share * period_s, 0.05 * period_s) for share in (0.3, 2.0, 20.0)]
     found = beside_line(m.window, m.ringing.lined, begins, m.play.valve.stickband, period_s)
     if found.evidence >= m.ringing.penalty and is_crossed_beside(found, m, limits):
-        found = with_further(found, _further(m, record), period_s)
+        found = with_further(found, _further(m, record, limits), period_s)
     if not is_worn_beside(found, m, limits):
         return verdict
     return replace(verdict, fault=fault_of(m, limits), measured=replace(m, play=found.play))
 
 
-def _further(m: Measured, record: LoopRecord) -> list[Window]:
-    """Further windows of the record, with OP at the controller's scan as in the first."""
-    windows = further_windows(record, m.window, m.scale_s, FURTHER)
+def _further(m: Measured, record: LoopRecord, limits: CauseLimits) -> list[Window]:
+    """Further windows of the record with enough good blocks, with OP at the controller's scan as in the first."""
+    whole = (w for w in further_windows(record, m.window, m.scale_s) if judged_count(w) >= limits.judged)
+    windows = list(islice(whole, FURTHER))
     if m.window.steps == 1:
         return windows
     scans = (scans_of(record, w, m.controller) for w in windows)

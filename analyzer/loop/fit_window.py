@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -20,7 +21,7 @@ LIVELIER = 2.0
 cycle of constant size differs by less."""
 
 
-def latest_fit_stretch(record: LoopRecord, n: int, period: float, calm: bool = False) -> int:
+def fit_stretch(record: LoopRecord, n: int, period: float, calm: bool = False) -> int:
     """First sample of the latest stretch of n samples with the fewest unusable ones, or of one with few more.
 
     In a calm loop the one in which the set point moves farthest: its moves separate the process from load and valve.
@@ -75,10 +76,10 @@ def across(x: Floats, hole: Mask) -> Floats:
 def window_of(
     record: LoopRecord, scale_s: float, limits: CauseLimits, kind: str = "", calm: bool = False
 ) -> Window:
-    """The latest stretch with the fewest unusable samples, in blocks of a fraction of the period."""
+    """The stretch that is fitted, in blocks of a fraction of the period."""
     factor = max(round(scale_s / limits.blocks_per_period / record.dt_s), 1)
     n = min(len(record) // factor, limits.window) * factor
-    first = latest_fit_stretch(record, n, scale_s / record.dt_s, calm)
+    first = fit_stretch(record, n, scale_s / record.dt_s, calm)
     known = {name: (t, dead) for name, t, dead in limits.fast_process}
     most = known.get(kind.lower(), (math.inf, math.inf))
     turn = 0 if calm else max(round(2 * scale_s / record.dt_s), 2)
@@ -113,13 +114,13 @@ def _cut(
     )
 
 
-def further_windows(record: LoopRecord, window: Window, scale_s: float, count: int) -> list[Window]:
-    """Other windows of the same length, at most `count`, the latest first."""
+def further_windows(record: LoopRecord, window: Window, scale_s: float) -> Iterator[Window]:
+    """Other windows of the same length, the latest first, whatever is usable in them."""
     n = window.y.size * window.factor
     firsts = [*range(window.first + n, len(record) - n + 1, n), *range(window.first - n, -1, -n)]
     most = window.most_time_constant_s, window.most_dead_time_s
-    latest = sorted(firsts, reverse=True)[:count]
-    return [_cut(record, at, n, window.factor, scale_s, most, window.turn) for at in latest]
+    for at in sorted(firsts, reverse=True):
+        yield _cut(record, at, n, window.factor, scale_s, most, window.turn)
 
 
 def scans_of(record: LoopRecord, window: Window, law: Pid | None) -> Scans | None:

@@ -39,3 +39,18 @@ def test_a_worn_valve_under_a_sine_is_told_with_its_width() -> None:
 def test_a_sound_valve_is_at_fault_beside_nothing(kind: str) -> None:
     """Of sound valves under a load that cycles, or in a loop tuned too tight, none is called worn."""
     assert {str(judged(d).verdict.fault) for d in drawn(37, 6, (kind,))} <= {"none"}
+
+
+@pytest.mark.parametrize("lost", ["bad", "manual"])
+def test_a_night_of_which_half_is_lost_is_judged_by_the_rest(lost: str) -> None:
+    """A worn valve under a sine is found where the last half of the night is bad, or in manual: a window without a
+    good block is passed over."""
+    d = drawn(521, 6, ("worn-sine",))[5]
+    t = run(d)
+    away = np.arange(t.pv.size) >= t.pv.size // 2
+    masks = {"gap": away} if lost == "bad" else {"manual": away}
+    record = LoopRecord(d.name, 0.0, 1.0, t.sp, t.pv, t.op, away & (lost == "bad"), masks=masks)
+    stated = Pid(d.controller.kp, d.controller.ti_s, scan_s=1.0)
+    found = assess(Prepared(record, Scale(0, 100, 0, 100, False), 0.0, 0.0, ()), stated, CONFIG).verdict
+    assert found.fault == "backlash"
+    assert found.require_measured.play.valve.stickband == pytest.approx(d.valve.band, rel=0.1)
