@@ -36,8 +36,6 @@ FIRST_STEP = 2.0
 CLOCKS = (4.0, 16.0)
 """Factors by which the process is identified on a finer clock than the present settings require: SIMC's integral
 times of sluggish loops are that much shorter."""
-
-
 Known = tuple[Fit, dict[str, Estimate]]
 """A fit with the intervals of its constants."""
 
