@@ -22,6 +22,7 @@ from identification.controller.law_ways import (
     rough_ways,
     shape_of,
     usual_ways,
+    with_best_filter,
     with_shape,
 )
 from identification.controller.pid_regression import best_gains, blurred, explained, integral_time
@@ -76,10 +77,14 @@ def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompar
             best = seen
         if given is None or seen.poorness(gains) < given.poorness(gains):
             given = seen
-        if _settled(best, given, gains):
+        if seen.way.pv_filter > given.way.pv_filter and _settled(best, given, gains):
             break
     if best is None or given is None:
         return None
+    if given.way.pv_filter >= LAW.seen_filter:
+        near = with_best_filter(x, given.way, stated)
+        if near is not None and near.does(gains):
+            return LawsCompared(recognized(x, stated, near.way), 1.0, 1.0, True)
     found = _simplest(best, gains, record.duration_s, with_shape(stated, best.way.shape))
     return None if found is None else _most_apart(best, given, gains, *found)
 
@@ -128,7 +133,8 @@ def best_of(record: LoopRecord, period_s: float, laws: Sequence[Pid]) -> Pid:
 
 
 def _settled(best: Seen, given: Seen, gains: Floats) -> bool:
-    """Whether another law reproduces OP fully and the stated one is far off, so that more variants are useless."""
+    """Whether another law reproduces OP fully and the stated one is far off, so that more variants are useless; asked
+    only after a longer filter of PV is no better for the stated one."""
     left = best.left_over_all(best.free)
     return left < LAW.small and given.left_over_all(gains) > max(10.0 * left, LAW.gives)
 

@@ -280,6 +280,17 @@ def recognized(x: Look, stated: Pid, way: Way) -> Pid:
     return replace(c, op_lo=float(max([c.op_lo, *low[:1]])), op_hi=float(min([c.op_hi, *high[:1]])))
 
 
+def with_best_filter(x: Look, way: Way, stated: Pid) -> Seen | None:
+    """A variant with the filter of PV, near its own, with which the stated gains reproduce OP best."""
+    return _filtered(x, way, _best_filter(x, way, stated))
+
+
+def _filtered(x: Look, way: Way, smooth: float) -> Seen | None:
+    """A variant with another filter of PV [samples]."""
+    error = x.record.sp - first_order(x.record.pv, smooth)
+    return x.seen(rows_of(x.record, shaped(error, way.shape)), replace(way, pv_filter=smooth))
+
+
 def _best_filter(x: Look, way: Way, stated: Pid) -> float:
     """The filter of PV, near that of a variant, with which the stated gains reproduce OP best [samples]; the
     variant's own if there is a derivative, which also has a filter."""
@@ -287,8 +298,7 @@ def _best_filter(x: Look, way: Way, stated: Pid) -> float:
         return way.pv_filter
 
     def poor(smooth: float) -> float:
-        error = x.record.sp - first_order(x.record.pv, smooth)
-        seen = x.seen(rows_of(x.record, shaped(error, way.shape)), way)
+        seen = _filtered(x, way, smooth)
         return np.inf if seen is None else seen.poorness(gains_of(stated))
 
     return float(min(way.pv_filter * np.geomspace(0.5, 2.0, LAW.filters_near), key=poor))

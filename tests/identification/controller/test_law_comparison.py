@@ -66,6 +66,30 @@ def test_true_settings_agree_whatever_no_list_states(acting, more, every):
     assert compared(recorded(acting, every, **more), replace(TRUE, kp=more.get("kp", 2.0))).agree
 
 
+@pytest.mark.parametrize("smooth", [4.0, 5.0, 10.0, 17.0, 30.0])
+def test_a_filter_of_pv_that_no_list_states_is_no_other_setting(smooth):
+    """True settings agree with a record in which the controller saw PV through a first-order filter, also where
+    other gains with a shorter filter leave less than a hundredth of OP's variance."""
+    seen = compared(behind_a_filter(smooth), Pid(1.0, 40.0, scan_s=1.0))
+    assert seen.agree
+    assert seen.found.pv_filter_s == pytest.approx(smooth, rel=0.12)
+
+
+def behind_a_filter(smooth: float) -> LoopRecord:
+    """A lag of 30 s in coarse noise under a load that walks, closed by a PI behind a filter of PV [s]."""
+    rng = np.random.default_rng(8)
+    load = np.cumsum(rng.standard_normal(N)) * 0.1
+    load -= np.linspace(0.0, load[-1], N)
+    pv, op, y, seen, integral = np.empty(N), np.empty(N), 0.0, 50.0, 0.0
+    for k in range(N):
+        y += ((op[k - 4] if k >= 4 else 50.0) - 50.0 + load[k] - y) / 30.0
+        pv[k] = 50.0 + y + 0.05 * rng.standard_normal()
+        seen += (1.0 - np.exp(-1.0 / smooth)) * (pv[k] - seen)
+        integral += (50.0 - seen) / 40.0
+        op[k] = 50.0 + (50.0 - seen) + integral
+    return LoopRecord("L", 0.0, 1.0, np.full(N, 50.0), pv, op, np.zeros(N, dtype=bool))
+
+
 def test_the_gap_is_found_and_the_square_named():
     """The gap is found within a tenth, and a squared error by its name."""
     assert compared(recorded(gapped), TRUE).found.gap == pytest.approx(0.4, rel=0.1)
