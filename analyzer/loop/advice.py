@@ -310,7 +310,7 @@ def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Con
         return Proposed(Proposal(Action.CHECK_SETTINGS, SAID["no_integral"]))
     load = load_of(fit, loop.controller)
     if period_s is not None and load.size >= config.tuning.least_steps:
-        apart = agreement(sought, fit, load, period_s).worst(config.advice)
+        apart = agreement(sought, fit, load).worst(config.advice)
         if apart is not None:
             differs = SAID["off_by"].format(*apart) if apart[1] > 0.0 else SAID["no_cycle"]
             return Proposed(Proposal(Action.UNDECIDED, SAID["disagrees"].format(differs)))

@@ -17,84 +17,78 @@ from identification.controller.check import op_step
 from identification.estimation.window import Fit, Stems, stem_of
 from identification.models import Loop
 from identification.record import Floats
-from identification.signals.correlation import lag_sums
 from identification.simulation.closed_loop import scan_step
 from identification.simulation.valve import play
 from tuning.forecast import in_digits, loop_in_digits, run, settled
 
-NEARLY = 0.8
-"""Share of the autocorrelation's highest peak from which an earlier peak is the period's: peaks at multiples are as
-high."""
+LEAST = 0.5
+"""A number of reversals [-] in place of none."""
+RESTS = 1e-9
+"""Move of a stem [% OP] that is rounding of the simulation."""
 
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """Ratio of a simulation at the present settings to the record [-]: period, average absolute error, travel of OP
-    and of the stem; a period of 0 if the simulation does not cycle."""
+    """Ratio of a simulation at the present settings to the record [-]: reversals of the stem in a time, average
+    absolute error, travel of OP and of the stem; counted, the reversals in the record and in the simulation."""
 
-    period: float
+    reversals: float
     error: float
     op_travel: float
     stem_travel: float
+    counted: tuple[int, int]
 
     def worst(self, limits: AdviceLimits) -> tuple[str, float] | None:
-        """The figure farthest beyond its limit, and its ratio; None if all agree."""
+        """The figure farthest beyond its limit, and its ratio; None if all agree.
+
+        The cycle of a worn valve under a load is irregular: a number of n reversals scatters by sqrt(n) at most, and
+        two such standard errors are allowed beside the limit.
+        """
+        scatter = 2.0 * math.sqrt(sum(1.0 / max(n, LEAST) for n in self.counted))
         allowed = {
-            "period": (self.period, limits.agree_period),
-            "average absolute error": (self.error, limits.agree_error),
-            "OP travel": (self.op_travel, limits.agree_travel),
-            "stem travel": (self.stem_travel, limits.agree_stem),
+            "number of valve reversals": (self.reversals, math.log(limits.agree_reversals) + scatter),
+            "average absolute error": (self.error, math.log(limits.agree_error)),
+            "OP travel": (self.op_travel, math.log(limits.agree_travel)),
+            "stem travel": (self.stem_travel, math.log(limits.agree_travel)),
         }
-        beyond = {n: abs(math.log(max(x, 1e-9))) / math.log(most) for n, (x, most) in allowed.items()}
+        beyond = {n: abs(math.log(max(x, 1e-9))) / most for n, (x, most) in allowed.items()}
         name = max(beyond, key=lambda n: beyond[n])
         return None if beyond[name] <= 1.0 else (name, allowed[name][0])
 
 
-def agreement(loop: Loop, fit: Fit, load: Floats, period_s: float) -> Agreement:
-    """Compare the loop at its present settings under a load on its scan [% PV], shape (n,), with the record of a fit,
-    which cycles at a period [s] if its error shows none.
+def agreement(loop: Loop, fit: Fit, load: Floats) -> Agreement:
+    """Compare the loop at its present settings under a load on its scan [% PV], shape (n,), with the same stretch of
+    a fit's record.
 
-    Travel of both is that of their samples at the longer of both intervals, OP rounded as recorded and without moves
-    within a digit: at a coarse digit OP's noise is not in the record.
+    Stem and OP are compared by their samples at the longer of both intervals, OP rounded as recorded and without
+    moves within a digit: at a coarse digit OP's noise is not in the record.
     """
     sim, window = settled(run(loop_in_digits(loop), in_digits(load))), fit.window
     dt_s, scan_s = window.step_s, scan_step(loop)
     last = min(window.op.size, math.ceil(len(sim) * scan_s / dt_s))
     own = window.op[None]
-    stem = stem_of(Stems(own, own, own, window.op, np.empty(0), 1), fit.valve)
-    if window.position is not None:
-        stem = window.position
+    modelled = stem_of(Stems(own, own, own, window.op, np.empty(0), 1), fit.valve)
+    stem = modelled if window.position is None else window.position
     every = max(round(dt_s / scan_s), 1)
     digit = op_step(window.op)
     recorded = [_travel(x[-last:], dt_s) for x in (play(window.op, digit), stem)]
     rounded = digit * np.round(sim.op[::every] / digit) if digit > 0.0 else sim.op[::every]
     simulated = [_travel(x, every * scan_s) for x in (play(rounded, digit), sim.stem[::every])]
     op, moved = (s / max(r, 1e-9) for s, r in zip(simulated, recorded, strict=True))
-    error = float(np.mean(np.abs(sim.error))) / max(recorded_error(fit, loop.controller), 1e-9)
-    sp = 0.0 if window.sp is None else window.sp
-    own_s = period_of(sp - window.y, window.dt_s) or period_s
-    return Agreement(period_of(sim.error, sim.dt_s) / own_s, error, op, moved)
+    error = recorded_error(fit, loop.controller, math.ceil(len(sim) * scan_s / window.dt_s))
+    counted = reversals(modelled[-last:]), reversals(sim.stem[::every])
+    rate = counted[1] / max(counted[0], LEAST) * last * dt_s / (len(sim) * scan_s)
+    ratio = float(np.mean(np.abs(sim.error))) / max(error, 1e-9) if math.isfinite(error) else 0.0
+    return Agreement(rate, ratio, op, moved, counted)
+
+
+def reversals(stem: Floats) -> int:
+    """Number of times at which a stem, shape (n,), moves on in the other direction."""
+    moves = np.diff(stem)
+    signs = np.sign(moves[np.abs(moves) > RESTS])
+    return int(np.count_nonzero(signs[1:] != signs[:-1]))
 
 
 def _travel(x: Floats, dt_s: float) -> float:
     """Travel of a signal [its unit / s]."""
     return float(np.abs(np.diff(x)).sum()) / max((x.size - 1) * dt_s, 1e-9)
-
-
-def period_of(error: Floats, dt_s: float) -> float:
-    """Period of the autocorrelation's first peak beyond its first zero that is nearly the highest [s], 0 if there is
-    none; error, shape (n,), every dt_s [s]."""
-    x = error - error.mean()
-    if x.size < 8 or not np.any(x):
-        return 0.0
-    sums = lag_sums(x, x.size // 2)
-    below = np.flatnonzero(sums < 0)
-    if not below.size:
-        return 0.0
-    rest = sums[below[0] :]
-    if rest.max() <= 0.0:
-        return 0.0
-    first = int(np.argmax(rest >= NEARLY * rest.max()))
-    back = np.flatnonzero(rest[first:] < 0.5 * rest[first])
-    end = first + int(back[0]) if back.size else rest.size
-    return float((below[0] + first + int(np.argmax(rest[first:end]))) * dt_s)

@@ -102,12 +102,13 @@ def load_of(fit: Fit, controller: Pid) -> Floats:
     return np.asarray(load, dtype=np.float64)
 
 
-def recorded_error(fit: Fit, controller: Pid) -> float:
-    """Average absolute error of the data of a fit [% PV]; about PV's mean if the set point is constant. The noise
-    missing in blocks is added as in `load_of`."""
+def recorded_error(fit: Fit, controller: Pid, last: int = 0) -> float:
+    """Average absolute error of the data of a fit [% PV], of its last samples if a number is given; about PV's mean
+    if the set point is constant. The noise missing in blocks is added as in `load_of`."""
     window = fit.window
     sp = 0.0 if window.sp is None else window.sp - window.y.mean()
-    slow = float(np.mean(np.abs((window.centred - sp)[window.usable])))
+    error, usable = (window.centred - sp)[-last:], window.usable[-last:]
+    slow = float(np.mean(np.abs(error[usable]))) if usable.any() else math.nan
     fast = scan_noise(window, controller) if window.factor > 1 else 0.0
     return math.hypot(slow, math.sqrt(2.0 / math.pi) * fast)
 
