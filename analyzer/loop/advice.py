@@ -23,7 +23,6 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import sentences
 from analyzer.words.units import beside_settings, number, of_controller, schedule_shown
-from identification.estimation.between_samples import scans_per_row
 from identification.estimation.window import Fit
 from identification.limits import FIT
 from identification.models import Loop, Pid
@@ -314,9 +313,7 @@ def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Con
         if apart is not None:
             differs = SAID["off_by"].format(*apart) if apart[1] > 0.0 else SAID["no_cycle"]
             return Proposed(Proposal(Action.UNDECIDED, SAID["disagrees"].format(differs)))
-    same: tuple[LoadedLoop, ...] = ()
-    if period_s is not None and scans_per_row(loop.controller, fit.window.row_s) > 1:
-        same = indistinguishable(fit, sought, period_s)
+    same = () if period_s is None else indistinguishable(fit, sought, period_s)
     found = recommend(sought, verdict.cause, others, load, config.tuning, indistinguishable=same)
     return Proposed(found, sought, load, others, same)
 

@@ -153,10 +153,10 @@ def indistinguishable(fit: Fit, loop: Loop, period_s: float) -> tuple[LoadedLoop
     of the record, as `load_of`.
 
     A limit cycle determines the product of the process and the valve's describing function at its own frequency alone
-    (Astrom, Hagglund 1984). OP between two rows of a record is unknown and biases the rest: the fitted time constant
-    and width are too small, and with them the error under a slow load. These loops have the same product, an
-    integrating process, and the valve as fitted or WIDER. A dead time that would be negative is 0; the product then
-    differs in phase.
+    (Astrom, Hagglund 1984). OP between two rows of a record, or within a digit, is unknown and biases the rest: the
+    fitted time constant and width are too small, and with them the error under a slow load. These loops have the same
+    product, an integrating process, and the valve as fitted or WIDER. A dead time that would be negative is 0; the
+    product then differs in phase.
     """
     omega, lag_s = 2.0 * math.pi / period_s, fit.time_constant_s
     slow_s, swing = INTEGRATING * max(lag_s, period_s), 0.5 * fit.window.cycle_range
