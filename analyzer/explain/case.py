@@ -27,6 +27,8 @@ from analyzer.loop.decisions import Cause, Fault
 from analyzer.loop.experiments import Learned, learned
 from analyzer.loop.fitness import at_limits, pv_that_jumps
 from analyzer.loop.identified import intervals
+from analyzer.loop.judged_stretch import differing
+from analyzer.loop.measure import time_scale
 from analyzer.loop.oscillation import counting
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loop.sample_clock import onto_clock, snapped
@@ -62,14 +64,15 @@ def tags_of(spec: LoopSpec, specs: Sequence[LoopSpec]) -> list[str]:
     return list(dict.fromkeys([*spec.tags, *load, *others[: EXPLAIN.neighbours]]))
 
 
-def stated_law(spec: LoopSpec, prepared: Prepared) -> StatedSettings | None:
-    """The controller as stated, integral time in samples; None if it is unknown, not a PI, or one whose gain changed
-    by its schedule."""
+def stated_law(spec: LoopSpec, prepared: Prepared, period_s: float, config: Config) -> StatedSettings | None:
+    """The controller as stated, integral time in samples, confirmed if a night finds no other settings; None if it is
+    unknown, not a PI, or one whose gain changed by its schedule. period_s, of the loop's cycle, 0 without one."""
     pid = controller(spec, prepared.scale.span, prepared.gain_share)
     if pid is None or pid.td_s > 0 or not math.isfinite(pid.ti_s) or prepared.record.gain_share is not None:
         return None
-    dt_s = prepared.record.dt_s
-    return StatedSettings(pid.kp, pid.ti_s / dt_s, dt_s / (spec.scan_s or dt_s))
+    dt_s, scale_s = prepared.record.dt_s, period_s or time_scale(prepared.record, None, pid)
+    confirmed = differing(prepared.record, pid, scale_s, config.settings) is None
+    return StatedSettings(pid.kp, pid.ti_s / dt_s, dt_s / (spec.scan_s or dt_s), confirmed)
 
 
 def ops_beside(
@@ -243,7 +246,7 @@ def subject_of(
         ~(r.bad | r.mask("gap")),
         r.dt_s,
         stamps,
-        stated_law(spec, prepared) if judged and prepared.shared is None else None,
+        stated_law(spec, prepared, period_s, config) if judged and prepared.shared is None else None,
         not prepared.scale.recorded,
         others,
         spec.type.strip().lower(),

@@ -25,11 +25,13 @@ from identification.simulation.pi import due_moves, gapped
 
 @dataclass(frozen=True, slots=True)
 class StatedSettings:
-    """The controller stated by the plant: kp [% OP/% PV], ti [samples], and scans per sample of the recording."""
+    """The controller stated by the plant: kp [% OP/% PV], ti [samples], scans per sample of the recording; whether
+    a comparison of laws, with all unlisted properties free, finds no others."""
 
     kp: float
     ti: float
     scans: float = 1.0
+    confirmed: bool = False
 
     def thinned(self, limits: ControllerLimits) -> bool:
         """Whether OP responded to values of PV that were not recorded."""
@@ -178,15 +180,15 @@ def settings(found: ControlLaw, said: StatedSettings, limits: ControllerLimits) 
 def judge(x: Trends, said: StatedSettings) -> tuple[Finding | None, ControlLaw | None]:
     """The first finding about clock or controller, and the identified law.
 
-    said : on a thinned recording only clearly wrong settings are reported, because the law is not visible in detail;
-    nothing at all where its integral acts between the samples.
+    said : confirmed settings are not reported; on a thinned recording only clearly wrong ones are, because the law is
+    not visible in detail; nothing at all where its integral acts between the samples.
     """
     limits, thinned = x.limits, said.thinned(x.limits)
     if thinned and said.ti < limits.thinned_ti:
         return None, None
     found = recovered_law(x, said.ti, said.kp, late=not thinned)
     e = x.sp - first_order(x.pv, found.smoothed) + found.offset
-    wrong = None if obeys(x, said, found) else settings(found, said, limits)
+    wrong = None if said.confirmed or obeys(x, said, found) else settings(found, said, limits)
     if thinned:
         return wrong, found
     if found.late >= limits.late and found.explained > limits.law_explains:

@@ -128,12 +128,13 @@ def transmitter_end(recorder: Finding | None, pv: Floats) -> Clip | None:
 
 
 def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
-    """Add the effects of the catalogue that pass, and the gain [nat] of what remains beyond them."""
+    """Add the effects of the catalogue that pass, and the gain [nat] of what remains beyond them: nothing in a record
+    without every scan, where OP between the rows predicts PV too."""
     p, best = integrating_or_first_order(found.p, found.plain, s)
     found, last = one_by_one(replace(found, p=p, plain=best, best=best), tell, s)
     if len(found.accepted) > 1:
         found = as_a_set(found, tell, s)
-    left = left_over(found, last)
+    left = left_over(found, last) if s.every_scan or is_experiment(s) else Prediction()
     return replace(found, left=left.gain, left_by=left.way)
 
 
@@ -142,11 +143,12 @@ def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explan
 
     An effect without a name, which uses recorded PV, is excluded in a loop that cycles, because delayed PV predicts
     PV whatever causes the cycle, and in an experiment, because it is judged by simulation, and a model with recorded
-    PV as input is no simulation.
+    PV as input is no simulation. Behind a faulty valve in a record without every scan no further effect is tried: OP
+    moves the valve between the rows too, and what the model lacks there takes other names.
     """
     limits, candidates = found.p.limits.search, list[Candidate]()
-    has_rivals = s.cycles is None and not s.free_valve and not is_experiment(s)
-    for _ in range(limits.rounds):
+    has_rivals = s.cycles is None and not s.free_valve and not is_experiment(s) and s.every_scan
+    for _ in range(limits.rounds if s.cycles is None or s.every_scan else 1):
         x = round_of(found.p, found.best, s)
         candidates = compete(x, (*CANDIDATES, *RIVALS) if has_rivals else CANDIDATES, tell)
         if s.cycles is not None and not found.accepted:

@@ -142,7 +142,8 @@ def mark(found: Explanation) -> float:
 def carried_over(found: Explanation) -> Explanation:
     """The explanation with its proof: the longest sequence of effects, in order, that carries over to held-out data.
 
-    A valve identified from the loop's cycles is proven by them.
+    A valve identified from the loop's cycles is proven by them. The phase of a periodic load drifts from its fit, so
+    that held-out data in the band do not judge it.
     """
     names = tuple(r.name for r in found.accepted)
     cycle_s = 0.0 if found.cycles is None else found.cycles.cycle_s
@@ -154,7 +155,8 @@ def carried_over(found: Explanation) -> Explanation:
         unjudged = is_one_move(found.p) or proof.is_blind
         unproven = not proof.carries and proof.falls and unjudged
         timed = proof.falls and all(EFFECTS[name].timed for name in names[:count])
-        seen = proof.carries and (count == 1 or adds_in_band(kept, proof))
+        timed = timed and (proof.holds_in_band or any(c.row.needs == "line" for c in kept.accepted))
+        seen = proof.carries and adds_in_band(kept, proof)
         if seen or unproven or cycling or timed:
             return replace(kept, proof=proof, refuted=names[count:], unproven=unproven)
     proof = held_out(found.p, found.plain, found.plain, band=found.band)
@@ -163,9 +165,12 @@ def carried_over(found: Explanation) -> Explanation:
 
 
 def adds_in_band(found: Explanation, proof: HeldOut) -> bool:
-    """Whether the last of several effects removes enough of the held-out misfit in the loop's band, if that is known.
-    A second effect takes up what the first one's model leaves, which is a deficit of the model everywhere."""
-    if found.band is None or proof.banded is None:
+    """Whether the last effect removes enough of the held-out misfit in the loop's band, if that is known. A second
+    effect takes up what the first one's model leaves, which is a deficit of the model everywhere; the first one only
+    must not add to it."""
+    if found.band is None or proof.banded is None or not proof.holds_in_band:
+        return proof.holds_in_band
+    if len(found.accepted) == 1:
         return True
     less = first_effects(found, len(found.accepted) - 1)
     before = held_out(less.p, less.plain, less.best, band=found.band).banded

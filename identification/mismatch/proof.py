@@ -209,6 +209,12 @@ class HeldOut:
         before, after = (m.rmse**2 for m in self.banded or self.held)
         return 1.0 - after / max(before, 1e-30)
 
+    @property
+    def holds_in_band(self) -> bool:
+        """Whether the held-out misfit in the loop's band does not rise by more than chance; True where no band is
+        known."""
+        return self.banded is None or self.share_in_band > -self.limits.proof.most_worse_in_band
+
 
 def course(p: Problem, c: Floats, window: int, placed: bool) -> Floats:
     """PV's deviation [% PV], shape (n,), as drawn and judged: anchored in windows, the stem re-estimated or not."""
