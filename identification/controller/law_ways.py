@@ -269,6 +269,7 @@ def recognized(x: Look, stated: Pid, way: Way) -> Pid:
     """A stated controller completed by what the record shows: the properties of the variant that agrees with the
     stated gains, and the visible limits of OP and of its rate."""
     record, c = x.record, with_shape(stated, way.shape)
+    way = _clearer(x, way, stated)
     if way.pv_filter >= LAW.seen_filter and not stated.pv_filter_s:
         c = replace(c, pv_filter_s=_best_filter(x, way, stated) * record.dt_s)
     if way.sp_weight == 0.0 and c.kp and c.scan_s >= record.dt_s:
@@ -278,6 +279,24 @@ def recognized(x: Look, stated: Pid, way: Way) -> Pid:
     at_end, middle = record.op[clamped(record.op)], 0.5 * float(record.op.min() + record.op.max())
     low, high = at_end[at_end < middle], at_end[at_end > middle]
     return replace(c, op_lo=float(max([c.op_lo, *low[:1]])), op_hi=float(min([c.op_hi, *high[:1]])))
+
+
+def _clearer(x: Look, way: Way, stated: Pid) -> Way:
+    """The variant, or the one with the filter of PV with which the stated gains reproduce OP clearly better: where
+    little of OP is noise, gains agree with the record whatever filters it."""
+    if stated.td_s or stated.pv_filter_s:
+        return way
+
+    def poor(smooth: float) -> float:
+        seen = _filtered(x, way, smooth)
+        return np.inf if seen is None else seen.poorness(gains_of(stated))
+
+    own = poor(way.pv_filter)
+    if own < np.log(LAW.small) + LAW.plainly_better:
+        return way
+    found = {smooth: poor(smooth) for smooth in LAW.pv_filters if smooth > way.pv_filter}
+    best = min(found, key=found.__getitem__, default=way.pv_filter)
+    return replace(way, pv_filter=best) if found.get(best, own) < own - LAW.plainly_better else way
 
 
 def with_best_filter(x: Look, way: Way, stated: Pid) -> Seen | None:

@@ -31,10 +31,12 @@ HEALTHY = Drawn("H", "healthy", PROCESS, Controller(2.5, 150.0), Valve(), 25, 0.
 
 
 def assessed(
-    d: Drawn, way: str = "plain", hours: float = 8, scan_s: float | None = 1.0
+    d: Drawn, way: str = "plain", hours: float = 8, scan_s: float | None = 1.0, filter_s: float = 0.0
 ) -> tuple[Assessment, Pid]:
-    """What some hours of a loop come to, whose scan is stated or not, and its controller."""
-    r, spec = recorded(run(d, hours=hours), way, 1), replace(spec_of(d), scan_s=scan_s)
+    """What some hours of a loop come to, whose scan is stated or not and whose filter of PV is not, and its
+    controller."""
+    made = run(d, hours=hours, settings=replace(d.controller, pv_filter_s=filter_s))
+    r, spec = recorded(made, way, 1), replace(spec_of(d), scan_s=scan_s)
     stamp, good = START_S + r["stamp_s"], np.zeros(r["pv"].size, dtype=bool)
     found = {f"{d.name}.{role.upper()}": Series(stamp, r[role], good) for role in ("sp", "pv", "op")}
     made = prepare(spec, found, Config().quality)
@@ -73,6 +75,16 @@ def test_a_simulated_present_is_believed_only_where_it_agrees() -> None:
     wrong = replace(loop, controller=replace(pid, td_s=20.0, td_filter=0.0))
     _, ratio = agreement(wrong, fit, load).worst(limits) or ("", 0.0)
     assert ratio > 3.0
+
+
+@pytest.mark.parametrize("loop", [HEALTHY, WORN], ids=["healthy", "worn"])
+def test_a_filter_of_pv_is_recognized_where_stated_gains_agree_without_it(loop: Drawn) -> None:
+    """Where little of OP is noise, the stated gains agree whatever filters PV; the filter is still recognized, and
+    none where there is none."""
+    behind, plain = (assessed(loop, filter_s=smooth)[0].shown for smooth in (5.0, 0.0))
+    assert plain is None
+    assert behind is not None
+    assert behind.pv_filter_s == pytest.approx(5.0, rel=0.12)
 
 
 def test_rounding_costs_no_settings() -> None:
