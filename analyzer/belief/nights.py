@@ -11,6 +11,7 @@ from typing import Any
 import pyarrow as pa
 
 from analyzer.belief.belief import Belief, belief_of, kept_as, step
+from analyzer.belief.inputs import FOLLOWS, follow, has_inputs, inputs_of
 from analyzer.belief.pool import Pooled
 from analyzer.belief.wear import growth, wear
 from analyzer.columns import BELIEFS, Row, row_of
@@ -20,7 +21,7 @@ from analyzer.loop.decisions import CAUSES, Lane
 from analyzer.store import notes
 from analyzer.store.care import Problem
 from analyzer.store.store import Store
-from analyzer.store.table import DamagedError, rows_table
+from analyzer.store.table import DamagedError, marked, rows_table
 from analyzer.words import belief as words
 from identification.errors import InputError, NotNowError
 
@@ -85,8 +86,10 @@ def unfounded(store: Store, config: Config) -> list[Problem]:
     version stored no beliefs."""
     if not store.files("beliefs"):
         return []
-    names, wrong = store.nights(), set()
+    names, wrong = store.nights(), set[str]()
     try:
+        if _follows(store, names, config):
+            return []
         loops = list(dict.fromkeys(loop for name in names for loop in _loops(store, name, "nights")))
         repaired = _repaired(store)
         for part in in_parts(loops):
@@ -100,6 +103,27 @@ def unfounded(store: Store, config: Config) -> list[Problem]:
     remedy = "'triage store beliefs' computes them again"
     paths = [store.file("beliefs", night) for night in sorted(wrong)]
     return [Problem(f"{path}: inconsistent with the nights", remedy) for path in paths]
+
+
+def _follows(store: Store, names: Sequence[str], config: Config) -> bool:
+    """Whether the newest night's beliefs follow from the previous night's, and those of the others carry the digest
+    of their inputs, or of the oldest one are about deleted nights; False for a single night."""
+    repaired = _repaired(store)
+    if len(names) < 2 or not follow(store, names, repaired, config):
+        return False
+    with suppress(UnreadableError):
+        whole = has_inputs(store, names[0], None, repaired, config)
+        parts = in_parts(_loops(store, names[0], "beliefs"))
+        if not (whole or any(_pruned(store, names[0], part) for part in parts)):
+            return False
+        loops = [*_loops(store, names[-1], "nights"), *_loops(store, names[-2], "beliefs")]
+        for part in in_parts(list(dict.fromkeys(loops))):
+            known = read_beliefs(store, names[-2], part)
+            rows, _ = _with_night(store, names[-1], part, known, repaired, config)
+            if not _same(store, names[-1], rows, part):
+                return False
+        return True
+    return False
 
 
 def _write_all(store: Store, names: Sequence[str], before: str | None, config: Config) -> list[str]:
@@ -126,6 +150,7 @@ def _believed(
     if before == name:
         with suppress(UnreadableError):
             earlier = _loops(store, name, "beliefs")
+    digest = inputs_of(store, name, None if before == name else before, repaired, config)
     for part in in_parts(list(dict.fromkeys([*_loops(store, name, "nights"), *earlier]))):
         if before is None:
             known = {}
@@ -133,7 +158,7 @@ def _believed(
             known = _pruned(store, name, part) if before == name else read_beliefs(store, before, part)
         rows, failed = _with_night(store, name, part, known, repaired, config)
         lost += failed
-        yield rows_table(rows, BELIEFS)
+        yield marked(rows_table(rows, BELIEFS), FOLLOWS, digest)
 
 
 def in_parts(loops: Sequence[str]) -> Iterator[Sequence[str]]:

@@ -119,13 +119,23 @@ BESIDE = b"beside"
 
 def naming(table: pa.Table, beside: Iterable[str]) -> pa.Table:
     """A chunk's piece of the table of nights, with the names of the chunk's other pieces."""
-    return table.replace_schema_metadata({BESIDE: " ".join(beside).encode()})
+    return marked(table, BESIDE, " ".join(beside))
+
+
+def marked(table: pa.Table, key: bytes, text: str) -> pa.Table:
+    """A table with a text among its metadata."""
+    return table.replace_schema_metadata({key: text.encode()})
 
 
 def tables_beside(path: Path) -> list[str]:
     """The tables of which a chunk has written further pieces; errors as of `read_stored`."""
+    return mark_of(path, BESIDE).split()
+
+
+def mark_of(path: Path, key: bytes) -> str:
+    """A text among the metadata of a stored table, '' if there is none; errors as of `read_stored`."""
     with _for_parquet(path) as held:
-        return (pq.read_schema(held).metadata or {}).get(BESIDE, b"").decode().split()
+        return (pq.read_schema(held).metadata or {}).get(key, b"").decode()
 
 
 def read_stored(

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from analyzer.belief.belief import step
 from analyzer.belief.nights import settle, settle_anew, unfounded
 from analyzer.columns import NIGHTS, row_of
 from analyzer.config import Config
@@ -71,6 +73,38 @@ def test_one_command_makes_them_anew_and_check_sees_where_they_differ(tmp_path: 
     ]
     settle_anew(store, CONFIG)
     assert believed(store) == first
+
+
+def test_check_computes_one_night_of_beliefs_that_carry_their_inputs(tmp_path, monkeypatch) -> None:
+    """Of ten nights the newest alone is computed again, also after the oldest ones are deleted and after a note on a
+    later repair; another limit computes all."""
+    store, counted = store_of(tmp_path / "s", ten_nights()), []
+
+    def counting(before: Any, row: Any, *more: Any) -> Any:
+        counted.append(row["night"])
+        return step(before, row, *more)
+
+    monkeypatch.setattr("analyzer.belief.nights.step", counting)
+    assert unfounded(store, CONFIG) == []
+    assert counted == ["2026-03-11"]
+    assert pruned(store, 4, None)
+    notes.add(store.path, Note("L", ten_nights()[9]["start_s"] + 20 * 86400.0, "valve replaced"))
+    assert unfounded(store, CONFIG) == []
+    assert counted == 2 * ["2026-03-11"]
+    other = replace(CONFIG, belief=replace(CONFIG.belief, half_life=5.0))
+    assert unfounded(store, other)
+    assert len(counted) > 3
+
+
+@pytest.mark.parametrize("k", [0, 4, 9])
+def test_check_sees_a_night_that_was_written_again(k: int, tmp_path: Path) -> None:
+    """A night whose table has changed since its beliefs were computed is found, whichever it is."""
+    rows = ten_nights()
+    store = store_of(tmp_path / "s", rows)
+    anew = row_of({**row(k, WORN, backlash_pct=2.0), "night": rows[k]["night"]}, NIGHTS)
+    store.write("nights", rows[k]["night"], rows_table([anew], NIGHTS))
+    named = [p.seen for p in unfounded(store, CONFIG)]
+    assert any(rows[k]["night"] in seen for seen in named)
 
 
 def test_a_store_of_an_earlier_version_is_taken_in(tmp_path: Path) -> None:
