@@ -65,14 +65,18 @@ def tags_of(spec: LoopSpec, specs: Sequence[LoopSpec]) -> list[str]:
 
 
 def stated_law(spec: LoopSpec, prepared: Prepared, period_s: float, config: Config) -> StatedSettings | None:
-    """The controller as stated, integral time in samples, confirmed if a night finds no other settings; None if it is
-    unknown, not a PI, or one whose gain changed by its schedule. period_s, of the loop's cycle, 0 without one."""
+    """The controller as stated, integral time in samples, confirmed if rows are slower than its scan and a night
+    finds no others; None if it is unknown, not a PI, or one whose gain changed by its schedule. period_s, of the
+    loop's cycle, 0 without one."""
     pid = controller(spec, prepared.scale.span, prepared.gain_share)
     if pid is None or pid.td_s > 0 or not math.isfinite(pid.ti_s) or prepared.record.gain_share is not None:
         return None
-    dt_s, scale_s = prepared.record.dt_s, period_s or time_scale(prepared.record, None, pid)
-    confirmed = differing(prepared.record, pid, scale_s, config.settings) is None
-    return StatedSettings(pid.kp, pid.ti_s / dt_s, dt_s / (spec.scan_s or dt_s), confirmed)
+    dt_s = prepared.record.dt_s
+    said = StatedSettings(pid.kp, pid.ti_s / dt_s, dt_s / (spec.scan_s or dt_s))
+    if not said.thinned(config.explain.controller):
+        return said
+    scale_s = period_s or time_scale(prepared.record, None, pid)
+    return replace(said, confirmed=differing(prepared.record, pid, scale_s, config.settings) is None)
 
 
 def ops_beside(
