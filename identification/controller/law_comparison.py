@@ -70,7 +70,7 @@ def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompar
     best, given = None, None
     for seen in _ways(x, stated):
         if seen.does(gains):
-            return LawsCompared(recognized(x, stated, _way_needed(seen, given, stated)), 1.0, 1.0, True)
+            return LawsCompared(recognized(x, stated, seen, _way_needed(seen, given, stated)), 1.0, 1.0, True)
         if not seen.is_law(gains):
             continue
         if best is None or seen.poorness(seen.free) < best.poorness(best.free) - LAW.worth:
@@ -84,7 +84,7 @@ def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompar
     if given.way.pv_filter >= LAW.seen_filter:
         near = with_best_filter(x, given.way, stated)
         if near is not None and near.does(gains):
-            return LawsCompared(recognized(x, stated, near.way), 1.0, 1.0, True)
+            return LawsCompared(recognized(x, stated, near, near.way), 1.0, 1.0, True)
     found = _simplest(best, gains, record.duration_s, with_shape(stated, best.way.shape))
     return None if found is None else _most_apart(best, given, gains, *found)
 

@@ -265,11 +265,11 @@ def _best_gap(x: Look, size: float, inside: float, gains: Floats | None) -> floa
     return 0.5 * (low + high)
 
 
-def recognized(x: Look, stated: Pid, way: Way) -> Pid:
-    """A stated controller completed by what the record shows: the properties of the variant that agrees with the
-    stated gains, and the visible limits of OP and of its rate."""
+def recognized(x: Look, stated: Pid, seen: Seen, way: Way) -> Pid:
+    """A stated controller completed by what the record shows: the properties `way` of the variant seen, which agrees
+    with the stated gains, and the visible limits of OP and of its rate."""
     record, c = x.record, with_shape(stated, way.shape)
-    way = _clearer(x, way, stated)
+    way = _clearer(x, seen, way, stated)
     if way.pv_filter >= LAW.seen_filter and not stated.pv_filter_s:
         c = replace(c, pv_filter_s=_best_filter(x, way, stated) * record.dt_s)
     if way.sp_weight == 0.0 and c.kp and c.scan_s >= record.dt_s:
@@ -281,20 +281,13 @@ def recognized(x: Look, stated: Pid, way: Way) -> Pid:
     return replace(c, op_lo=float(max([c.op_lo, *low[:1]])), op_hi=float(min([c.op_hi, *high[:1]])))
 
 
-def _clearer(x: Look, way: Way, stated: Pid) -> Way:
-    """The variant, or the one with the filter of PV with which the stated gains reproduce OP clearly better: where
-    little of OP is noise, gains agree with the record whatever filters it."""
-    if stated.td_s or stated.pv_filter_s:
+def _clearer(x: Look, seen: Seen, way: Way, stated: Pid) -> Way:
+    """Its properties, or those with the filter of PV with which the stated gains reproduce OP clearly better than in
+    the variant seen: where little of OP is noise, gains agree with the record whatever filters it."""
+    own = seen.poorness(gains_of(stated))
+    if stated.td_s or stated.pv_filter_s or own < np.log(LAW.small) + LAW.plainly_better:
         return way
-
-    def poor(smooth: float) -> float:
-        seen = _filtered(x, way, smooth)
-        return np.inf if seen is None else seen.poorness(gains_of(stated))
-
-    own = poor(way.pv_filter)
-    if own < np.log(LAW.small) + LAW.plainly_better:
-        return way
-    found = {smooth: poor(smooth) for smooth in LAW.pv_filters if smooth > way.pv_filter}
+    found = {f: _poorness(x, way, stated, f) for f in LAW.pv_filters if f > way.pv_filter}
     best = min(found, key=found.__getitem__, default=way.pv_filter)
     return replace(way, pv_filter=best) if found.get(best, own) < own - LAW.plainly_better else way
 
@@ -310,14 +303,16 @@ def _filtered(x: Look, way: Way, smooth: float) -> Seen | None:
     return x.seen(rows_of(x.record, shaped(error, way.shape)), replace(way, pv_filter=smooth))
 
 
+def _poorness(x: Look, way: Way, stated: Pid, smooth: float) -> float:
+    """Misfit of the stated gains, as Seen.poorness, behind another filter of PV [samples]."""
+    seen = _filtered(x, way, smooth)
+    return np.inf if seen is None else seen.poorness(gains_of(stated))
+
+
 def _best_filter(x: Look, way: Way, stated: Pid) -> float:
     """The filter of PV, near that of a variant, with which the stated gains reproduce OP best [samples]; the
     variant's own if there is a derivative, which also has a filter."""
     if stated.td_s:
         return way.pv_filter
-
-    def poor(smooth: float) -> float:
-        seen = _filtered(x, way, smooth)
-        return np.inf if seen is None else seen.poorness(gains_of(stated))
-
-    return float(min(way.pv_filter * np.geomspace(0.5, 2.0, LAW.filters_near), key=poor))
+    near = way.pv_filter * np.geomspace(0.5, 2.0, LAW.filters_near)
+    return float(min(near, key=lambda smooth: _poorness(x, way, stated, smooth)))
