@@ -73,8 +73,9 @@ def test_a_simulated_present_is_believed_only_where_it_agrees() -> None:
     load = load_of(fit, pid)
     assert agreement(loop, fit, load).worst(limits) is None
     wrong = replace(loop, controller=replace(pid, td_s=20.0, td_filter=0.0))
-    _, ratio = agreement(wrong, fit, load).worst(limits) or ("", 0.0)
-    assert ratio > 3.0
+    made = agreement(wrong, fit, load)
+    assert made.worst(limits) is not None
+    assert made.stem_travel > 3.0
 
 
 @pytest.mark.parametrize("loop", [HEALTHY, WORN], ids=["healthy", "worn"])
