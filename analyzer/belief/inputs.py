@@ -47,7 +47,7 @@ def has_inputs(
         return False
 
 
-def follow(
+def all_have_inputs(
     store: Store, names: Sequence[str], repaired: Mapping[str, Sequence[float]], config: Config
 ) -> bool:
     """Whether the beliefs of all nights between the oldest and the newest carry the digest of their inputs. The

@@ -11,7 +11,7 @@ from typing import Any
 import pyarrow as pa
 
 from analyzer.belief.belief import Belief, belief_of, kept_as, step
-from analyzer.belief.inputs import FOLLOWS, follow, has_inputs, inputs_of
+from analyzer.belief.inputs import FOLLOWS, all_have_inputs, has_inputs, inputs_of
 from analyzer.belief.pool import Pooled
 from analyzer.belief.wear import growth, wear
 from analyzer.columns import BELIEFS, Row, row_of
@@ -88,7 +88,7 @@ def unfounded(store: Store, config: Config) -> list[Problem]:
         return []
     names, wrong = store.nights(), set[str]()
     try:
-        if _follows(store, names, config):
+        if _consistent(store, names, config):
             return []
         loops = list(dict.fromkeys(loop for name in names for loop in _loops(store, name, "nights")))
         repaired = _repaired(store)
@@ -105,11 +105,11 @@ def unfounded(store: Store, config: Config) -> list[Problem]:
     return [Problem(f"{path}: inconsistent with the nights", remedy) for path in paths]
 
 
-def _follows(store: Store, names: Sequence[str], config: Config) -> bool:
+def _consistent(store: Store, names: Sequence[str], config: Config) -> bool:
     """Whether the newest night's beliefs follow from the previous night's, and those of the others carry the digest
     of their inputs, or of the oldest one are about deleted nights; False for a single night."""
     repaired = _repaired(store)
-    if len(names) < 2 or not follow(store, names, repaired, config):
+    if len(names) < 2 or not all_have_inputs(store, names, repaired, config):
         return False
     with suppress(UnreadableError):
         whole = has_inputs(store, names[0], None, repaired, config)
