@@ -32,7 +32,11 @@ from proofs.sampling import ROWS, settings
 
 VALVE = {"backlash", "stiction", "positioner"}
 LOADS = {"load-step", "load-oscillation", "coupling"}
+"""Effects that a worn valve has, and those of a load."""
 WORN = ("backlash", "stiction", "backlash-quiet")
+"""True causes that are worn valves."""
+WORSE = 1.005
+"""Ratio of rms misfits from which a model is worse: a hundredth of the mean square (proof.most_worse_in_band)."""
 EACH = 8
 """Loops of each kind of one draw of the world."""
 PARTS = ("loops", "valve by run", "valve by explain", "invented effect", "worse held out")
@@ -61,7 +65,7 @@ def judged(asked: Asked) -> tuple[str, Counter[str]]:
         few = cycle is None or cycle.period_s < ROWS * asked.every
         group = "worn, few rows a cycle" if few else "worn"
     there = LOADS | VALVE if asked.cause in WORN else LOADS
-    worse = bool(names) and held_out(data)[1] > 1.005 * held_out(data)[0]
+    worse = bool(names) and held_out(data)[1] > WORSE * held_out(data)[0]
     said = (True, night.verdict.cause is Cause.VALVE, bool(VALVE & names), bool(names - there), worse)
     return group, Counter({part: int(x) for part, x in zip(PARTS, said, strict=True)})
 
