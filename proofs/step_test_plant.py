@@ -6,7 +6,7 @@ answer; drift; play; a sample in 1 to 60 s; stamps that scatter. Processes are i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,29 +74,70 @@ def drawn(seed: int) -> Truth:
 def recorded(t: Truth, seed: int) -> Recorded:
     """The test as a historian has it."""
     rng = np.random.default_rng([seed, 1])
-    scale = (sum(t.lags_s) + t.dead_s) if t.lags_s else 6.0 * t.dead_s
-    ways = directions(t, rng)
-    sizes = rng.uniform(4.0, 8.0, t.moves)
-    rests = scale * rng.uniform(4.0, 6.0, t.moves + 1)
+    stamps, op, clean, noise = undisturbed(t, rng, t)
+    return Recorded(stamps, clean + noise * rng.normal(size=clean.size), op)
+
+
+def undisturbed(t: Truth, rng: np.random.Generator, planned: Truth) -> tuple[Floats, Floats, Floats, float]:
+    """Stamps [s], OP, PV without noise and the size of the noise [%] of a process whose test was planned for another.
+
+    The other process draws the test, so that the derivatives of PV by the constants of a process can be taken.
+    """
+    p = planned
+    scale = (sum(p.lags_s) + p.dead_s) if p.lags_s else 6.0 * p.dead_s
+    ways = directions(p, rng)
+    sizes = rng.uniform(4.0, 8.0, p.moves)
+    rests = scale * rng.uniform(4.0, 6.0, p.moves + 1)
     rests[0] = scale * rng.uniform(1.5, 3.0)
     end_s = float(rests.sum())
-    shortest = min([x for x in (*t.lags_s, t.zero_s, t.dead_s) if x > 0.0])
-    fine_s = min(shortest / FINE, t.sample_s / 2.0)
+    shortest = min([x for x in (*p.lags_s, p.zero_s, p.dead_s) if x > 0.0])
+    fine_s = min(shortest / FINE, p.sample_s / 2.0)
     clock = np.arange(0.0, end_s, fine_s)
     op = np.full(clock.size, 45.0)
     for at, way, size in zip(np.cumsum(rests)[:-1], ways, sizes, strict=True):
         op[clock >= at] += way * size
     stem = behind_play(op, t.play * float(sizes.mean()), float(rng.uniform()))
-    clean = response(
-        t, np.r_[np.full(round(t.dead_s / fine_s), stem[0]), stem][: clock.size] - stem[0], fine_s
-    )
-    answer = abs(t.gain) * float(sizes.mean()) * (float(rests.mean()) if t.kind == "integrator" else 1.0)
-    stamps = np.arange(0.0, end_s - t.sample_s, t.sample_s)
-    stamps = stamps + t.scatter * t.sample_s * rng.uniform(-0.5, 0.5, stamps.size) + 0.5 * t.sample_s
+    clean = response(t, stem - stem[0], fine_s)
+    answer = abs(p.gain) * float(sizes.mean()) * (float(rests.mean()) if p.kind == "integrator" else 1.0)
+    stamps = np.arange(0.0, end_s - p.sample_s, p.sample_s)
+    stamps = stamps + p.scatter * p.sample_s * rng.uniform(-0.5, 0.5, stamps.size) + 0.5 * p.sample_s
+    late = np.interp(stamps - t.dead_s, clock, clean, left=0.0)
     at = np.minimum((stamps / fine_s).astype(int), clock.size - 1)
-    load = t.drift * answer * stamps / end_s
-    pv = 50.0 + clean[at] + load + t.noise * answer * rng.normal(size=at.size)
-    return Recorded(stamps, pv, op[at])
+    return stamps, op[at], 50.0 + late + t.drift * answer * stamps / end_s, p.noise * answer
+
+
+def best_scatter(t: Truth, seed: int, name: str) -> float:
+    """Smallest standard deviation that an unbiased estimate of a constant can have, by the bound of Cramer and Rao.
+
+    The noise is white and normal; offset, drift and all constants of the process are unknown (Kay 1993, ch. 3).
+    """
+    columns = [_slope(t, seed, field) for field in _constants(t)]
+    columns += [np.ones_like(columns[0]), np.linspace(0.0, 1.0, columns[0].size)]
+    noise = undisturbed(t, np.random.default_rng([seed, 1]), t)[3]
+    matrix = np.array(columns).T
+    scale = np.linalg.norm(matrix, axis=0)
+    spread = np.linalg.inv((matrix / scale).T @ (matrix / scale))
+    k = _constants(t).index(name)
+    return float(noise * np.sqrt(spread[k, k]) / scale[k])
+
+
+def _constants(t: Truth) -> list[str]:
+    """Names of a process's constants; `lags_s:0` is the first lag."""
+    named = ["gain", "dead_s", *(f"lags_s:{k}" for k in range(len(t.lags_s)))]
+    return named + [x for x in ("zero_s", "play") if getattr(t, x) > 0.0]
+
+
+def _slope(t: Truth, seed: int, constant: str) -> Floats:
+    """The derivative of PV by a constant, at its stamps."""
+    name, _, at = constant.partition(":")
+    value = t.lags_s[int(at)] if at else getattr(t, name)
+    step = 0.02 * abs(value)
+    ends = []
+    for x in (value + step, value - step):
+        put = tuple(x if k == int(at) else lag for k, lag in enumerate(t.lags_s)) if at else x
+        moved = undisturbed(replace(t, **{name: put}), np.random.default_rng([seed, 1]), t)
+        ends.append(moved[2])
+    return np.asarray((ends[0] - ends[1]) / (2.0 * step))
 
 
 def directions(t: Truth, rng: np.random.Generator) -> Floats:

@@ -8,11 +8,12 @@ The plant is proofs/step_test_plant.py, which shares no code with the packages. 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.special import erf
 
 from analyzer.config import Config
 from analyzer.history.series import Series
@@ -20,7 +21,7 @@ from analyzer.loop.decisions import LacksError
 from analyzer.loop.experiments import learned
 from analyzer.loop.quality import prepare
 from analyzer.loops.spec import LoopSpec
-from proofs.step_test_plant import Truth, drawn, recorded
+from proofs.step_test_plant import Truth, best_scatter, drawn, recorded
 
 RESULT = Path(__file__).with_suffix(".md")
 WITHIN = {"gain": 0.10, "sum of lags": 0.15, "dead time": 0.30}
@@ -38,6 +39,8 @@ class Asked:
     low: float
     high: float
     right: bool
+    possible: float = np.nan
+    """Probability that an unbiased normal estimate of the smallest possible scatter is right; dead times only."""
 
     @property
     def holds(self) -> bool:
@@ -64,12 +67,17 @@ def asked(seed: int) -> tuple[Truth, list[Asked]]:
     keys = {"gain": "slope_pct_per_s" if t.kind == "integrator" else "gain", "sum of lags": "lags_s"}
     out = []
     for name, truth in names.items():
+        near = max(WITHIN[name] * abs(truth), t.sample_s if name == "dead time" else 0.0)
+        can = (
+            float(erf(near / best_scatter(t, seed, "dead_s") / np.sqrt(2.0)))
+            if name == "dead time"
+            else np.nan
+        )
         e = None if model is None else model.estimates.get(keys.get(name, "dead_time_s"))
         if e is None:
-            out.append(Asked(name, truth, None, 0.0, 0.0, False))
+            out.append(Asked(name, truth, None, 0.0, 0.0, False, can))
             continue
-        near = max(WITHIN[name] * abs(truth), t.sample_s if name == "dead time" else 0.0)
-        out.append(Asked(name, truth, e.value, e.low, e.high, abs(e.value - truth) <= near))
+        out.append(Asked(name, truth, e.value, e.low, e.high, abs(e.value - truth) <= near, can))
     return t, out
 
 
@@ -90,27 +98,41 @@ def table(found: list[tuple[Truth, list[Asked]]]) -> Iterator[str]:
     some = [a for a in every if a.value is not None]
     yield f"\nIntervals of all constants: {100 * sum(a.holds for a in some) / len(some):.0f} % hold the truth."
     yield f"Wrong signs: {wrong} of {len(gains)}."
-    yield "\n| by noise over the answer | tests | gain right | lags right | dead time right |\n|---|---|---|---|---|"
+    yield (
+        "\nDead times: unbiased estimates with the smallest scatter that the noise of each test allows (the bound of "
+        "Cramer and Rao, with gain, lags, zero, play, offset and drift unknown) would be right in "
+        f"{100 * possible(every):.0f} %."
+    )
+    yield "\n| by noise over the answer | tests | gain right | lags right | dead time right | the noise allows |"
+    yield "|---|---|---|---|---|---|"
     for low, high in ((0.0, 0.1), (0.1, 0.2), (0.2, 0.34)):
         part = [of for t, of in found if low <= t.noise < high]
         cells = []
         for name in WITHIN:
             own = [a for of in part for a in of if a.name == name]
             cells.append(f"{sum(a.right for a in own)} of {len(own)}")
+        cells.append(f"{100.0 * possible(a for of in part for a in of):.0f} %")
         yield f"| {low:g} to {high:g} | {len(part)} | {' | '.join(cells)} |"
+
+
+def possible(every: Iterable[Asked]) -> float:
+    """Share of dead times that unbiased estimates with the smallest possible scatter would have right."""
+    shares = [a.possible for a in every if a.name == "dead time"]
+    return float(np.mean(shares)) if shares else np.nan
 
 
 def main() -> None:
     """Print the table, and write it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--tests", type=int, default=60)
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seed", type=int, nargs="+", default=[1])
     args = parser.parse_args()
     found = []
-    for k in range(args.tests):
-        found.append(asked(1000 * args.seed + k))
+    for k in (1000 * seed + i for seed in args.seed for i in range(args.tests)):
+        found.append(asked(k))
         print(k, found[-1][0].kind, [(a.name, a.right, a.holds) for a in found[-1][1]], flush=True)
-    head = f"# Step tests\n\n`python -m proofs.step_tests --tests {args.tests} --seed {args.seed}`\n"
+    seeds = " ".join(map(str, args.seed))
+    head = f"# Step tests\n\n`python -m proofs.step_tests --tests {args.tests} --seed {seeds}`\n"
     about = (
         "\nLag, two lags, integrator or inverse response; one to six moves of 4 to 8 %; noise of 1 to 33 % of the "
         "mean answer; in half of the tests a drift of up to 40 % of it; play of 5 to 30 % of a step in two of five "
