@@ -37,6 +37,7 @@ from analyzer.loop.ringing import same_period
 from analyzer.loop.setpoint_moves import Move, moves
 from analyzer.loop.shared_valve import Shared
 from analyzer.plantwide.wave import Wave, waves_of
+from identification.controller.free_law import FreeLaw
 from identification.controller.gain_pieces import ScheduledGain
 from identification.errors import NotAssessedError
 from identification.models import Pid
@@ -57,9 +58,9 @@ class Assessment:
 
     loop; start_s, duration_s of the record [s]; night, the figures of the whole span; hours, of each clock hour;
     oscillations; verdict; settings, the controller's if they differ from the stated ones; shown, the stated
-    controller with further terms found in the record, or the recorded one if none is stated; scheduled_over, as in
-    Shown; harris index (1: minimum variance) if known; moves of the set point; waves, its data for the plant-wide
-    analysis; trend, thinned; notes, sentences about the data; needs, the missing data for whether the loop
+    controller with further terms found in the record, or the recorded one if none is stated; scheduled_over and law,
+    as in Shown; harris index (1: minimum variance) if known; moves of the set point; waves, its data for the
+    plant-wide analysis; trend, thinned; notes, sentences about the data; needs, the missing data for whether the loop
     oscillates, None if this is known; close_s, first and last time [s] of the last ten periods; for_settings, the
     missing data for new settings regardless of the cause, None if there are none; judged_h, good hours in automatic
     on which oscillations and verdict are based: of the stretch that is judged (judged_stretch.py), whose settings are
@@ -76,6 +77,7 @@ class Assessment:
     settings: Pid | None = None
     shown: Pid | None = None
     scheduled_over: ScheduledGain | None = None
+    law: FreeLaw | None = None
     harris: float | None = None
     moves: tuple[Move, ...] = ()
     waves: tuple[Wave, ...] = ()
@@ -198,7 +200,7 @@ def hidden(
         controller = as_recorded(record, controller, scale_s, config.settings)
     if found.first is not None:
         folded = None if controller is None else config.advice.cycle_per_ti * controller.ti_s
-        if folded is None or folded >= NYQUIST * record.dt_s:
+        if controller is None or folded is None or folded >= NYQUIST * record.dt_s:
             return None
         return Requirement(
             MissingData.FASTER, RequirementKind.UNFOLDED, (folded / samples, record.dt_s, folded)
@@ -238,12 +240,21 @@ def _judge_stretch(prepared: Prepared, stretch: Stretch, config: Config, kind: s
     if part.op_known and part.op_scaled and not stretch.outdated:
         scale = time_scale(part.record, counting(found), stated)
         seen = shown(part.record, stated, scale, config.settings)
-    acting = seen.other or (None if stated is None else seen.beside) or stated
+    acting = _acting(seen, stated)
     found, verdict = judged_where(part, found, span, acting, config, kind)
     thin = None if verdict.told_between_rows else too_thin(record.dt_s, acting, config)
     if _hours_in(part.record) < config.advice.least_h or thin is not None:
         verdict = cap_confidence(verdict, config.advice.hint_pct)
     return _Judged(part, found if whole else of_all, found, verdict, seen)
+
+
+def _acting(seen: Shown, stated: Pid | None) -> Pid | None:
+    """The controller that acts on a record: the recorded one where it differs from the stated one, else the stated
+    one completed. Where none is stated a recorded one with integral action: a copy of PV follows a proportional law
+    too."""
+    if stated is None and seen.beside is not None and not seen.beside.ki:
+        return None
+    return seen.other or seen.beside or stated
 
 
 def judged_where(
@@ -306,6 +317,7 @@ def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: C
         settings=judged.shown.other,
         shown=judged.shown.beside,
         scheduled_over=judged.shown.scheduled_over,
+        law=judged.shown.law,
         harris=harris_index(record.error, record.usable, record.dt_s, dead_time) if dead_time else None,
         moves=moves(record, night.noise_band_pct or 0.0, config.figures),
         waves=waves_of(record.tag, judged.of_all, end_s, config.plant),

@@ -24,9 +24,10 @@ from analyzer.loops.changes import TuningChange, settings_before
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller as stated_controller
 from identification.controller.check import runs
+from identification.controller.free_law import FreeLaw, free_law
 from identification.controller.gain_pieces import ScheduledGain, gain_pieces
 from identification.controller.law_comparison import LawsCompared, best_of, compare_laws, scheduled_over
-from identification.controller.pid_regression import clamped, fit_pi
+from identification.controller.pid_regression import clamped
 from identification.models import Pid
 from identification.record import LoopRecord, Mask
 
@@ -121,12 +122,14 @@ class Shown:
     other, settings that differ from the stated ones, None if they agree or the record is not sufficient; beside, the
     stated ones with the controller's further terms, or the recorded ones if none are stated, None if the record shows
     no more than is stated; scheduled_over, the signal, OP, PV or SP, that schedules the gain, so that the
-    stated gain is valid only in a part of its range, None if there is none.
+    stated gain is valid only in a part of its range, None if there is none; law, the record's own law with intervals,
+    where it is reported.
     """
 
     other: Pid | None = None
     beside: Pid | None = None
     scheduled_over: ScheduledGain | None = None
+    law: FreeLaw | None = None
 
 
 def shown(record: LoopRecord, stated: Pid | None, scale_s: float, limits: SettingsLimits) -> Shown:
@@ -137,10 +140,14 @@ def shown(record: LoopRecord, stated: Pid | None, scale_s: float, limits: Settin
     """
     if record.mask("compressed").mean() > limits.straight_share:
         return Shown()
-    if record.mask("saturated").mean() > limits.saturated_share:
-        return Shown()
+    saturated = record.mask("saturated").mean() > limits.saturated_share
     if stated is None:
-        return Shown(beside=recorded(record, scale_s, limits))
+        law = recorded(record, scale_s, limits)
+        if law is not None and saturated and law.found.td_s:  # at the limits its slope is not seen
+            law = None
+        return Shown(beside=None if law is None else law.found, law=law)
+    if saturated:
+        return Shown()
     for part in (record.span(len(record) // 2, len(record)), record):
         seen = compare_laws(part, scale_s, stated)
         if seen is None:
@@ -152,7 +159,9 @@ def shown(record: LoopRecord, stated: Pid | None, scale_s: float, limits: Settin
             return Shown(beside=beside) if best is stated else Shown(best)
         if _plainly(seen, stated, part, limits):
             over = gain_pieces(record, stated) or scheduled_over(part, scale_s, stated)
-            return Shown(seen.found) if over is None else Shown(scheduled_over=over)
+            if over is not None:
+                return Shown(scheduled_over=over)
+            return Shown(seen.found, law=recorded(part, scale_s, limits))
         form = _of_another_form(part, stated, scale_s, limits)
         if form is not None:
             return Shown(form)
@@ -164,16 +173,15 @@ def differing(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsL
     return shown(record, stated, scale_s, limits).other
 
 
-def recorded(record: LoopRecord, scale_s: float, limits: SettingsLimits) -> Pid | None:
-    """The controller identified in a record if none is stated; None if no law with a gain explains nearly all of
-    OP."""
-    first = fit_pi(record, scale_s)
-    if first is None or first.kp == 0.0 or first.explained < limits.explained:
+def recorded(record: LoopRecord, scale_s: float, limits: SettingsLimits) -> FreeLaw | None:
+    """The law identified in a record whatever is stated; None if none explains nearly all of OP, if its gain differs
+    between parts of a range, or if its integral acts, or its filter of PV is longer, than the samples show."""
+    law = free_law(record, scale_s)
+    if law is None or law.several or law.explained < limits.explained_alone:
         return None
-    seen = compare_laws(record, scale_s, Pid(first.kp, first.ti_s, scan_s=record.dt_s))
-    if seen is None or seen.explained < limits.explained_alone or seen.found.kp == 0.0:
-        return None
-    return seen.found if seen.found.ti_s >= limits.ti_samples * record.dt_s else None
+    ti_s = law.found.ti_s
+    unseen = law.found.kp != 0.0 and ti_s < limits.ti_samples * record.dt_s
+    return None if unseen or law.found.pv_filter_s > limits.filter_of_ti * ti_s else law
 
 
 def as_recorded(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits) -> Pid:

@@ -10,6 +10,7 @@ from analyzer.columns import Row
 if TYPE_CHECKING:
     from analyzer.loop.quality import Scale
     from analyzer.loops.spec import LoopSpec
+    from identification.controller.free_law import FreeLaw
     from identification.controller.gain_pieces import ScheduledGain
     from identification.models import Pid
 
@@ -91,6 +92,21 @@ def of_controller(pid: Pid, spec: LoopSpec, pv_span: float) -> str:
     known = settings(kp, ti, gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit), spec.ti_unit)
     td = derivative_as_stated(pid, spec, pv_span)
     return f"{known}, Td {number(td)} {'s' if spec.ti_unit == 's' else 'min'}" if td else known
+
+
+def within(law: FreeLaw | None, spec: LoopSpec, pv_span: float) -> str:
+    """The 90 % intervals of a law's gain and integral time in the units of entry; '' without a law."""
+    from analyzer.loops.tags import as_stated
+
+    if law is None:
+        return ""
+    kps = [replace(law.found, kp=x) for x in (law.kp.low, law.kp.high)]
+    tis = [replace(law.found, ti_s=x) for x in (law.ti_s.low, law.ti_s.high)]
+    said = []
+    for at, (name, pids) in enumerate((("Kp", kps), ("Ti", tis))):
+        low, high = sorted(as_stated(pid, spec, pv_span)[at] for pid in pids)
+        said += [f"{name} {number(low)} to {number(high)}"] if low < high else []
+    return f" (90 % intervals: {', '.join(said)})" if said else ""
 
 
 def beside_settings(stated: Pid, shown: Pid, spec: LoopSpec, pv_span: float) -> str:

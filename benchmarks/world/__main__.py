@@ -7,6 +7,7 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -60,21 +61,27 @@ def export(folder: Path, records: dict[str, Recording]) -> list[Path]:
     return sorted(folder.glob("*.parquet"))
 
 
-def spec_of(d: Drawn) -> LoopSpec:
-    """The loop as loops.csv states it."""
+def spec_of(d: Drawn, stated: bool = True) -> LoopSpec:
+    """The loop as loops.csv states it, with its settings or without."""
     tags = {role: f"{d.name}.{role.upper()}" for role in ("sp", "pv", "op")}
     c = d.controller
-    return LoopSpec(d.name, pv_lo=0.0, pv_hi=100.0, kp=c.kp, ti=c.ti_s, scan_s=c.scan_s, **tags)
+    plain = LoopSpec(d.name, pv_lo=0.0, pv_hi=100.0, **tags)
+    return replace(plain, kp=c.kp, ti=c.ti_s, scan_s=c.scan_s) if stated else plain
 
 
 def told(
-    loops: list[Drawn], records: dict[str, Recording], jobs: int, columns: Sequence[str] = COLUMNS
+    loops: list[Drawn],
+    records: dict[str, Recording],
+    jobs: int,
+    columns: Sequence[str] = COLUMNS,
+    stated: bool = True,
 ) -> dict[str, dict[str, Any]]:
-    """Rows of the night by loop."""
+    """Rows of the night by loop; stated: whether loops.csv has the settings."""
     with tempfile.TemporaryDirectory() as folder:
         files = export(Path(folder), records)
         store = Store(Path(folder) / "store")
-        batch.run(Plant(open_export(files), tuple(map(spec_of, loops)), Config()), store, jobs)
+        specs = tuple(spec_of(d, stated) for d in loops)
+        batch.run(Plant(open_export(files), specs, Config()), store, jobs)
         return {r["loop"]: r for r in store.own_rows("nights", store.nights()[-1], columns)}
 
 

@@ -16,6 +16,8 @@ from proofs.common import command_line, table
 DAYS = ("another day", "SP moves", "PV filter")
 """Variations of the day itself: another load; eight set point moves; a filter of 5 s on the PV that the controller
 sees, which loops.csv does not state."""
+UNSTATED = "settings unstated"
+"""The plain record of a loop for which loops.csv has no settings."""
 SIZE, PERIOD = 0.2, 0.05
 """Changes of size and period from which an answer counts as changed."""
 
@@ -65,7 +67,7 @@ def _compared(d: Drawn, way: str, before: dict[str, Any], after: dict[str, Any],
 def main() -> None:
     """Draw, vary, assess, compare."""
     asked = command_line(
-        __doc__, seed=[1], each=8, ways=[*WAYS[1:], *DAYS], jobs=2, kinds=list(KINDS), show=False
+        __doc__, seed=[1], each=8, ways=[*WAYS[1:], *DAYS, UNSTATED], jobs=2, kinds=list(KINDS), show=False
     )
     counts: dict[str, Counter[str]] = {way: Counter() for way in ("plain", *asked.ways)}
     for seed in asked.seed:
@@ -74,7 +76,8 @@ def main() -> None:
             plain = told(loops, {d.name: varied(d, "plain") for d in loops}, asked.jobs)
             counts["plain"].update(right=sum(right(d, plain[d.name]) for d in loops))
             for way in asked.ways:
-                rows = told(loops, {d.name: varied(d, way) for d in loops}, asked.jobs)
+                records = {d.name: varied(d, "plain" if way == UNSTATED else way) for d in loops}
+                rows = told(loops, records, asked.jobs, stated=way != UNSTATED)
                 for d in loops:
                     found = _compared(d, way, plain[d.name], rows[d.name], asked.show)
                     counts[way].update(found, changed=int(bool(found)), right=int(right(d, rows[d.name])))

@@ -30,6 +30,10 @@ from identification.limits import LAW
 from identification.models import Pid
 from identification.record import Floats, LoopRecord
 
+INTEGRAL = np.eye(3)[1:2]
+SIMPLEST_FIRST = (np.eye(3)[:1], INTEGRAL, np.eye(3)[:2], np.eye(3))
+"""Gains that are free in P, I, PI and PID, as rows of best_gains."""
+
 
 @dataclass(frozen=True, slots=True)
 class LawsCompared:
@@ -82,7 +86,7 @@ def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompar
     if best is None or given is None:
         return None
     if given.way.pv_filter >= LAW.seen_filter:
-        near = with_best_filter(x, given.way, stated)
+        near = with_best_filter(x, given.way, gains)
         if near is not None and near.does(gains):
             return LawsCompared(recognized(x, stated, near, near.way), 1.0, 1.0, True)
     found = _simplest(best, gains, record.duration_s, with_shape(stated, best.way.shape))
@@ -150,8 +154,8 @@ def _most_apart(best: Seen, given: Seen, gains: Floats, pid: Pid, law: Floats) -
     return max(laws, key=lambda x: x.left * x.explained, default=None)
 
 
-def _settings(gains: Floats, record_s: float, stated: Pid) -> Pid | None:
-    """The controller settings for given gains; None if no controller has them."""
+def settings_of(gains: Floats, record_s: float, stated: Pid) -> Pid | None:
+    """A controller with given gains, shape (3,), of a record of so many seconds; None if no controller has them."""
     kp, ki, kd = (float(g) for g in gains)
     if kp == 0:
         return replace(stated, kp=0.0, ti_s=1.0 / ki, td_s=0.0) if ki else None
@@ -178,7 +182,7 @@ def _simplest(seen: Seen, gains: Floats, record_s: float, stated: Pid) -> tuple[
     enough = LAW.as_well * seen.left_over_all(seen.free) + 1e-6  # an exact law has only a rounding residual
     for along, held in trials:
         law = best_gains(seen.moves.values(), seen.weight, along, held)
-        pid = _settings(law, record_s, stated)
+        pid = settings_of(law, record_s, stated)
         if pid is not None and seen.left_over_all(law) <= enough:
             return pid, law
     return None

@@ -8,7 +8,7 @@ at its own limit, or repeatedly moves at its highest rate, no law is visible.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
@@ -34,6 +34,10 @@ ON_ERROR = ((1.0, 1.0), (1.0, 0.0), (0.0, 0.0))
 """Set point weights of gain and derivative: the usual three [-]."""
 LATE = ((0, 0), (1, 0), (1, 1))
 """Candidate delays of OP's stamps relative to those of PV and of SP [samples]."""
+PILED_UP = 8.0
+"""Density of OP's moves at their highest rate over that just below, from which the rate is a limit; of a sine 4.1."""
+WITH_SP = 10
+"""Samples after a move of SP in which its gain moves OP; ours: scans are up to ten samples apart."""
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 Shape = tuple[float, float, bool]
 """Gap [% PV], gain inside it [-], and whether the error is squared."""
@@ -53,12 +57,13 @@ class Way:
 @dataclass(frozen=True, slots=True)
 class Seen:
     """A record under one variant of the law: products of increments by their length in samples, the weight of each
-    length, the least-squares law, and the variant."""
+    length, the least-squares law, the variant, and its rows (pid_regression.rows_of)."""
 
     moves: dict[int, Floats]
     weight: Floats
     free: Floats
     way: Way
+    rows: Floats = field(repr=False)
 
     def is_law(self, gains: Floats) -> bool:
         """Whether the least-squares law can be that of a controller with the stated gains: without set point moves, a
@@ -98,7 +103,8 @@ def fastest(op: Floats) -> Mask:
     at = size >= LAW.at_rate * top
     nearly = np.count_nonzero((size >= LAW.near_rate * top) & ~at)
     coarse = top < LAW.rate_steps * float(np.min(size, where=size > 0.0, initial=np.inf))
-    limited = not coarse and np.count_nonzero(at) > LAW.clamped * (nearly + LAW.end_samples)
+    expected = PILED_UP * nearly * (1.0 - LAW.at_rate) / (LAW.at_rate - LAW.near_rate)
+    limited = not coarse and np.count_nonzero(at) > expected + LAW.clamped * LAW.end_samples
     return _spread(at) if limited else np.zeros(op.size, dtype=bool)
 
 
@@ -147,11 +153,17 @@ def with_shape(c: Pid, shape: Shape) -> Pid:
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """A recording prepared for comparison: samples without a law, and lengths of increments [samples]."""
+    """A recording prepared for comparison: samples without a law, lengths of increments [samples], and the
+    controller's scan [s]."""
 
     record: LoopRecord
     out: Mask
     lengths: tuple[int, ...]
+    scan_s: float
+
+    def rows(self, error: Floats, slope: Floats | None = None) -> Floats:
+        """Rows of an error and its slope (pid_regression.rows_of)."""
+        return rows_of(self.record, error, slope, self.scan_s)
 
     def seen(self, rows: Floats, way: Way) -> Seen | None:
         """The recording under one variant; None where no length shows a law."""
@@ -164,11 +176,11 @@ class Look:
         free = best_gains(found.values(), weight, np.eye(3), np.zeros(3))
         if free[2] * free[0] < 0.0:  # no controller has such a derivative: it compensates for a wrong filter
             free = best_gains(found.values(), weight, np.eye(3)[:2], np.zeros(3))
-        return Seen(found, weight, free, way)
+        return Seen(found, weight, free, way, rows)
 
     def plainly(self, shape: Shape) -> Seen | None:
         """The simplest variant with an error of that shape."""
-        return self.seen(rows_of(self.record, shaped(self.record.error, shape)), Way(shape))
+        return self.seen(self.rows(shaped(self.record.error, shape)), Way(shape))
 
 
 def look(record: LoopRecord, scale_s: float, stated: Pid) -> Look:
@@ -176,7 +188,7 @@ def look(record: LoopRecord, scale_s: float, stated: Pid) -> Look:
     n, ti = len(record), stated.ti_s if stated.ki else 0.0
     reach = min(n / 20, max(LAW.reach * max(ti, scale_s) / record.dt_s, LAW.least_reach))
     lengths = tuple(LAW.longer**k for k in range(12) if LAW.longer**k <= reach)
-    return Look(record, no_law(record, stated), lengths)
+    return Look(record, no_law(record, stated), lengths, stated.scan_s)
 
 
 def slope_filters(dt_s: float, laws: Iterable[Pid]) -> tuple[float, ...]:
@@ -193,7 +205,7 @@ def usual_ways(x: Look, shape: Shape, *laws: Pid, smoothing: bool = True) -> Ite
     filters = [*stated, *LAW.pv_filters] if smoothing else [0.0]
     for smooth, (late_pv, late_sp) in product(filters, LATE if moves else LATE[:2]):
         pv, sp = delayed(first_order(record.pv, smooth), late_pv), delayed(record.sp, late_sp)
-        for rows, weight in _slopes(record, sp, pv, narrow, moves, shape):
+        for rows, weight in _slopes(x, sp, pv, narrow, moves, shape):
             found = x.seen(rows, Way(shape, smooth, weight))
             if found is not None:
                 yield found
@@ -205,18 +217,18 @@ def delayed(x: Floats, samples: int) -> Floats:
 
 
 def _slopes(
-    record: LoopRecord, sp: Floats, pv: Floats, narrow: Iterable[float], moves: bool, shape: Shape
+    x: Look, sp: Floats, pv: Floats, narrow: Iterable[float], moves: bool, shape: Shape
 ) -> Iterator[tuple[Floats, float | None]]:
     """Rows for every slope filter and set point weight, and that weight; None for the rows with the effect of set
     point moves removed."""
     for (on_gain, on_slope), filtered in product(ON_ERROR if moves else ON_ERROR[:1], narrow):
-        slope = np.diff(on_slope * sp - pv, prepend=on_slope * sp[0] - pv[0]) / record.dt_s
-        rows = rows_of(record, shaped(sp - pv, shape), first_order(slope, filtered))
+        slope = np.diff(on_slope * sp - pv, prepend=on_slope * sp[0] - pv[0]) / x.record.dt_s
+        rows = x.rows(shaped(sp - pv, shape), first_order(slope, filtered))
         rows[0] += (on_gain - 1.0) * sp
         yield rows, on_gain
     if moves:
-        slope = np.diff(-pv, prepend=-pv[0]) / record.dt_s
-        yield np.vstack((rows_of(record, shaped(sp - pv, shape), slope), sp)), None
+        slope = np.diff(-pv, prepend=-pv[0]) / x.record.dt_s
+        yield np.vstack((x.rows(shaped(sp - pv, shape), slope), sp)), None
 
 
 def rough_ways(x: Look, shape: Shape) -> Iterator[Seen]:
@@ -225,7 +237,7 @@ def rough_ways(x: Look, shape: Shape) -> Iterator[Seen]:
     record, pv = x.record, x.record.pv
     beside = 0.5 * (np.concatenate((pv[:1], pv[:-1])) + np.concatenate((pv[1:], pv[-1:])))
     slope = np.gradient(-beside, record.dt_s)
-    rows = [np.vstack((rows_of(record, shaped(record.error, shape), slope), pv - beside))]
+    rows = [np.vstack((x.rows(shaped(record.error, shape), slope), pv - beside))]
     if float(np.ptp(record.sp)) > 0:
         rows.append(np.vstack((rows[0], record.sp)))
     for each, weight in zip(rows, (1.0, None), strict=False):
@@ -234,14 +246,14 @@ def rough_ways(x: Look, shape: Shape) -> Iterator[Seen]:
             yield found
 
 
-def bent_shapes(x: Look, gains: Floats) -> Iterator[Shape]:
+def bent_shapes(x: Look, gains: Floats | None) -> Iterator[Shape]:
     """Nonlinear error shapes that fit the record best: a squared one, and the best gaps for the least-squares law and
-    for these gains."""
+    for these gains, if any."""
     yield 0.0, 0.0, True
     size = float(np.median(np.abs(x.record.error[~x.out]))) if not x.out.all() else 0.0
     if size <= 0.0:
         return
-    for inside, free in product(LAW.gap_gains, (True, False)):
+    for inside, free in product(LAW.gap_gains, (True,) if gains is None else (True, False)):
         width = _best_gap(x, size, inside, None if free else gains)
         if width > 0.0:
             yield width, inside, False
@@ -268,17 +280,37 @@ def _best_gap(x: Look, size: float, inside: float, gains: Floats | None) -> floa
 def recognized(x: Look, stated: Pid, seen: Seen, way: Way) -> Pid:
     """A stated controller completed by what the record shows: the properties `way` of the variant seen, which agrees
     with the stated gains, and the visible limits of OP and of its rate."""
-    record, c = x.record, with_shape(stated, way.shape)
     way = _clearer(x, seen, way, stated)
     if way.pv_filter >= LAW.seen_filter and not stated.pv_filter_s:
-        c = replace(c, pv_filter_s=_best_filter(x, way, stated) * record.dt_s)
-    if way.sp_weight == 0.0 and c.kp and c.scan_s >= record.dt_s:
-        c = replace(c, sp_weight=0.0)
+        way = replace(way, pv_filter=_best_filter(x, way, gains_of(stated)))
+    return terms_of(x, stated, replace(seen, way=way))
+
+
+def terms_of(x: Look, c: Pid, seen: Seen) -> Pid:
+    """A controller with the terms of a variant, and with the visible limits of OP and of its rate."""
+    record, way, c = x.record, seen.way, with_shape(c, seen.way.shape)
+    if way.pv_filter >= LAW.seen_filter and not c.pv_filter_s:
+        c = replace(c, pv_filter_s=way.pv_filter * record.dt_s)
+    weight = _set_point_weight(x, seen, gains_of(c)) if way.sp_weight is None else way.sp_weight
+    if weight < LAW.plain_weight and c.kp:
+        c = replace(c, sp_weight=weight)
     if fastest(record.op).any():
         c = replace(c, op_rate=min(c.op_rate, float(np.abs(np.diff(record.op)).max()) / record.dt_s))
     at_end, middle = record.op[clamped(record.op)], 0.5 * float(record.op.min() + record.op.max())
     low, high = at_end[at_end < middle], at_end[at_end > middle]
     return replace(c, op_lo=float(max([c.op_lo, *low[:1]])), op_hi=float(min([c.op_hi, *high[:1]])))
+
+
+def _set_point_weight(x: Look, seen: Seen, gains: Floats) -> float:
+    """The set point weight of the gain, from OP's moves with SP and within WITH_SP samples after it that the law with
+    the full weight leaves [-]; 1 where other signals act on OP too."""
+    if seen.rows.shape[0] != 6 or x.record.feed is not None or gains[0] == 0.0:
+        return 1.0
+    moved, use = np.diff(seen.rows, axis=1), ~(x.out[1:] | x.out[:-1])
+    left = (moved[3] - gains @ moved[:3])[use]
+    sp = np.stack([delayed(moved[5], k)[use] for k in range(WITH_SP + 1)], axis=1)
+    with_sp = float(np.linalg.lstsq(sp, left, rcond=1e-9)[0].sum())
+    return float(np.clip(1.0 + with_sp / gains[0], 0.0, 1.0))
 
 
 def _clearer(x: Look, seen: Seen, way: Way, stated: Pid) -> Way:
@@ -287,32 +319,33 @@ def _clearer(x: Look, seen: Seen, way: Way, stated: Pid) -> Way:
     own = seen.poorness(gains_of(stated))
     if stated.td_s or stated.pv_filter_s or own < np.log(LAW.small) + LAW.plainly_better:
         return way
-    found = {f: _poorness(x, way, stated, f) for f in LAW.pv_filters if f > way.pv_filter}
+    found = {f: _poorness(x, way, gains_of(stated), f) for f in LAW.pv_filters if f > way.pv_filter}
     best = min(found, key=found.__getitem__, default=way.pv_filter)
     return replace(way, pv_filter=best) if found.get(best, own) < own - LAW.plainly_better else way
 
 
-def with_best_filter(x: Look, way: Way, stated: Pid) -> Seen | None:
-    """A variant with the filter of PV, near its own, with which the stated gains reproduce OP best."""
-    return _filtered(x, way, _best_filter(x, way, stated))
+def with_best_filter(x: Look, way: Way, gains: Floats | None) -> Seen | None:
+    """A variant with the filter of PV, near its own, with which the gains, or the least-squares law, reproduce OP
+    best."""
+    return _filtered(x, way, _best_filter(x, way, gains))
 
 
 def _filtered(x: Look, way: Way, smooth: float) -> Seen | None:
     """A variant with another filter of PV [samples]."""
     error = x.record.sp - first_order(x.record.pv, smooth)
-    return x.seen(rows_of(x.record, shaped(error, way.shape)), replace(way, pv_filter=smooth))
+    return x.seen(x.rows(shaped(error, way.shape)), replace(way, pv_filter=smooth))
 
 
-def _poorness(x: Look, way: Way, stated: Pid, smooth: float) -> float:
-    """Misfit of the stated gains, as Seen.poorness, behind another filter of PV [samples]."""
+def _poorness(x: Look, way: Way, gains: Floats | None, smooth: float) -> float:
+    """Misfit of the gains, or of the least-squares law, as Seen.poorness, behind another filter of PV [samples]."""
     seen = _filtered(x, way, smooth)
-    return np.inf if seen is None else seen.poorness(gains_of(stated))
+    return np.inf if seen is None else seen.poorness(seen.free if gains is None else gains)
 
 
-def _best_filter(x: Look, way: Way, stated: Pid) -> float:
-    """The filter of PV, near that of a variant, with which the stated gains reproduce OP best [samples]; the
-    variant's own if there is a derivative, which also has a filter."""
-    if stated.td_s:
+def _best_filter(x: Look, way: Way, gains: Floats | None) -> float:
+    """The filter of PV, near that of a variant, with which the gains, or the least-squares law, reproduce OP best
+    [samples]; the variant's own if there is a derivative, which also has a filter."""
+    if gains is not None and gains[2]:
         return way.pv_filter
     near = way.pv_filter * np.geomspace(0.5, 2.0, LAW.filters_near)
-    return float(min(near, key=lambda smooth: _poorness(x, way, stated, smooth)))
+    return float(min(near, key=lambda smooth: _poorness(x, way, gains, smooth)))

@@ -83,12 +83,20 @@ def _without(moved: Floats, feed: Floats) -> Floats:
     return moved - np.outer(moved @ feed, feed) / size if size > 0 else moved
 
 
-def rows_of(record: LoopRecord, error: Floats, slope: Floats | None = None) -> Floats:
+def rows_of(
+    record: LoopRecord, error: Floats, slope: Floats | None = None, scan_s: float = math.inf
+) -> Floats:
     """Error, integral [% s], slope [% / s], OP, and the error of an integral of every second sample, shape (5, n); a
-    feedforward signal, if any, as a sixth row."""
+    feedforward signal, if any, as a sixth row.
+
+    A controller that scans between the samples sums up errors between two of them: about their mean, with scan_s
+    toward zero, and not the latter alone, which is half a sample early.
+    """
     none = np.zeros(error.size) if slope is None else slope
     coarser = np.repeat(error[::2], 2)[: error.size]
-    whole, lacking = np.cumsum(error) * record.dt_s, np.cumsum(error - coarser) * record.dt_s
+    early_s = 0.5 * max(record.dt_s - scan_s, 0.0)
+    whole = np.cumsum(error) * record.dt_s - early_s * error
+    lacking = np.cumsum(error - coarser) * record.dt_s
     feed = () if record.feed is None else (record.feed,)
     terms = np.stack((error, whole, none, lacking))
     if record.gain_share is not None:  # velocity form: the gain of a sample multiplies its moves

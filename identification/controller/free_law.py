@@ -1,0 +1,156 @@
+"""The law of a record for which no settings are stated: the variant with the strongest evidence, and its settings.
+
+The variants of law_ways are fitted with free gains. An interval adds the scatter between parts of the record
+(delete-a-group jackknife, Shao and Wu 1989) and the share of OP that the law does not explain: moves of PV that no
+sample shows may be collinear with those that the samples show.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import chain, pairwise
+
+import numpy as np
+
+from identification.controller.gain_pieces import APART
+from identification.controller.law_comparison import INTEGRAL, SIMPLEST_FIRST, settings_of
+from identification.controller.law_ways import (
+    STRAIGHT,
+    Look,
+    Seen,
+    bent_shapes,
+    gains_of,
+    look,
+    terms_of,
+    usual_ways,
+    with_best_filter,
+)
+from identification.controller.pid_regression import best_gains, fit_pi
+from identification.limits import LAW
+from identification.models import Estimate, Pid
+from identification.record import Floats, LoopRecord, Mask
+
+PARTS = 8
+"""Parts of a record of which one is left out at a time."""
+T_NINETY = 1.895
+"""95 % quantile of Student's distribution with seven degrees of freedom."""
+DIGITS = 0.005
+"""Least half-width of an interval's log: settings are entered with three digits."""
+UNSEEN = 1.0
+"""Log error of a setting over the root of the share that the law does not explain, within which nine of ten are;
+ours, on seeds 41 and 42 of proofs/controllers.py."""
+
+
+@dataclass(frozen=True, slots=True)
+class FreeLaw:
+    """A law identified without stated settings: the controller, the share of OP's variance that it explains [-], and
+    gain [% OP/% PV] and integral time [s] with 90 % intervals; several, whether parts of a signal's range have
+    different gains, so that no pair of settings is the controller's."""
+
+    found: Pid
+    explained: float
+    kp: Estimate
+    ti_s: Estimate
+    several: bool = False
+
+
+def free_law(record: LoopRecord, scale_s: float) -> FreeLaw | None:
+    """The law that OP follows; None where OP follows none. scale_s : time scale on which the loop moves [s]."""
+    first = fit_pi(record, scale_s)
+    if first is None or first.kp == 0.0:
+        return None
+    start = Pid(first.kp, first.ti_s, scan_s=min(record.dt_s, LAW.usual_scan))
+    x = look(record, scale_s, start)
+    seen = _clearest(x, start)
+    if seen is None:
+        return None
+    enough = LAW.as_well * seen.left_over_all(seen.free) + LAW.rounding
+    for along in SIMPLEST_FIRST:
+        gains = best_gains(seen.moves.values(), seen.weight, along, np.zeros(3))
+        pid = settings_of(gains, record.duration_s, start)
+        alone = along is INTEGRAL and _is_integral(seen, record.dt_s)
+        if pid is not None and (alone or seen.left_over_all(gains) <= enough):
+            return _law(x, seen, along, pid)
+    return None
+
+
+def _is_integral(seen: Seen, dt_s: float) -> bool:
+    """Whether the gain of the error is the delay, of at most a sample, of an integral without one."""
+    kp, ki, _ = (float(g) for g in seen.free)
+    return -dt_s * abs(ki) <= kp * math.copysign(1.0, ki) < 0.0
+
+
+def _law(x: Look, seen: Seen, along: Floats, pid: Pid) -> FreeLaw:
+    """A law with its intervals."""
+    explained = 1.0 - seen.left_over_all(gains_of(pid))
+    kp, ti_s = (
+        _around(v, w) for v, w in zip((pid.kp, pid.ti_s), _widths(x, seen, along, explained), strict=True)
+    )
+    return FreeLaw(terms_of(x, pid, seen), explained, kp, replace(ti_s, unit="s"), _several(x, seen, along))
+
+
+def _clearest(x: Look, start: Pid) -> Seen | None:
+    """The variant, simplest first, that none reproduces OP clearly better than."""
+    best: Seen | None = None
+    for seen in _variants(x, start):
+        lawful = seen.is_law(gains_of(start))
+        if lawful and (best is None or seen.poorness(seen.free) < best.poorness(best.free) - LAW.worth):
+            best = seen
+    if best is None or best.way.pv_filter == 0.0:
+        return best
+    near = with_best_filter(x, best.way, None)
+    return near if near is not None and near.poorness(near.free) < best.poorness(best.free) else best
+
+
+def _variants(x: Look, start: Pid) -> Iterator[Seen]:
+    bent = (usual_ways(x, shape, smoothing=False) for shape in bent_shapes(x, None))
+    return chain(usual_ways(x, STRAIGHT, start), *bent)
+
+
+def _widths(x: Look, seen: Seen, along: Floats, explained: float) -> tuple[float, float]:
+    """Half-widths of the 90 % intervals of the logs of gain and integral time."""
+    edges = np.linspace(0, len(x.record), PARTS + 1).astype(int)
+    k = np.arange(len(x.record))
+    gains = [_gains_without(x, seen, along, (k >= a) & (k < b)) for a, b in pairwise(edges)]
+    logs = np.array([_logs(g) for g in gains if g is not None])
+    jackknife = np.zeros(2)
+    if len(logs) > 1:
+        jackknife = np.sqrt((len(logs) - 1) * logs.var(axis=0))
+    wide = np.hypot(T_NINETY * jackknife, UNSEEN * math.sqrt(max(1.0 - explained, 0.0)))
+    return float(wide[0]), float(wide[1])
+
+
+def _logs(gains: Floats) -> tuple[float, float]:
+    """Logs of gain and integral time, 0 for a missing one; of an integral alone that of 1 / ki."""
+    kp, ki = abs(float(gains[0])), abs(float(gains[1]))
+    return math.log(kp) if kp else 0.0, math.log((kp or 1.0) / ki) if ki else 0.0
+
+
+def _gains_without(x: Look, seen: Seen, along: Floats, out: Mask) -> Floats | None:
+    """The gains of a variant without some samples, bool, shape (n,); None where the others show no law."""
+    rest = replace(x, out=x.out | out).seen(seen.rows, seen.way)
+    return None if rest is None else best_gains(rest.moves.values(), rest.weight, along, np.zeros(3))
+
+
+def _several(x: Look, seen: Seen, along: Floats) -> bool:
+    """Whether the gains in the lower and the upper half of OP, PV or SP differ by more than the usual resolution."""
+    if x.out.all():
+        return False
+    for signal in (x.record.op, x.record.pv, x.record.sp):
+        middle = np.median(signal[~x.out])
+        pair = [_gains_without(x, seen, along, out) for out in (signal < middle, signal > middle)]
+        kp = [abs(float(g[0])) for g in pair if g is not None]
+        if len(kp) == 2 and max(kp) > APART * min(kp):
+            return True
+    return False
+
+
+def _around(value: float, half: float) -> Estimate:
+    """A setting with its interval; a setting that is zero or infinite is exact."""
+    if value == 0.0 or math.isinf(value):
+        return Estimate(value, value, value)
+    half = max(half, DIGITS)
+    ends = sorted((value * math.exp(-half), value * math.exp(half)))
+    return Estimate(value, ends[0], ends[1])

@@ -1,0 +1,110 @@
+"""Laws of records without stated settings; proofs/controllers_plant.py shares no code with the package."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identification.controller.free_law import FreeLaw, free_law
+from identification.controller.law_ways import fastest
+from identification.models import ErrorForm
+from identification.record import LoopRecord
+from proofs.controllers_plant import Controlled, controlled
+
+SCALE_S = 300.0
+
+
+def law_of(c: Controlled, every: int = 1) -> FreeLaw:
+    """The law of a recording of one sample every so many seconds, rounded as recorders do."""
+    sp, pv, op = (np.round(x[::every], 3) for x in (c.sp, c.pv, c.op))
+    found = free_law(LoopRecord("L", 0.0, float(every), sp, pv, op, np.zeros(sp.size, dtype=bool)), SCALE_S)
+    assert found is not None
+    return found
+
+
+def near(law: FreeLaw, c: Controlled, within: float) -> bool:
+    """Whether gain and integral time are those of the simulated controller."""
+    kp, ti, _ = c.ideal
+    return abs(law.found.kp / kp - 1.0) < within and abs(law.found.ti_s / ti - 1.0) < within
+
+
+@pytest.mark.parametrize("every", [1, 10])
+@pytest.mark.parametrize("form", ["PI", "gap", "error squared", "PV filter", "slow scan", "limit of OP"])
+def test_settings_are_found_whatever_else_the_controller_has(form: str, every: int) -> None:
+    """Gain and integral time are within 10 % at 1 s and 25 % at 10 s, as the issue of controllers asks."""
+    c = controlled(form, "worn", 71, days=0.5)
+    assert near(law_of(c, every), c, {1: 0.10, 10: 0.25}[every])
+
+
+def test_other_terms_of_the_controller_are_found_with_its_settings() -> None:
+    """A gap, a squared error and a filter of PV are found where nothing is stated."""
+    gap, squared, behind = (
+        controlled(form, "set point moves", 71, days=0.5) for form in ("gap", "error squared", "PV filter")
+    )
+    assert law_of(gap).found.gap == pytest.approx(float(str(gap.extras["gap"])), rel=0.1)
+    assert law_of(squared).found.error_form is ErrorForm.SQUARED
+    filter_s = float(str(behind.extras["pv_filter_s"]))
+    assert law_of(behind).found.pv_filter_s == pytest.approx(filter_s, rel=0.25)
+
+
+def test_a_limit_of_the_rate_is_found_among_moves_of_noise() -> None:
+    """OP that follows a limit of its rate after set point moves has the limit and the settings."""
+    c = controlled("limit of OP's rate", "set point moves", 41, days=0.5)
+    law = law_of(c)
+    assert law.found.op_rate == pytest.approx(float(str(c.extras["op_rate"])), rel=0.02)
+    assert near(law, c, 0.05)
+
+
+@pytest.mark.parametrize("digits", [1, 2, 9])
+def test_the_highest_rate_of_a_sine_is_no_limit(digits: int) -> None:
+    """A sine moves at its highest rate 4.1 times as often as just below it, rounded or not."""
+    assert not fastest(np.round(50.0 + 10.0 * np.sin(np.arange(40_000) / 80.0), digits)).any()
+
+
+def test_a_set_point_weight_is_found_from_set_point_moves() -> None:
+    """The weight of the gain on SP is found within .1."""
+    c = controlled("set point weight", "set point moves", 72, days=0.5)
+    assert law_of(c).found.sp_weight == pytest.approx(float(str(c.extras["sp_weight"])), abs=0.1)
+
+
+def test_integral_action_alone_has_no_gain() -> None:
+    """An integral-only controller is found as one, not as a PI with a tiny gain."""
+    c = controlled("integral only", "healthy", 71, days=0.5)
+    found = law_of(c).found
+    assert found.kp == 0.0
+    assert found.ti_s == pytest.approx(c.ideal[1], rel=0.05)
+
+
+def test_a_gain_that_differs_over_the_range_is_no_one_law() -> None:
+    """A scheduled gain is reported as several, a constant one is not."""
+    assert law_of(controlled("gain schedule", "worn", 71, days=0.5)).several
+    assert not law_of(controlled("PI", "worn", 71, days=0.5)).several
+
+
+@pytest.mark.parametrize("every", [1, 10])
+def test_intervals_hold_the_settings(every: int) -> None:
+    """Of 90 % intervals of twelve loops at least nine hold the gain, and nine the integral time."""
+    held = np.zeros(2, dtype=int)
+    for form in ("PI", "PV filter", "gap", "limit of OP's rate"):
+        for seed in (73, 74, 75):
+            c = controlled(form, "worn", seed, days=0.25)
+            law, (kp, ti, _) = law_of(c, every), c.ideal
+            held += [law.kp.low <= kp <= law.kp.high, law.ti_s.low <= ti <= law.ti_s.high]
+    assert (held >= 9).all()
+
+
+@pytest.mark.parametrize("kind", ["noise", "drift", "sine", "constant"])
+def test_signals_that_follow_no_law_have_none(kind: str) -> None:
+    """OP that does not depend on PV is explained by no law."""
+    rng, k = np.random.default_rng(5), np.arange(20_000)
+    pv, op = {
+        "noise": (rng.normal(size=k.size), rng.normal(size=k.size)),
+        "drift": (np.cumsum(rng.normal(size=k.size)), np.cumsum(rng.normal(size=k.size))),
+        "sine": (np.sin(k / 50.0) + 0.1 * rng.normal(size=k.size), np.cumsum(rng.normal(size=k.size))),
+        "constant": (rng.normal(size=k.size), np.full(k.size, 40.0)),
+    }[kind]
+    found = free_law(
+        LoopRecord("L", 0.0, 1.0, np.full(k.size, 50.0), 50.0 + pv, 50.0 + op, np.zeros(k.size, dtype=bool)),
+        SCALE_S,
+    )
+    assert found is None or found.explained < 0.9
