@@ -11,6 +11,7 @@ import numpy as np
 
 from analyzer.config import CauseLimits, Config
 from analyzer.history.plant_clock import HOUR_S
+from analyzer.loop.aliasing import is_own_period
 from analyzer.loop.assessments import Assessments, Hour, assess_span, hourly
 from analyzer.loop.cause import (
     NO_CAUSE,
@@ -201,6 +202,8 @@ def hidden(
     if found.first is not None:
         folded = None if controller is None else config.advice.cycle_per_ti * controller.ti_s
         if controller is None or folded is None or folded >= NYQUIST * record.dt_s:
+            return None
+        if is_own_period(record, found.first.period_s, controller):
             return None
         return Requirement(
             MissingData.FASTER, RequirementKind.UNFOLDED, (folded / samples, record.dt_s, folded)
