@@ -96,8 +96,11 @@ class LoopNight:
 
 def pid_of(row: Mapping[str, Any], kp: float | None = None, ti: float | None = None) -> Pid | None:
     """The settings of a night's row, or others in its units, in percent and seconds; None if unknown."""
+    terms = json.loads(row["controller"] or "{}")
+    share = terms.pop("gain_share", 1.0)
     spec = LoopSpec(
         row["loop"],
+        **terms,
         pv_lo=row["pv_lo"],
         pv_hi=row["pv_hi"],
         kp=row["kp"] if kp is None else kp,
@@ -108,7 +111,7 @@ def pid_of(row: Mapping[str, Any], kp: float | None = None, ti: float | None = N
     )
     span = None if None in (spec.pv_lo, spec.pv_hi) else float(spec.pv_hi or 0.0) - float(spec.pv_lo or 0.0)
     try:
-        return controller(spec, span)
+        return controller(spec, span, share)
     except InputError:
         return None
 

@@ -139,6 +139,20 @@ class LoopSpec:
         return tuple(text for column, text in STATED["defaults"].items() if column not in self.stated)
 
 
+CONTROLLER_COLUMNS = (
+    *("td", "td_filter", "scan_s", "pv_filter_s", "gap", "gap_gain", "error_form", "sp_weight"),
+    *("op_rate", "op_lo_limit", "op_hi_limit", "op_lo", "op_hi"),
+)
+"""Columns that state the controller's law in addition to kp and ti, their units and the form."""
+
+
+def controller_columns(spec: LoopSpec) -> dict[str, str | float]:
+    """Those of CONTROLLER_COLUMNS that a loop states otherwise than the default, with their values."""
+    plain = LoopSpec("")
+    values = ((name, getattr(spec, name)) for name in CONTROLLER_COLUMNS)
+    return {name: value for name, value in values if value != getattr(plain, name)}
+
+
 def read_loops(path: Path, zone: str = UTC_NAME, day_first: bool | None = None) -> tuple[LoopSpec, ...]:
     """Read loops.csv: one loop per row, decimal point or comma, columns in any order.
 

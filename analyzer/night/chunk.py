@@ -5,6 +5,7 @@ An error of one loop is a result of that loop.
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -41,7 +42,7 @@ from analyzer.loop.quality import Prepared, prepare
 from analyzer.loop.sample_clock import interval
 from analyzer.loop.witness import witness
 from analyzer.loops.changes import TuningChange, in_force, settings_from
-from analyzer.loops.spec import LoopSpec
+from analyzer.loops.spec import LoopSpec, controller_columns
 from analyzer.night.nights import Night, Plant, cut
 from analyzer.pages import compared as settings_pages
 from analyzer.places import be_patient, each
@@ -150,6 +151,7 @@ def _loop_row(
     try:
         prepared = prepare(spec, part, config.quality)
         earlier, present = earlier_settings(stated, changes, prepared), controller_of(spec, prepared)
+        known["controller"] = _controller_terms(spec, prepared)
         known |= _of_trends(prepared) | standing(prepared, present, spec.type, config)
         taught = learned(spec, part, prepared, config, closed=False)
         try:
@@ -177,6 +179,14 @@ def _loop_row(
     kept.compared += drawn
     kept.moves += filter(None, [moves_of(prepared.record)])
     kept.found.append(found)
+
+
+def _controller_terms(spec: LoopSpec, prepared: Prepared) -> str | None:
+    """Columns of loops.csv that state the law in addition to kp and ti, and the factor of a gain schedule that is in
+    force in most of the record (JSON); None if there are none."""
+    share = prepared.gain_share
+    terms = controller_columns(spec) | ({} if share == 1.0 else {"gain_share": share})
+    return json.dumps(terms, separators=(",", ":")) if terms else None
 
 
 def _of_trends(prepared: Prepared) -> dict[str, Cell]:

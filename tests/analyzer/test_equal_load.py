@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -10,16 +11,17 @@ import numpy as np
 import pytest
 
 from analyzer.comparison.before_after import Change, Grade, Reference, Span, grade, parts_of, reference
-from analyzer.comparison.equal_load import FIGURES, NO_RATIO, EqualLoad, LogRatio, LoopNight, Weeks
+from analyzer.comparison.equal_load import FIGURES, NO_RATIO, EqualLoad, LogRatio, LoopNight, Weeks, pid_of
 from analyzer.history.export import open_export
 from analyzer.loop.assessments import travel_of
 from analyzer.loops.changes import TuningChange
-from analyzer.loops.tags import match
+from analyzer.loops.spec import LoopSpec, controller_columns
+from analyzer.loops.tags import controller, match
 from analyzer.night import batch
 from analyzer.night.nights import Plant
 from analyzer.pages.before_after import ChangeCase, _evidence, change_cases, changes_page, outcome
 from analyzer.store.store import Store
-from identification.models import Pid
+from identification.models import ErrorForm, Form, Pid
 from proofs.before_after_plant import LOADS, changed, truth
 from proofs.plant import CONFIG, START_S, Sketch, Trends, simulate, spec, write_export
 from reports.markdown import render
@@ -223,3 +225,25 @@ def test_a_repair_is_seen_where_the_cycle_ended(cycles: bool, cured: bool) -> No
     cannot be seen, proves no repair."""
     before, after = (night(True, True),) * 7, (night(False, cycles),) * 7
     assert Weeks(before, after, Pid(1.0, 60.0), Pid(1.0, 60.0)).cured is cured
+
+
+@pytest.mark.parametrize(
+    ("stated", "share"),
+    [
+        (LoopSpec("L", pv_lo=0.0, pv_hi=50.0, kp=2.0, ti=1.0, ti_unit="min", td=0.1, td_filter=10.0), 1.0),
+        (
+            LoopSpec("L", pv_lo=0.0, pv_hi=50.0, kp=2.0, ti=60.0, td=9.0, form=Form.SERIES, pv_filter_s=4.0),
+            1.0,
+        ),
+        (LoopSpec("L", pv_lo=0.0, pv_hi=50.0, kp=2.0, ti=60.0, gap=1.0, error_form=ErrorForm.SQUARED), 1.0),
+        (LoopSpec("L", pv_lo=0.0, pv_hi=50.0, kp=2.0, ti=60.0, gain_unit="engineering", op_hi=20.0), 1.0),
+        (LoopSpec("L", pv_lo=0.0, pv_hi=50.0, kp=2.0, ti=60.0), 0.4),
+    ],
+)
+def test_a_night_is_simulated_with_its_whole_controller(stated: LoopSpec, share: float) -> None:
+    """Derivative, filter, gap, range of OP and the gain in force are those of loops.csv, not a plain PI."""
+    terms = controller_columns(stated) | ({} if share == 1.0 else {"gain_share": share})
+    names = ("loop", "pv_lo", "pv_hi", "kp", "ti", "form", "gain_unit", "ti_unit")
+    row = {name: getattr(stated, name) for name in names}
+    row["controller"] = json.dumps(terms) if terms else None
+    assert pid_of(row) == controller(stated, 50.0, share)
