@@ -84,11 +84,11 @@ def hopeful(window: Window, q: Question) -> float:
 
 
 def _is_searched(linear: Fit, play: Fit, q: Question) -> bool:
-    """Whether backlash explains enough for the complete search for a valve fault."""
-    if q.calm and play.window.y.size < FIT.short:
+    """Whether the complete search for a valve fault is worthwhile: in a loop that oscillates always, because a stem
+    that jumps by nearly its stickband resembles no backlash; in a calm one if backlash explains enough."""
+    if not q.calm or play.window.y.size < FIT.short:
         return True
-    least = hopeful(play.window, q) if q.calm else FIT.screened
-    return play.log_likelihood - linear.log_likelihood >= least
+    return play.log_likelihood - linear.log_likelihood >= hopeful(play.window, q)
 
 
 def _candidates(window: Window, q: Question) -> Candidates:

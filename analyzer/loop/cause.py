@@ -56,6 +56,8 @@ from tuning.frequency_response import loop_response
 
 NO_MODEL = Requirement(None, RequirementKind.MODEL)
 CAUSE_IN_MANUAL = Requirement(MissingData.MANUAL_TEST, RequirementKind.CAUSE_IN_MANUAL)
+SIGN_TEST = 1.645
+"""Excess of agreeing half-cycles, in standard errors, of one in twenty valves without a fault (normal density)."""
 FURTHER = 4
 """Further windows of a record in which backlash beside a load is tested: ours, for time."""
 
@@ -244,11 +246,12 @@ def _rings(m: Measured, ringing: Ringing, limits: CauseLimits) -> Verdict:
 
 def _may_be_cause(m: Measured, ringing: Ringing, limits: CauseLimits) -> bool:
     """Whether a valve fault may be the cause of a cycle: PV shows it, it is not too small for OP's travel, and the
-    loop's harmonic balance is not far from a limit cycle. Beside a periodic load, whose harmonics it explains too,
-    nearly every half-cycle must show a narrow one."""
+    loop's harmonic balance is not far from a limit cycle. A valve loses the same travel at each reversal, so more
+    than half of the half-cycles must show it: a few may follow set point moves. Beside a periodic load, whose
+    harmonics it explains too, nearly every half-cycle must show a narrow one."""
     if m.size < limits.least_size or m.evidence < ringing.penalty or not speaks(m, limits, True):
         return False
-    if imbalance(m) > limits.imbalance:
+    if imbalance(m) > limits.imbalance or (m.trials is not None and m.trials.signs < SIGN_TEST):
         return False
     each = m.trials is not None and m.trials.agreeing >= limits.agreeing
     return m.size >= limits.small_size or not ringing.is_periodic(limits) or each

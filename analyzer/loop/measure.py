@@ -11,7 +11,7 @@ from analyzer.config import CauseLimits
 from analyzer.loop.assessments import at_limits_share
 from analyzer.loop.candidates import Question, check_judged, fits_of, hopeful, refined
 from analyzer.loop.fit_window import due_to_answer, scans_of, window_of
-from analyzer.loop.oscillation import Oscillation
+from analyzer.loop.oscillation import Oscillation, error_spectrum
 from analyzer.loop.ringing import Ringing, calm_resonance, ringing_of
 from identification.controller.pid_regression import fit_pi
 from identification.estimation.evidence import (
@@ -24,6 +24,7 @@ from identification.estimation.evidence import (
 from identification.estimation.window import Fit, Window
 from identification.models import Fopdt, Loop, Pid
 from identification.record import LoopRecord, Mask
+from identification.signals.setpoint_response import at_rest
 from identification.signals.spectrum import Spectrum, size_kurtosis
 from tuning.frequency_response import is_stable, loop_response
 from tuning.ringing import ObservedRinging, observed_ringing
@@ -112,7 +113,8 @@ def measure(
             return replace(seen_alone, steady=math.inf)
         alone = not record.mask("idle").any()  # else another loop moves PV too
         return _without_a_cycle(seen_alone, best, linear, due if alone else None)
-    return _of_a_cycle(seen_alone, best, linear, law, error)
+    found = _of_a_cycle(seen_alone, best, linear, law, error)
+    return found if error is None else replace(found, kurtosis=_kurtosis(record, error, scale))
 
 
 def ringing_period(m: Measured, limits: CauseLimits) -> float | None:
@@ -128,6 +130,16 @@ def _without_a_cycle(m: Measured, best: Fit, linear: Fit, due: Mask | None) -> M
     return replace(m, steady=0.0 if shown is None else shown.steadiness, asked=asked)
 
 
+def _kurtosis(record: LoopRecord, error: Spectrum, scale_s: float) -> float:
+    """Kurtosis of the cycle's size in the error at rest of the set point; if that moves too often, in the error
+    without its part, whose removal disturbs a steady load over the whole record."""
+    rest = at_rest(record.sp, scale_s / record.dt_s)
+    if 2 * np.count_nonzero(rest) < rest.size:
+        return size_kurtosis(error, error.duration_s / scale_s)
+    whole = error_spectrum(record, whole=True)
+    return size_kurtosis(whole, whole.duration_s / scale_s, rest[-whole.n :])
+
+
 def _of_a_cycle(m: Measured, best: Fit, linear: Fit, law: Pid | None, error: Spectrum | None) -> Measured:
     """Further measures of a cycle of this period: its models under a smooth load, and its regularity in the error."""
     scale = m.scale_s
@@ -138,7 +150,6 @@ def _of_a_cycle(m: Measured, best: Fit, linear: Fit, law: Pid | None, error: Spe
         found,
         observed=observed_ringing(scale, error),
         trials=trials(best, linear, scale),
-        kurtosis=size_kurtosis(error, error.duration_s / scale),
     )
 
 

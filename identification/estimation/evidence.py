@@ -86,7 +86,11 @@ def trials(ours: Fit, theirs: Fit, period_s: float) -> Trials | None:
 
 
 def agreement_of(gained: Floats) -> Trials:
-    """Agreement of stretches that one model is better, from its gain in each [nat], shape (t,), t > 1."""
+    """Agreement of stretches that one model is better, from its gain in each [nat], shape (t,); one without good
+    samples, whose gain is 0, does not count."""
+    gained = gained[gained != 0.0]
+    if gained.size < 2:
+        return Trials(gained.size, float(gained.size > 0 and gained[0] > 0.0), 0.0)
     spread = float(gained.std(ddof=1)) / math.sqrt(gained.size)
     return Trials(gained.size, float((gained > 0).mean()), float(gained.mean()) / max(spread, 1e-9))
 

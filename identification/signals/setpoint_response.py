@@ -39,6 +39,14 @@ def moves(sp: Floats) -> Mask:
     return np.abs(np.diff(sp, prepend=sp[0])) > 1e-9 * max(float(np.ptp(sp)), SMALLEST)
 
 
+def at_rest(sp: Floats, period: float) -> Mask:
+    """True where the set point does not move within two periods before or after, shape (n,). period : [samples]."""
+    reach = round(SIGNALS.dies * max(round(period), 4))
+    return np.asarray(
+        np.convolve(moves(sp), np.ones(2 * reach + 1), mode="full")[reach : reach + sp.size] == 0
+    )
+
+
 def amplitude_at_rest(error: Floats, sp: Floats, usable: Mask, period: float) -> tuple[float, int]:
     """Amplitude of a period while the set point has long been constant, and the number of stretches used.
 

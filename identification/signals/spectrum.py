@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.fft import ifft, irfft, next_fast_len, rfft
 
 from identification.limits import SIGNALS
-from identification.record import Floats
+from identification.record import Floats, Mask
 
 Complex = NDArray[np.complex128]
 
@@ -195,13 +195,16 @@ def half_cycles(x: Floats, dt_s: float) -> Floats:
     return np.diff(outside[np.flatnonzero(np.diff(side[outside])) + 1]) * dt_s
 
 
-def size_kurtosis(s: Spectrum, line: float) -> float:
-    """Kurtosis of the band about a frequency [-]: 1.5 if all cycles have the same size.
+def size_kurtosis(s: Spectrum, line: float, rest: Mask | None = None) -> float:
+    """Kurtosis of the band about a frequency [-]: 1.5 if all cycles have the same size. rest : bool, shape (n,), the
+    samples that count; None for all.
 
     Noise through a resonance is Gaussian with a Rayleigh envelope and has 3 (Rice 1945); a load from a machine, a
     limit cycle, or a loop between OP's limits has a constant size.
     """
     x, _ = band_signal(s, line, SIGNALS.own_band)
+    if rest is not None:
+        x = x[rest[np.arange(x.size) * rest.size // x.size]]
     power = float(x @ x) / x.size
     return float(np.mean(x**4)) / power**2 if power > 0.0 else 3.0
 

@@ -1,0 +1,32 @@
+"""What each half-cycle shows of a valve; the loops of benchmarks/world share no code with the packages."""
+
+from __future__ import annotations
+
+from benchmarks.world.__main__ import told
+from benchmarks.world.draw import drawn, run
+from benchmarks.world.recorder import recorded
+
+
+def row_of(seed: int, kind: str, number: int) -> dict[str, object]:
+    """The night's row of one loop of the world, recorded at 1 s."""
+    d = drawn(seed, number + 1, (kind,))[number]
+    return told([d], {d.name: recorded(run(d), "plain", d.seed)}, 1)[d.name]
+
+
+def test_a_stem_that_jumps_by_its_whole_stickband_is_found() -> None:
+    """The valve of a stem that jumps by 98 % of its stickband is named, though backlash explains nothing of it."""
+    row = row_of(573, "stiction", 1)
+    assert (row["cause"], row["valve_fault"]) == ("valve", "stiction")
+
+
+def test_a_few_half_cycles_after_set_point_moves_are_no_valve() -> None:
+    """A tight loop in which 68 of 121 half-cycles suit backlash, those after set point moves by far, has no valve
+    fault."""
+    row = row_of(573, "tight", 4)
+    assert (row["cause"], row["valve_fault"]) == ("tuning", "none")
+
+
+def test_a_steady_load_is_steady_beside_set_point_moves() -> None:
+    """A sine that acts on a loop with eight set point moves keeps its size, and is named."""
+    row = row_of(577, "load", 4)
+    assert (row["cause"], row["valve_fault"]) == ("load", "none")
