@@ -93,6 +93,19 @@ def test_intervals_hold_the_settings(every: int) -> None:
     assert (held >= 9).all()
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_an_op_that_a_script_moves_follows_no_law(seed: int) -> None:
+    """PV that answers steps of OP makes no controller of them."""
+    rng = np.random.default_rng(seed)
+    op, pv, x = np.repeat(50.0 + 10.0 * rng.standard_normal(60), 100), np.empty(6000), 0.0
+    for k in range(pv.size):
+        pv[k] = 50.0 + x + 0.05 * rng.standard_normal()
+        x += (op[k] - 50.0 - x) / 25.0
+    record = LoopRecord("L", 0.0, 1.0, np.full(pv.size, 50.0), pv, op, np.zeros(pv.size, dtype=bool))
+    found = free_law(record, 100.0)
+    assert found is None or found.explained < 0.9
+
+
 @pytest.mark.parametrize("kind", ["noise", "drift", "sine", "constant"])
 def test_signals_that_follow_no_law_have_none(kind: str) -> None:
     """OP that does not depend on PV is explained by no law."""
