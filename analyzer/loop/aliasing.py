@@ -14,6 +14,8 @@ from tuning.frequency_response import controller_response
 
 PERIODS = 8
 """Periods in a block of the cross-spectrum; ours: few enough for a cycle whose phase drifts."""
+MOST_FOLDS = 100
+"""Multiples of the sampling frequency that are looked at; ours: beyond, a law is proportional alone."""
 COHERENT = 0.5
 """Coherence of error and OP at the period from which their ratio may be a law's; ours: of ten blocks a gain is then
 known within a third."""
@@ -25,9 +27,9 @@ def is_own_period(record: LoopRecord, period_s: float, controller: Pid) -> bool:
     """Whether error and OP are related at a period as by the control law there, and as at no faster period that the
     sampling folds to it [s]; False where they do not show it."""
     ratio = _ratio(record, period_s)
-    if ratio is None:
+    if ratio is None or controller.kp == 0.0:
         return False
-    folds = max(int(record.dt_s / (2.0 * controller.scan_s)), 1)
+    folds = min(max(int(record.dt_s / (2.0 * max(controller.scan_s, 1e-6))), 1), MOST_FOLDS)
     whole, f = np.arange(1, folds + 1) / record.dt_s, 1.0 / period_s
     below, above = (controller_response(controller, 2.0 * np.pi * x) for x in (whole - f, whole + f))
     own = complex(controller_response(controller, np.array([2.0 * np.pi * f]))[0])

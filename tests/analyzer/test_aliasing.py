@@ -42,6 +42,12 @@ def test_a_law_that_is_alike_at_all_periods_tells_nothing() -> None:
     assert not is_own_period(sampled(69.0, alone), 69.0, alone)
 
 
+@pytest.mark.parametrize("pid", [Pid(0.5, 4.0, scan_s=0.0), Pid(0.0, 4.0), Pid(-0.5, 4.0)])
+def test_any_stated_controller_is_answered(pid: Pid) -> None:
+    """A continuous controller, one without a gain and one of the other direction end in an answer."""
+    assert is_own_period(sampled(69.0), 69.0, pid) is (pid.kp > 0.0)
+
+
 def test_an_op_of_its_own_tells_nothing() -> None:
     """OP that does not follow the error shows no period of a law."""
     record, other = sampled(69.0, seed=2), sampled(55.0, seed=3)

@@ -86,9 +86,7 @@ def test_a_play_of_many_steps_of_the_grid_is_still_found():
     assert verdict_of(sp, rounded(pv, 0.3), op, 1.0, "") == "valve"
 
 
-@pytest.mark.parametrize(
-    ("seed", "told"), [(1503739, "tuning"), (1503856, "tuning"), (1503904, "undecided")]
-)
+@pytest.mark.parametrize(("seed", "told"), [(1503739, "tuning"), (1503856, "tuning"), (1503904, "undecided")])
 def test_a_tuning_is_told_on_a_grid_of_two_steps_an_amplitude(seed, told):
     """Of loops that their tuning swings by 1.5 steps of PV's grid and more the tuning is told where settings
     are known and eight rows a cycle show the ringing; nothing else is told of the others."""
