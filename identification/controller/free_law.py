@@ -98,6 +98,8 @@ def _clearest(x: Look, start: Pid) -> Seen | None:
         lawful = seen.is_law(gains_of(start))
         if lawful and (best is None or seen.poorness(seen.free) < best.poorness(best.free) - LAW.worth):
             best = seen
+        if best is not None and best.poorness(best.free) < math.log(LAW.small) + LAW.worth:
+            break  # no residual is so small that another variant is clearly better
     if best is None or best.way.pv_filter == 0.0:
         return best
     near = with_best_filter(x, best.way, None)
