@@ -41,10 +41,9 @@ def moves(sp: Floats) -> Mask:
 
 def at_rest(sp: Floats, period: float) -> Mask:
     """True where the set point does not move within two periods before or after, shape (n,). period : [samples]."""
-    reach = round(SIGNALS.dies * max(round(period), 4))
-    return np.asarray(
-        np.convolve(moves(sp), np.ones(2 * reach + 1), mode="full")[reach : reach + sp.size] == 0
-    )
+    reach, k = round(SIGNALS.dies * max(round(period), 4)), np.arange(sp.size)
+    moved = np.concatenate(([0], np.cumsum(moves(sp))))
+    return np.asarray(moved[np.minimum(k + reach + 1, sp.size)] == moved[np.maximum(k - reach, 0)])
 
 
 def amplitude_at_rest(error: Floats, sp: Floats, usable: Mask, period: float) -> tuple[float, int]:
