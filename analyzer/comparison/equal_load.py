@@ -24,7 +24,7 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller
 from identification.errors import InputError
 from identification.limits import SIGNALS
-from identification.models import Backlash, Fopdt, Form, Loop, Pid, Stiction, Valve
+from identification.models import Backlash, ErrorForm, Fopdt, Form, Loop, Pid, Stiction, Valve
 from identification.signals.robust import robust_deviation
 from tuning.forecast import in_digits, loop_in_digits, run, settled
 from tuning.frequency_response import loop_response, maximum_sensitivity
@@ -97,10 +97,11 @@ class LoopNight:
 def pid_of(row: Mapping[str, Any], kp: float | None = None, ti: float | None = None) -> Pid | None:
     """The settings of a night's row, or others in its units, in percent and seconds; None if unknown."""
     terms = json.loads(row["controller"] or "{}")
-    share = terms.pop("gain_share", 1.0)
+    share, shape = terms.pop("gain_share", 1.0), ErrorForm(terms.pop("error_form", ErrorForm.LINEAR))
     spec = LoopSpec(
         row["loop"],
         **terms,
+        error_form=shape,
         pv_lo=row["pv_lo"],
         pv_hi=row["pv_hi"],
         kp=row["kp"] if kp is None else kp,

@@ -246,4 +246,7 @@ def test_a_night_is_simulated_with_its_whole_controller(stated: LoopSpec, share:
     names = ("loop", "pv_lo", "pv_hi", "kp", "ti", "form", "gain_unit", "ti_unit")
     row = {name: getattr(stated, name) for name in names}
     row["controller"] = json.dumps(terms) if terms else None
-    assert pid_of(row) == controller(stated, 50.0, share)
+    found = pid_of(row)
+    assert found == controller(stated, 50.0, share)
+    assert found is not None
+    assert found.error_form is stated.error_form  # the simulation asks for the member, not for its text
