@@ -133,7 +133,7 @@ def _without_a_cycle(m: Measured, best: Fit, linear: Fit, due: Mask | None) -> M
 def _kurtosis(record: LoopRecord, error: Spectrum, scale_s: float) -> float:
     """Kurtosis of the cycle's size in the error at rest of the set point; if that moves too often, in the error
     without its part, whose removal disturbs a steady load over the whole record."""
-    rest = at_rest(record.sp, scale_s / record.dt_s)
+    rest = at_rest(record.sp, scale_s / record.dt_s, after=True)
     if 2 * np.count_nonzero(rest) < rest.size:
         return size_kurtosis(error, error.duration_s / scale_s)
     whole = error_spectrum(record, whole=True)

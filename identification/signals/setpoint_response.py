@@ -39,11 +39,15 @@ def moves(sp: Floats) -> Mask:
     return np.abs(np.diff(sp, prepend=sp[0])) > 1e-9 * max(float(np.ptp(sp)), SMALLEST)
 
 
-def at_rest(sp: Floats, period: float) -> Mask:
-    """True where the set point does not move within two periods before or after, shape (n,). period : [samples]."""
-    reach, k = round(SIGNALS.dies * max(round(period), 4)), np.arange(sp.size)
+def at_rest(sp: Floats, period: float, after: bool = False) -> Mask:
+    """True where the set point has not moved for two periods, shape (n,); after: and does not within the next two.
+
+    period : [samples].
+    """
+    length, k = round(SIGNALS.dies * max(round(period), 4)), np.arange(sp.size)
     moved = np.concatenate(([0], np.cumsum(moves(sp))))
-    return np.asarray(moved[np.minimum(k + reach + 1, sp.size)] == moved[np.maximum(k - reach, 0)])
+    last = np.minimum(k + 1 + length * after, sp.size)
+    return np.asarray(moved[last] == moved[np.maximum(k + 1 - length, 0)])
 
 
 def amplitude_at_rest(error: Floats, sp: Floats, usable: Mask, period: float) -> tuple[float, int]:
@@ -56,8 +60,7 @@ def amplitude_at_rest(error: Floats, sp: Floats, usable: Mask, period: float) ->
     stretches' amplitudes, in the unit of the error; 0 without a stretch.
     """
     n = max(round(period), 4)
-    moved = np.convolve(moves(sp), np.ones(round(SIGNALS.dies * n)))[: sp.size] > 0
-    out = np.concatenate(([0], np.cumsum(moved | ~usable)))
+    out = np.concatenate(([0], np.cumsum(~(at_rest(sp, period) & usable))))
     first = np.arange(0, sp.size - n + 1, max(n // 2, 1))
     first = first[out[first + n] == out[first]]
     if not first.size:
