@@ -22,7 +22,7 @@ from analyzer.loops.slips import slip
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import sentences
-from analyzer.words.units import beside_settings, number, of_controller, schedule_shown, within
+from analyzer.words.units import beside_settings, intervals_of, number, of_controller, schedule_shown
 from identification.estimation.window import Fit
 from identification.limits import FIT
 from identification.models import Loop, Pid
@@ -144,7 +144,9 @@ def with_controller_told(
         return found
     span = prepared.scale.span
     if stated is None:
-        said = SAID["recorded"].format(of_controller(found.shown, spec, span) + within(found.law, spec, span))
+        said = SAID["recorded"].format(
+            of_controller(found.shown, spec, span) + intervals_of(found.shown, found.law, spec, span)
+        )
     else:
         said = SAID["beside"].format(beside_settings(stated, found.shown, spec, span))
     return replace(found, notes=(*found.notes, said))
@@ -186,7 +188,7 @@ def withheld(
         return Advice(Action.NONE, SAID["just_changed"])
     if found.settings is not None and controller is not None:
         listed, followed = (of_controller(pid, spec, pv_span) for pid in (controller, found.settings))
-        followed += within(found.law, spec, pv_span)
+        followed += intervals_of(found.settings, found.law, spec, pv_span)
         return Advice(
             Action.CHECK_SETTINGS, SAID["differ"].format(listed, followed) + _slip(found, spec, pv_span)
         )

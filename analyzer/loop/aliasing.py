@@ -1,7 +1,8 @@
 """Whether a period in the samples is that of the loop, or a faster one that the sampling folds to it.
 
 OP follows the control law of the error at the frequency at which the loop moves. Samples show a faster cycle at
-another frequency, but with the gain and the phase that the law has at the true one.
+another frequency, but with the gain and the phase that the law has at the true one, conjugate below a multiple of
+the sampling frequency (aliasing of sampled signals; Oppenheim and Schafer 2010, chapter 4).
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import numpy as np
 
 from identification.models import Pid
 from identification.record import Floats, LoopRecord
+from tuning.describing import Complexes
 from tuning.frequency_response import controller_response
 
 PERIODS = 8
@@ -24,8 +26,8 @@ NEAR = 0.4
 
 
 def is_own_period(record: LoopRecord, period_s: float, controller: Pid) -> bool:
-    """Whether error and OP are related at a period as by the control law there, and as at no faster period that the
-    sampling folds to it [s]; False where they do not show it."""
+    """Whether error and OP are related at a period [s] as by the control law there, and not as at a faster one that
+    the sampling folds to it; False where the record does not show it."""
     ratio = _ratio(record, period_s)
     if ratio is None or controller.kp == 0.0:
         return False
@@ -38,7 +40,7 @@ def is_own_period(record: LoopRecord, period_s: float, controller: Pid) -> bool:
     return bool(away[0] < NEAR and away[0] < 0.5 * others.min())
 
 
-def _distance(ratio: complex, expected: np.ndarray) -> Floats:
+def _distance(ratio: complex, expected: Complexes) -> Floats:
     return np.asarray(np.abs(np.log(ratio / expected)))
 
 
@@ -62,7 +64,7 @@ def _ratio(record: LoopRecord, period_s: float) -> complex | None:
     return complex(cross / auto)
 
 
-def _line(x: Floats, wave: np.ndarray) -> complex:
+def _line(x: Floats, wave: Complexes) -> complex:
     """The line of a block at a wave's frequency, without its mean and drift."""
     k = np.linspace(-1.0, 1.0, x.size)
     return complex((x - x.mean() - k * (k @ x) / (k @ k)) @ wave)

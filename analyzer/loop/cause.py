@@ -57,7 +57,7 @@ from tuning.frequency_response import loop_response
 NO_MODEL = Requirement(None, RequirementKind.MODEL)
 CAUSE_IN_MANUAL = Requirement(MissingData.MANUAL_TEST, RequirementKind.CAUSE_IN_MANUAL)
 SIGN_TEST = 1.645
-"""Excess of agreeing half-cycles, in standard errors, of one in twenty valves without a fault (normal density)."""
+"""Excess of agreeing half-cycles, in standard errors, of one in twenty valves without a fault (normal quantile)."""
 FURTHER = 4
 """Further windows of a record in which backlash beside a load is tested: ours, for time."""
 

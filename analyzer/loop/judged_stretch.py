@@ -179,7 +179,7 @@ def recorded(record: LoopRecord, scale_s: float, limits: SettingsLimits) -> Free
     law = free_law(record, scale_s)
     if law is None or law.several or law.explained < limits.explained_alone:
         return None
-    ti_s = law.found.ti_s
+    ti_s = abs(law.found.ti_s)
     unseen = law.found.kp != 0.0 and ti_s < limits.ti_samples * record.dt_s
     return None if unseen or law.found.pv_filter_s > limits.filter_of_ti * ti_s else law
 

@@ -94,11 +94,12 @@ def of_controller(pid: Pid, spec: LoopSpec, pv_span: float) -> str:
     return f"{known}, Td {number(td)} {'s' if spec.ti_unit == 's' else 'min'}" if td else known
 
 
-def within(law: FreeLaw | None, spec: LoopSpec, pv_span: float) -> str:
-    """The 90 % intervals of a law's gain and integral time in the units of entry; '' without a law."""
+def intervals_of(pid: Pid, law: FreeLaw | None, spec: LoopSpec, pv_span: float) -> str:
+    """The 90 % intervals of a law's gain and integral time in the units of entry; '' without a law, or if they do not
+    hold the reported settings."""
     from analyzer.loops.tags import as_stated
 
-    if law is None:
+    if law is None or not all(of.low <= x <= of.high for x, of in ((pid.kp, law.kp), (pid.ti_s, law.ti_s))):
         return ""
     kps = [replace(law.found, kp=x) for x in (law.kp.low, law.kp.high)]
     tis = [replace(law.found, ti_s=x) for x in (law.ti_s.low, law.ti_s.high)]

@@ -15,7 +15,7 @@ from itertools import chain, pairwise
 import numpy as np
 
 from identification.controller.gain_pieces import APART
-from identification.controller.law_comparison import INTEGRAL, SIMPLEST_FIRST, settings_of
+from identification.controller.law_comparison import settings_of
 from identification.controller.law_ways import (
     STRAIGHT,
     Look,
@@ -32,8 +32,11 @@ from identification.limits import LAW
 from identification.models import Estimate, Pid
 from identification.record import Floats, LoopRecord, Mask
 
+INTEGRAL = np.eye(3)[1:2]
+SIMPLEST_FIRST = (np.eye(3)[:1], INTEGRAL, np.eye(3)[:2], np.eye(3))
+"""Gains that are free in P, I, PI and PID, as rows of best_gains."""
 PARTS = 8
-"""Parts of a record of which one is left out at a time."""
+"""Parts of a record of which one is left out at a time; ours: enough for an interval, and each holds many moves."""
 T_NINETY = 1.895
 """95 % quantile of Student's distribution with seven degrees of freedom."""
 DIGITS = 0.005
@@ -57,7 +60,11 @@ class FreeLaw:
 
 
 def free_law(record: LoopRecord, scale_s: float) -> FreeLaw | None:
-    """The law that OP follows; None where OP follows none. scale_s : time scale on which the loop moves [s]."""
+    """The law that OP follows; None where OP follows none.
+
+    record : SP, PV and OP [% of span]. scale_s : time scale on which the loop moves [s]. A law that explains little
+    is returned too: the caller asks for its share.
+    """
     first = fit_pi(record, scale_s)
     if first is None or first.kp == 0.0:
         return None

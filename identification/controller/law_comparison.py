@@ -30,10 +30,6 @@ from identification.limits import LAW
 from identification.models import Pid
 from identification.record import Floats, LoopRecord
 
-INTEGRAL = np.eye(3)[1:2]
-SIMPLEST_FIRST = (np.eye(3)[:1], INTEGRAL, np.eye(3)[:2], np.eye(3))
-"""Gains that are free in P, I, PI and PID, as rows of best_gains."""
-
 
 @dataclass(frozen=True, slots=True)
 class LawsCompared:

@@ -292,10 +292,11 @@ def terms_of(x: Look, c: Pid, seen: Seen) -> Pid:
     if way.pv_filter >= LAW.seen_filter and not c.pv_filter_s:
         c = replace(c, pv_filter_s=way.pv_filter * record.dt_s)
     weight = _set_point_weight(x, seen, gains_of(c)) if way.sp_weight is None else way.sp_weight
-    if weight < LAW.plain_weight and c.kp:
+    if weight < LAW.plain_weight and c.kp and c.sp_weight == 1.0:
         c = replace(c, sp_weight=weight)
     if fastest(record.op).any():
-        c = replace(c, op_rate=min(c.op_rate, float(np.abs(np.diff(record.op)).max()) / record.dt_s))
+        rate = float(np.abs(np.diff(record.op)).max()) / record.dt_s
+        c = c if c.op_rate <= rate / LAW.at_rate else replace(c, op_rate=rate)
     at_end, middle = record.op[clamped(record.op)], 0.5 * float(record.op.min() + record.op.max())
     low, high = at_end[at_end < middle], at_end[at_end > middle]
     return replace(c, op_lo=float(max([c.op_lo, *low[:1]])), op_hi=float(min([c.op_hi, *high[:1]])))

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from analyzer.config import Config
+from analyzer.loop.judged_stretch import recorded
 from identification.controller.free_law import FreeLaw, free_law
+from identification.controller.law_comparison import compare_laws
 from identification.controller.law_ways import fastest
-from identification.models import ErrorForm
+from identification.models import ErrorForm, Pid
 from identification.record import LoopRecord
 from proofs.controllers_plant import Controlled, controlled
 
@@ -65,6 +68,28 @@ def test_a_set_point_weight_is_found_from_set_point_moves() -> None:
     """The weight of the gain on SP is found within .1."""
     c = controlled("set point weight", "set point moves", 72, days=0.5)
     assert law_of(c).found.sp_weight == pytest.approx(float(str(c.extras["sp_weight"])), abs=0.1)
+
+
+def test_a_stated_weight_is_no_finding() -> None:
+    """A stated set point weight that the record shows within its uncertainty is kept as it is stated."""
+    c = controlled("set point weight", "set point moves", 46, days=0.5)
+    sp, pv, op = (np.round(x[::10], 3) for x in (c.sp, c.pv, c.op))
+    record = LoopRecord("L", 0.0, 10.0, sp, pv, op, np.zeros(sp.size, dtype=bool))
+    stated = Pid(c.ideal[0], c.ideal[1], scan_s=1.0, sp_weight=float(str(c.extras["sp_weight"])))
+    seen = compare_laws(record, SCALE_S, stated)
+    assert seen is not None
+    assert seen.found == stated
+
+
+def test_a_direct_acting_integral_is_reported_too() -> None:
+    """An integral-only controller of either direction is told where nothing is stated."""
+    c = controlled("integral only", "healthy", 71, days=0.5)
+    for way in (1.0, -1.0):
+        pv = 50.0 + way * (c.pv - 50.0)
+        record = LoopRecord("L", 0.0, 1.0, c.sp, pv, c.op, np.zeros(pv.size, dtype=bool))
+        found = recorded(record, SCALE_S, Config().settings)
+        assert found is not None
+        assert found.found.ti_s == pytest.approx(way * c.ideal[1], rel=0.05)
 
 
 def test_integral_action_alone_has_no_gain() -> None:
