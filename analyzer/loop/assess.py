@@ -37,6 +37,7 @@ from analyzer.loop.quality import Prepared
 from analyzer.loop.ringing import same_period
 from analyzer.loop.setpoint_moves import Move, moves
 from analyzer.loop.shared_valve import Shared
+from analyzer.loop.worn_valve import WornValve
 from analyzer.plantwide.wave import Wave, waves_of
 from identification.controller.free_law import FreeLaw
 from identification.controller.gain_pieces import ScheduledGain
@@ -127,10 +128,12 @@ def cause_of(
             needs = Requirement(MissingData.UNBROKEN, RequirementKind.AS_TOLD, (str(error),))
     verdict = NO_CAUSE if oscillation is None else not_assessed(needs)
     if measured is not None:
-        verdict = verdict_by_measures(measured, prepared, oscillation, config)
+        period_s = measured.scale_s if oscillation is None else oscillation.period_s
+        worn = WornValve(record, measured, period_s, config.cause)
+        verdict = verdict_by_measures(measured, prepared, oscillation, config, worn)
         if oscillation is not None:
-            verdict = refine_stick_slip(verdict, oscillation.period_s, config.cause)
-            verdict = with_worn_valve(verdict, record, oscillation.period_s, config.cause)
+            others_s = [o.period_s for o in found.found if o is not oscillation]
+            verdict = with_worn_valve(refine_stick_slip(verdict, period_s, config.cause), worn, others_s)
     dead = dead_valve(record, config.cause) if prepared.op_known else None
     return with_dead_valve(verdict, dead) if dead and verdict.cause is not Cause.VALVE else verdict
 
@@ -177,12 +180,17 @@ def _made_by_valve(verdict: Verdict, limits: CauseLimits) -> bool:
 
 
 def verdict_by_measures(
-    measured: Measured, prepared: Prepared, oscillation: Oscillation | None, config: Config
+    measured: Measured,
+    prepared: Prepared,
+    oscillation: Oscillation | None,
+    config: Config,
+    worn: WornValve | None = None,
 ) -> Verdict:
-    """The verdict from the measures, as far as sampling and grid permit."""
+    """The verdict from the measures, as far as sampling and grid permit; worn, the question of a worn valve in the
+    whole record."""
     if hidden_by_grid(measured, prepared.pv_step, oscillation is not None, config.cause):
         measured = replace(measured, evidence=0.0)
-    return resolve_ambiguity(judge(measured, oscillation, config.cause), prepared, oscillation, config)
+    return resolve_ambiguity(judge(measured, oscillation, config.cause, worn), prepared, oscillation, config)
 
 
 def _known_without_op(figures: Assessments, op: bool) -> Assessments:

@@ -14,14 +14,12 @@ does the valve stick at distances that scatter, instead of backlash?
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
 
 import numpy as np
 
 from analyzer.config import CauseLimits, Config
-from analyzer.loop.candidates import SEARCHED, judged_count
 from analyzer.loop.decisions import (
     CAUSES,
     Cause,
@@ -32,22 +30,21 @@ from analyzer.loop.decisions import (
     Sign,
     SignKind,
 )
-from analyzer.loop.fit_window import further_windows, scans_of
 from analyzer.loop.fitness import compressed
 from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
 from analyzer.loop.ringing import Regularity, Ringing, between_samples
 from analyzer.loop.signs import WEAK, signs_of
+from analyzer.loop.worn_valve import WornValve
 from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import refined
-from identification.estimation.beside_line import BesideLine, beside_line, with_further
-from identification.estimation.between_samples import scans_per_row, with_scans
+from identification.estimation.between_samples import scans_per_row
 from identification.estimation.gauss_newton import descend
 from identification.estimation.irregular_slips import SlipPath, fit_irregular, near_path, path_evidence
 from identification.estimation.noise import generic_noise
 from identification.estimation.smooth_load import as_fit
-from identification.estimation.window import Fit, Window
+from identification.estimation.window import Fit
 from identification.limits import FIT
 from identification.models import Backlash, Loop
 from identification.record import LoopRecord
@@ -56,10 +53,10 @@ from tuning.frequency_response import loop_response
 
 NO_MODEL = Requirement(None, RequirementKind.MODEL)
 CAUSE_IN_MANUAL = Requirement(MissingData.MANUAL_TEST, RequirementKind.CAUSE_IN_MANUAL)
+OTHERS = 2
+"""Further periods of the error at which a periodic load is sought: ours."""
 SIGN_TEST = 1.645
 """Excess of agreeing half-cycles, in standard errors, of one in twenty valves without a fault (normal quantile)."""
-FURTHER = 4
-"""Further windows of a record in which backlash beside a load is tested: ours, for time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,15 +193,18 @@ def jump_evidence(m: Measured, limits: CauseLimits) -> tuple[float, float]:
     return min(m.jump, 10.0 * clear) if share >= limits.least_jump else 0.0, clear
 
 
-def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> Verdict:
+def judge(
+    m: Measured, oscillation: Oscillation | None, limits: CauseLimits, beside: WornValve | None = None
+) -> Verdict:
     """The cause of the cycle: that whose model is more likely than the others, and than a smooth load, by the penalty
-    of its constants. If a measure is unknown no cause is named."""
+    of its constants. If a measure is unknown no cause is named. beside : the valve in the whole record, if that can
+    be asked."""
     if oscillation is None:
-        return _quiet(m, limits)
+        return _quiet(m, limits, beside)
     if m.ringing is None or any(math.isnan(x) for x in (m.evidence, m.jump, m.size, m.kurtosis)):
         return replace(not_assessed(None), measured=m)
     seen_as = Regularity(oscillation.rhythm.first, m.kurtosis, m.saturated >= limits.held, oscillation.cycles)
-    worn = _may_be_cause(m, m.ringing, limits)
+    worn = _may_be_cause(m, m.ringing, limits, beside)
     if m.ringing.is_tight(seen_as, m.evidence if worn else 0.0, limits):
         return _rings(m, m.ringing, limits)
     wide = m.size >= limits.least_size  # a narrower fault raises no doubt about a load
@@ -244,17 +244,18 @@ def _rings(m: Measured, ringing: Ringing, limits: CauseLimits) -> Verdict:
     return Verdict(Cause.TUNING, confidence, Fault.NONE, signs, measured=told)
 
 
-def _may_be_cause(m: Measured, ringing: Ringing, limits: CauseLimits) -> bool:
+def _may_be_cause(m: Measured, ringing: Ringing, limits: CauseLimits, beside: WornValve | None) -> bool:
     """Whether a valve fault may be the cause of a cycle: PV shows it, it is not too small for OP's travel, and the
     loop's harmonic balance is not far from a limit cycle. A valve loses the same travel at each reversal, so more
-    than half of the half-cycles must show it: a few may follow set point moves. Beside a periodic load, whose
-    harmonics it explains too, nearly every half-cycle must show a narrow one."""
+    than half of the half-cycles must show it: a few may follow set point moves. A periodic load has harmonics that
+    backlash explains too: beside one the whole record must show it, unless nearly all half-cycles do."""
     if m.size < limits.least_size or m.evidence < ringing.penalty or not speaks(m, limits, True):
         return False
     if imbalance(m) > limits.imbalance or (m.trials is not None and m.trials.signs < SIGN_TEST):
         return False
-    each = m.trials is not None and m.trials.agreeing >= limits.agreeing
-    return m.size >= limits.small_size or not ringing.is_periodic(limits) or each
+    if not ringing.is_periodic(limits) or beside is None or fault_of(m, limits) is Fault.STICTION:
+        return True
+    return (m.trials is not None and m.trials.agreeing >= limits.agreeing) or beside.is_seen
 
 
 def imbalance(m: Measured) -> float:
@@ -267,11 +268,12 @@ def imbalance(m: Measured) -> float:
     return abs(1.0 + response * describe(Backlash(m.play.valve.stickband), 0.5 * m.window.cycle_range))
 
 
-def _quiet(m: Measured, limits: CauseLimits) -> Verdict:
+def _quiet(m: Measured, limits: CauseLimits, beside: WornValve | None) -> Verdict:
     """The verdict on a loop that does not oscillate: a valve fault, if likelihood and size agree, or none."""
     signs = quiet_signs(m, limits)
     pct = combined(signs)
     is_valve = len(signs) >= limits.signs and pct >= limits.named_pct
+    is_valve = is_valve and (beside is None or beside.is_likelier)
     if not is_valve:
         pct = min(pct, 0.5 * limits.named_pct)
     confidence = {Cause.VALVE: pct, Cause.TUNING: 0.0, Cause.LOAD: 0.0}
@@ -367,51 +369,37 @@ def _too_coarse(prepared: Prepared, oscillation: Oscillation, limits: CauseLimit
     return None
 
 
-def with_worn_valve(verdict: Verdict, record: LoopRecord, period_s: float, limits: CauseLimits) -> Verdict:
-    """The verdict on a loop that cycles at a period [s] for another cause, its valve worn if the joint model of its
-    load and backlash shows it: the valve needs repair regardless of the cause."""
+def with_worn_valve(verdict: Verdict, worn: WornValve, others_s: Sequence[float] = ()) -> Verdict:
+    """The verdict on a loop that cycles for another cause, its valve worn if that is seen beside the load: the valve
+    needs repair regardless of the cause. others_s : further periods of the error [s]."""
     m = verdict.measured
-    if m is None or m.ringing is None or verdict.cause is Cause.VALVE or m.window.position is not None:
-        return verdict
+    if verdict.cause is Cause.UNDECIDED and m is not None and not worn.is_seen:
+        return _beside_another_cycle(verdict, m, worn, others_s)
     # ringing is no line: the free noise model must show the backlash too
-    if verdict.cause is Cause.TUNING and m.evidence <= 0.0:
+    rings_alone = verdict.cause is Cause.TUNING and m is not None and m.evidence <= 0.0
+    if m is None or verdict.cause is Cause.VALVE or rings_alone or not worn.is_seen:
         return verdict
-    begins = [(x.time_constant_s, max(x.dead_time_s, 0.0)) for x in (m.linear, m.play)]
-    begins += [(share * period_s, 0.05 * period_s) for share in (0.3, 2.0, 20.0)]
-    found = beside_line(m.window, m.ringing.lined, begins, m.play.valve.stickband, period_s)
-    if found.evidence >= m.ringing.penalty and is_crossed_beside(found, m, limits):
-        found = with_further(found, _further(m, record, limits), period_s)
-    if not is_worn_beside(found, m, limits):
-        return verdict
-    return replace(verdict, fault=fault_of(m, limits), measured=replace(m, play=found.play))
+    linear, play = worn.fits
+    return replace(verdict, fault=fault_of(m, worn.limits), measured=replace(m, linear=linear, play=play))
 
 
-def _further(m: Measured, record: LoopRecord, limits: CauseLimits) -> list[Window]:
-    """Further windows of the record with enough good blocks, with OP at the controller's scan as in the first."""
-    whole = (w for w in further_windows(record, m.window, m.scale_s) if judged_count(w) >= limits.judged)
-    windows = list(islice(whole, FURTHER))
-    if m.window.steps == 1:
-        return windows
-    scans = (scans_of(record, w, m.controller) for w in windows)
-    return [
-        with_scans(replace(m.play, window=w), s, SEARCHED).window
-        for w, s in zip(windows, scans, strict=True)
-        if s is not None
-    ]
-
-
-def is_crossed_beside(found: BesideLine, m: Measured, limits: CauseLimits) -> bool:
-    """Whether OP crosses the backlash, and the process gain has the controller's sign."""
-    right_way = m.controller is None or m.controller.kp * found.play.gain > 0.0
-    size = found.play.valve.stickband / max(m.window.reach, 1e-9)
-    return right_way and limits.beside_size <= size <= limits.widest
-
-
-def is_worn_beside(found: BesideLine, m: Measured, limits: CauseLimits) -> bool:
-    """Whether backlash is seen beside the load: one that OP crosses, with enough evidence on which the half-cycles
-    agree."""
-    agree = found.trials is not None and found.trials.signs >= limits.beside_signs
-    return found.evidence >= limits.beside_evidence and agree and is_crossed_beside(found, m, limits)
+def _beside_another_cycle(
+    verdict: Verdict, m: Measured, worn: WornValve, others_s: Sequence[float]
+) -> Verdict:
+    """The verdict on an undecided cycle: its cause is the valve if that is seen beside a load of another period,
+    which leaves this cycle to the valve."""
+    for other in (replace(worn, period_s=period_s) for period_s in others_s[:OTHERS]):
+        if not other.is_seen:
+            continue
+        linear, play = other.fits
+        lead = other.found.evidence
+        gains = {Cause.VALVE: lead, Cause.TUNING: 0.0, Cause.LOAD: 0.0}
+        why = Sign(Cause.VALVE, 1.0, SignKind.LIKELIER, (str(Cause.VALVE), lead))
+        told = replace(m, linear=linear, play=play)
+        confidence = _chances(gains, worn.limits)
+        signs = (why, *verdict.signs)
+        return Verdict(Cause.VALVE, confidence, fault_of(m, worn.limits), signs, measured=told)
+    return verdict
 
 
 def refine_stick_slip(verdict: Verdict, period_s: float, limits: CauseLimits) -> Verdict:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -114,13 +113,12 @@ def _cut(
     )
 
 
-def further_windows(record: LoopRecord, window: Window, scale_s: float) -> Iterator[Window]:
-    """Other windows of the same length, the latest first, whatever is usable in them."""
-    n = window.y.size * window.factor
-    firsts = [*range(window.first + n, len(record) - n + 1, n), *range(window.first - n, -1, -n)]
-    most = window.most_time_constant_s, window.most_dead_time_s
-    for at in sorted(firsts, reverse=True):
-        yield _cut(record, at, n, window.factor, scale_s, most, window.turn)
+def whole_window(record: LoopRecord, window: Window, most: int) -> Window:
+    """The whole record in at most so many blocks, none shorter than those of a window of it; its cycles are not
+    distinguished from slower moves of OP."""
+    factor = max(math.ceil(len(record) / most), window.factor)
+    longest = window.most_time_constant_s, window.most_dead_time_s
+    return _cut(record, 0, len(record) // factor * factor, factor, window.dt_s, longest, 0)
 
 
 def scans_of(record: LoopRecord, window: Window, law: Pid | None) -> Scans | None:

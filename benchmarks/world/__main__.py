@@ -93,8 +93,8 @@ def right(d: Drawn, row: dict[str, Any]) -> bool:
         return row["valve_fault"] in ("none", None) and row["cause"] == "none"
     if d.kind in ("backlash", "stiction"):
         return row["cause"] == "valve"
-    if d.kind == "worn-sine":
-        return row["cause"] in ("load", "valve") and row["valve_fault"] not in ("none", None)
+    if d.kind in ("worn-sine", "worn-tight"):
+        return row["cause"] in (d.cause, "valve") and row["valve_fault"] not in ("none", None)
     return row["cause"] == d.cause and row["valve_fault"] in ("none", None)
 
 

@@ -22,7 +22,7 @@ from benchmarks.world.simulate import (
     simulate,
 )
 
-KINDS = ("backlash", "stiction", "tight", "load", "healthy", "worn-sine", "sluggish")
+KINDS = ("backlash", "stiction", "tight", "load", "healthy", "worn-sine", "sluggish", "worn-tight")
 HOURS = 24
 SWELL = 1.5
 """Spread of the error over that without the fault from which a loop shows it."""
@@ -49,7 +49,7 @@ class Drawn:
     @property
     def cause(self) -> str:
         """What `cause` should say."""
-        causes = {"backlash": "valve", "stiction": "valve", "tight": "tuning"}
+        causes = {"backlash": "valve", "stiction": "valve", "tight": "tuning", "worn-tight": "tuning"}
         return causes.get(self.kind, "none" if self.kind in ("healthy", "sluggish") else "load")
 
     @property
@@ -93,7 +93,7 @@ def _settings(rng: np.random.Generator, kind: str, p: Process) -> Controller | N
     """Settings of a kind; None where those drawn are of none."""
     scan = 1.0
     kp, ti = _nominal(p, scan)
-    if kind == "tight":
+    if kind in ("tight", "worn-tight"):
         way = rng.choice(["gain", "ti", "both"])
         more = rng.uniform(2.2, 3.6)
         c = Controller(
@@ -183,7 +183,7 @@ def _period(e: Floats, h: float) -> float:
 
 def _valve(rng: np.random.Generator, kind: str) -> Valve:
     band = float(np.exp(rng.uniform(math.log(0.8), math.log(6.0))))
-    if kind in ("backlash", "worn-sine"):
+    if kind in ("backlash", "worn-sine", "worn-tight"):
         return Valve(BACKLASH, band)
     if kind == "stiction":
         return Valve(int(rng.choice([HE, KANO, KARNOPP])), band, band * rng.uniform(0.3, 1.0))

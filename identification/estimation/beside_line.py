@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -22,7 +22,7 @@ from identification.estimation.window import Fit, Window
 from identification.record import Floats
 from identification.signals.robust import clipped_gain
 from identification.signals.turns import turns_of
-from identification.simulation.valve import IDEAL, sticking
+from identification.simulation.valve import IDEAL, StemLaw, sticking
 
 SHARES = np.geomspace(0.08, 0.95, 12)
 """Backlash widths of the scan, as shares of the range of OP in a cycle."""
@@ -54,41 +54,42 @@ class BesideLine:
 
 
 def beside_line(
-    window: Window, lined: SmoothFit, begins: Sequence[Dynamics], width: float, period_s: float
+    window: Window, begins: Sequence[Dynamics], valves: Sequence[StemLaw], period_s: float
 ) -> BesideLine:
     """Backlash under a load with a line of a period [s].
 
-    lined : the fit with a line and an ideal valve; begins : time constants and dead times [s], and width : backlash
-    [% of OP], at which the search begins.
+    begins : time constants and dead times [s], and valves : backlash or stick-slip, at which the search begins.
     """
-
-    def behind(width: float, near: SmoothFit) -> SmoothFit:
-        return fit_line(window, period_s, (near,), (), sticking(width, 0.0))
-
-    widths = np.append(SHARES * window.reach, width)
-    scanned = [
-        fit_line(window, period_s, (lined,), begins, sticking(float(w), 0.0)) for w in widths if w > 0.0
-    ]
+    lined = fit_line(window, period_s, (), begins)
+    laws = [sticking(float(w), 0.0) for w in SHARES * window.reach] + [x for x in valves if x.stickband > 0.0]
+    scanned = [fit_line(window, period_s, (lined,), begins, law) for law in laws]
     first = max(scanned, key=_likelihood)
-    at = math.log(first.law.stickband)
-    near = minimize_scalar(
-        lambda x: -behind(math.exp(x), first).log_likelihood,
-        bounds=(at - math.log(BETWEEN), at + math.log(BETWEEN)),
-        method="bounded",
-        options={"xatol": CLOSE},
-    )
-    worn = max((first, behind(math.exp(float(near.x)), first)), key=_likelihood)
+    worn = with_width(first, window, period_s)
     sound = _sound(window, worn, lined, period_s)
     return BesideLine(as_fit(worn, window), worn, sound, _gained(worn, sound, window, period_s))
 
 
-def with_further(found: BesideLine, windows: Sequence[Window], period_s: float) -> BesideLine:
-    """The same with the half-cycles of further windows, on which the width is not fitted."""
-    gained = [found.gained]
-    for window in windows:
-        worn = fit_line(window, period_s, (found.worn,), (), found.worn.law)
-        gained.append(_gained(worn, _sound(window, worn, found.sound, period_s), window, period_s))
-    return replace(found, gained=np.concatenate(gained))
+def with_width(near: SmoothFit, window: Window, period_s: float) -> SmoothFit:
+    """The fit behind backlash, or stick-slip of the same shape, with its width refined in a window."""
+    jump_share, at = near.law.slip_jump / near.law.stickband, math.log(near.law.stickband)
+
+    def behind(log_width: float) -> SmoothFit:
+        return fit_line(window, period_s, (near,), (), sticking(math.exp(log_width), jump_share))
+
+    best = minimize_scalar(
+        lambda x: -behind(x).log_likelihood,
+        bounds=(at - math.log(BETWEEN), at + math.log(BETWEEN)),
+        method="bounded",
+        options={"xatol": CLOSE},
+    )
+    return max((near, behind(float(best.x))), key=_likelihood)
+
+
+def in_window(found: BesideLine, window: Window, period_s: float) -> SmoothFit:
+    """The joint model behind a faulty valve fitted anew in another window, with its width refined."""
+    process = found.worn.process
+    begins = [(process.time_constant_s, max(process.dead_time_s - window.half_block_s, 0.0))]
+    return with_width(fit_line(window, period_s, (), begins, found.worn.law), window, period_s)
 
 
 def _likelihood(fit: SmoothFit) -> float:
