@@ -248,12 +248,16 @@ def _may_be_cause(m: Measured, ringing: Ringing, limits: CauseLimits, beside: Wo
     """Whether a valve fault may be the cause of a cycle: PV shows it, it is not too small for OP's travel, and the
     loop's harmonic balance is not far from a limit cycle. A valve loses the same travel at each reversal, so more
     than half of the half-cycles must show it: a few may follow set point moves. A periodic load has harmonics that
-    backlash explains too: beside one the whole record must show it, unless nearly all half-cycles do."""
-    if m.size < limits.least_size or m.evidence < ringing.penalty or not speaks(m, limits, True):
+    backlash explains too: beside one the whole record must show it, unless nearly all half-cycles do, or it explains
+    far more than a line."""
+    clear = ringing.valve_nat - max(ringing.line_nat, 0.0) >= limits.beside_evidence
+    clear = clear and (beside is None or not beside.is_hidden)
+    large = clear or m.size >= limits.least_size  # OP of a tight loop moves by several times its backlash
+    if not large or m.evidence < ringing.penalty or not speaks(m, limits, True):
         return False
     if imbalance(m) > limits.imbalance or (m.trials is not None and m.trials.signs < SIGN_TEST):
         return False
-    if not ringing.is_periodic(limits) or beside is None or fault_of(m, limits) is Fault.STICTION:
+    if clear or not ringing.is_periodic(limits) or beside is None or fault_of(m, limits) is Fault.STICTION:
         return True
     return (m.trials is not None and m.trials.agreeing >= limits.agreeing) or beside.is_seen
 

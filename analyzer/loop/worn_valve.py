@@ -51,7 +51,7 @@ class WornValve:
     def is_seen(self) -> bool:
         """Whether backlash is seen beside any load: one that OP crosses, with enough evidence on which half-cycles
         agree. A stem that is recorded, or identified slip by slip, is no question of a width."""
-        if self._is_hidden:
+        if self.is_hidden:
             return False
         trials, limits = self.found.trials, self.limits
         agree = trials is not None and trials.signs >= limits.beside_signs
@@ -73,7 +73,7 @@ class WornValve:
         return m.linear, as_fit(in_window(found, m.window, self.period_s), m.window)
 
     @property
-    def _is_hidden(self) -> bool:
+    def is_hidden(self) -> bool:
         """Whether the record cannot answer: its stem is recorded, the load was not compared, OP swings from limit to
         limit, or the loop rings with few samples a cycle."""
         m, limits = self.measured, self.limits
