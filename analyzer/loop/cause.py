@@ -252,14 +252,17 @@ def _may_be_cause(m: Measured, ringing: Ringing, limits: CauseLimits, beside: Wo
     far more than a line."""
     clear = ringing.valve_nat - max(ringing.line_nat, 0.0) >= limits.beside_evidence
     clear = clear and (beside is None or not beside.is_hidden)
-    large = clear or m.size >= limits.least_size  # OP of a tight loop moves by several times its backlash
+    each = m.trials is not None and m.trials.agreeing >= limits.agreeing
+    large = (
+        clear or each or m.size >= limits.least_size
+    )  # OP of a tight loop moves by several times its backlash
     if not large or m.evidence < ringing.penalty or not speaks(m, limits, True):
         return False
     if imbalance(m) > limits.imbalance or (m.trials is not None and m.trials.signs < SIGN_TEST):
         return False
-    if clear or not ringing.is_periodic(limits) or beside is None or fault_of(m, limits) is Fault.STICTION:
+    if clear or each or not ringing.is_periodic(limits) or fault_of(m, limits) is Fault.STICTION:
         return True
-    return (m.trials is not None and m.trials.agreeing >= limits.agreeing) or beside.is_seen
+    return beside is None or beside.is_seen
 
 
 def imbalance(m: Measured) -> float:
@@ -383,8 +386,8 @@ def with_worn_valve(verdict: Verdict, worn: WornValve, others_s: Sequence[float]
     rings_alone = verdict.cause is Cause.TUNING and m is not None and m.evidence <= 0.0
     if m is None or verdict.cause is Cause.VALVE or rings_alone or not worn.is_seen:
         return verdict
-    linear, play = worn.fits
-    return replace(verdict, fault=fault_of(m, worn.limits), measured=replace(m, linear=linear, play=play))
+    fault, told = worn.shown
+    return replace(verdict, fault=fault, measured=told)
 
 
 def _beside_another_cycle(
@@ -395,14 +398,11 @@ def _beside_another_cycle(
     for other in (replace(worn, period_s=period_s) for period_s in others_s[:OTHERS]):
         if not other.is_seen:
             continue
-        linear, play = other.fits
+        fault, told = other.shown
         lead = other.found.evidence
-        gains = {Cause.VALVE: lead, Cause.TUNING: 0.0, Cause.LOAD: 0.0}
+        confidence = _chances({Cause.VALVE: lead, Cause.TUNING: 0.0, Cause.LOAD: 0.0}, worn.limits)
         why = Sign(Cause.VALVE, 1.0, SignKind.LIKELIER, (str(Cause.VALVE), lead))
-        told = replace(m, linear=linear, play=play)
-        confidence = _chances(gains, worn.limits)
-        signs = (why, *verdict.signs)
-        return Verdict(Cause.VALVE, confidence, fault_of(m, worn.limits), signs, measured=told)
+        return Verdict(Cause.VALVE, confidence, fault, (why, *verdict.signs), measured=told)
     return verdict
 
 

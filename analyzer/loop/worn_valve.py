@@ -12,6 +12,7 @@ from functools import cached_property
 
 from analyzer.config import CauseLimits
 from analyzer.loop.candidates import SEARCHED
+from analyzer.loop.decisions import Fault
 from analyzer.loop.fit_window import scans_of, whole_window
 from analyzer.loop.measure import Measured
 from identification.estimation.beside_line import BesideLine, beside_line, in_window
@@ -64,7 +65,15 @@ class WornValve:
         return self.measured.window.position is not None or self.found.evidence > 0.0
 
     @property
-    def fits(self) -> tuple[Fit, Fit]:
+    def shown(self) -> tuple[Fault, Measured]:
+        """The fault of the likeliest valve, and the measures with its fit."""
+        linear, valve = self._fits()
+        told = replace(self.measured, linear=linear, play=valve)
+        if valve.valve.slip_jump < self.limits.least_jump * valve.valve.stickband:
+            return Fault.BACKLASH, told
+        return Fault.STICTION, replace(told, stick_slip=valve)
+
+    def _fits(self) -> tuple[Fit, Fit]:
         """Process alone and behind the faulty valve. If the cycle of OP crosses the backlash it is fitted in the
         stretch of the measures, whose blocks are shorter: longer ones give a width that is too small."""
         m, found = self.measured, self.found
