@@ -250,19 +250,18 @@ def _may_be_cause(m: Measured, ringing: Ringing, limits: CauseLimits, beside: Wo
     than half of the half-cycles must show it: a few may follow set point moves. A periodic load has harmonics that
     backlash explains too: beside one the whole record must show it, unless nearly all half-cycles do, or it explains
     far more than a line."""
-    clear = ringing.valve_nat - max(ringing.line_nat, 0.0) >= limits.beside_evidence
-    clear = clear and (beside is None or not beside.is_hidden)
+    if m.evidence < ringing.penalty or not speaks(m, limits, True) or imbalance(m) > limits.imbalance:
+        return False
+    if m.trials is not None and m.trials.signs < SIGN_TEST:
+        return False
     each = m.trials is not None and m.trials.agreeing >= limits.agreeing
-    large = (
-        clear or each or m.size >= limits.least_size
-    )  # OP of a tight loop moves by several times its backlash
-    if not large or m.evidence < ringing.penalty or not speaks(m, limits, True):
-        return False
-    if imbalance(m) > limits.imbalance or (m.trials is not None and m.trials.signs < SIGN_TEST):
-        return False
-    if clear or each or not ringing.is_periodic(limits) or fault_of(m, limits) is Fault.STICTION:
-        return True
-    return beside is None or beside.is_seen
+    narrow = m.size < limits.least_size and not each
+    doubted = ringing.is_periodic(limits) and not each and fault_of(m, limits) is not Fault.STICTION
+    if beside is None or not (narrow or doubted):
+        return not narrow
+    if ringing.valve_nat - max(ringing.line_nat, 0.0) >= limits.beside_evidence:
+        return beside.has_evidence  # OP of a tight loop moves by several times its backlash
+    return not narrow and beside.is_seen
 
 
 def imbalance(m: Measured) -> float:

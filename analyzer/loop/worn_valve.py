@@ -50,13 +50,17 @@ class WornValve:
 
     @property
     def is_seen(self) -> bool:
-        """Whether backlash is seen beside any load: one that OP crosses, with enough evidence on which half-cycles
-        agree. A stem that is recorded, or identified slip by slip, is no question of a width."""
-        if self.is_hidden:
+        """Whether backlash is seen beside any load: one that OP crosses and that changes its stem's motion."""
+        return self.has_evidence and self._is_crossed
+
+    @property
+    def has_evidence(self) -> bool:
+        """Whether backlash of any width has enough evidence beside the load, on which half-cycles agree."""
+        if self._is_hidden:
             return False
         trials, limits = self.found.trials, self.limits
         agree = trials is not None and trials.signs >= limits.beside_signs
-        return self.found.evidence >= limits.beside_evidence and agree and self._is_crossed
+        return agree and self.found.evidence >= limits.beside_evidence
 
     @property
     def is_likelier(self) -> bool:
@@ -82,7 +86,7 @@ class WornValve:
         return m.linear, as_fit(in_window(found, m.window, self.period_s), m.window)
 
     @property
-    def is_hidden(self) -> bool:
+    def _is_hidden(self) -> bool:
         """Whether the record cannot answer: its stem is recorded, the load was not compared, OP swings from limit to
         limit, or the loop rings with few samples a cycle."""
         m, limits = self.measured, self.limits
