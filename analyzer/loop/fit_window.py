@@ -113,12 +113,12 @@ def _cut(
     )
 
 
-def whole_window(record: LoopRecord, window: Window, most: int) -> Window:
-    """The whole record in at most so many blocks, none shorter than those of a window of it; its cycles are not
-    distinguished from slower moves of OP."""
+def whole_window(record: LoopRecord, window: Window, most: int, scale_s: float) -> Window:
+    """The whole record in at most so many blocks, none shorter than those of a window of it; its cycles, of a period
+    [s], are not distinguished from slower moves of OP."""
     factor = max(math.ceil(len(record) / most), window.factor)
     longest = window.most_time_constant_s, window.most_dead_time_s
-    return _cut(record, 0, len(record) // factor * factor, factor, window.dt_s, longest, 0)
+    return _cut(record, 0, len(record) // factor * factor, factor, scale_s, longest, 0)
 
 
 def scans_of(record: LoopRecord, window: Window, law: Pid | None) -> Scans | None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from analyzer.config import CauseLimits
-from analyzer.loop.candidates import SEARCHED
+from analyzer.loop.candidates import SEARCHED, judged_count
 from analyzer.loop.decisions import Fault
 from analyzer.loop.fit_window import scans_of, whole_window
 from analyzer.loop.measure import Measured
@@ -46,7 +46,7 @@ class WornValve:
         """The joint model of process, backlash, load and line."""
         m = self.measured
         valves = [fit.valve for fit in (m.play, m.stick_slip) if fit is not None]
-        return beside_line(self._window(), self._starts(), valves, self.period_s)
+        return beside_line(self._window, self._starts(), valves, self.period_s)
 
     @property
     def is_seen(self) -> bool:
@@ -65,8 +65,9 @@ class WornValve:
     @property
     def is_likelier(self) -> bool:
         """Whether the whole record is likelier with the fault than with an ideal valve, under a load with real poles:
-        a free noise model of one stretch can take over the process at a single move of the set point."""
-        return self.measured.window.position is not None or self.found.evidence > 0.0
+        a free noise model of one stretch can take over the process at a single move of the set point. True if the
+        whole record cannot answer."""
+        return self.measured.window.position is not None or self._is_thin or self.found.evidence > 0.0
 
     @property
     def shown(self) -> tuple[Fault, Measured]:
@@ -88,11 +89,18 @@ class WornValve:
     @property
     def _is_hidden(self) -> bool:
         """Whether the record cannot answer: its stem is recorded, the load was not compared, OP swings from limit to
-        limit, or the loop rings with few samples a cycle."""
+        limit, few blocks are good, or the loop rings with few samples a cycle."""
         m, limits = self.measured, self.limits
         if m.ringing is None or m.window.position is not None or m.window.cycle_range >= WHOLE_PCT:
             return True
+        if self._is_thin:
+            return True
         return self.period_s < limits.samples_told * self.record.dt_s and m.ringing.rings(limits)
+
+    @property
+    def _is_thin(self) -> bool:
+        """Whether too few blocks of the whole record follow good ones: those of the stretch are shorter."""
+        return judged_count(self._window) < self.limits.judged
 
     @property
     def _is_crossed(self) -> bool:
@@ -104,10 +112,11 @@ class WornValve:
         crossed = width <= self.limits.widest * play.window.op_range
         return right_way and crossed and width >= self.limits.beside_size * m.window.reach
 
+    @cached_property
     def _window(self) -> Window:
         """The whole record, with OP at the controller's scan if the measures have it there."""
         m = self.measured
-        window = whole_window(self.record, m.window, BLOCKS)
+        window = whole_window(self.record, m.window, BLOCKS, self.period_s)
         scans = None if m.window.steps == 1 else scans_of(self.record, window, m.controller)
         if scans is None:
             return window

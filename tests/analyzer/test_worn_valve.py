@@ -9,6 +9,7 @@ from analyzer.config import Config
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.decisions import Cause, Fault
 from analyzer.loop.quality import Prepared, Scale
+from analyzer.loop.worn_valve import WornValve
 from benchmarks.world.draw import Drawn, drawn, run
 from benchmarks.world.recorder import recorded
 from identification.models import Pid
@@ -17,13 +18,25 @@ from identification.record import LoopRecord
 CONFIG = Config()
 
 
+def assessed(d: Drawn, record: LoopRecord) -> Assessment:
+    """The assessment of a record of a drawn loop."""
+    stated = Pid(d.controller.kp, d.controller.ti_s, scan_s=1.0)
+    return assess(Prepared(record, Scale(0, 100, 0, 100, False), 0.0, 0.0, ()), stated, CONFIG)
+
+
+def holed(d: Drawn, lost: int, every: int) -> LoopRecord:
+    """A day of a loop of which the first rows of each `every` rows are bad, as many as are lost."""
+    t = run(d)
+    bad = np.arange(t.pv.size) % every < lost
+    return LoopRecord(d.name, 0.0, 1.0, t.sp, np.where(bad, 0.0, t.pv), t.op, bad, masks={"gap": bad})
+
+
 def judged(d: Drawn, way: str = "plain") -> Assessment:
     """The assessment of a day of a drawn loop, recorded in a way, by default a row a second."""
     r = recorded(run(d), way, d.seed)
     step_s = float(np.median(np.diff(r["stamp_s"])))
     record = LoopRecord(d.name, 0.0, step_s, r["sp"], r["pv"], r["op"], np.zeros(r["pv"].size, bool))
-    stated = Pid(d.controller.kp, d.controller.ti_s, scan_s=1.0)
-    return assess(Prepared(record, Scale(0, 100, 0, 100, False), 0.0, 0.0, ()), stated, CONFIG)
+    return assessed(d, record)
 
 
 def test_a_worn_valve_under_a_sine_is_told_with_its_width() -> None:
@@ -53,8 +66,7 @@ def test_a_night_of_which_half_is_lost_is_judged_by_the_rest(lost: str) -> None:
     away = np.arange(t.pv.size) >= t.pv.size // 2
     masks = {"gap": away} if lost == "bad" else {"manual": away}
     record = LoopRecord(d.name, 0.0, 1.0, t.sp, t.pv, t.op, away & (lost == "bad"), masks=masks)
-    stated = Pid(d.controller.kp, d.controller.ti_s, scan_s=1.0)
-    found = assess(Prepared(record, Scale(0, 100, 0, 100, False), 0.0, 0.0, ()), stated, CONFIG).verdict
+    found = assessed(d, record).verdict
     assert found.fault == "backlash"
     assert found.require_measured.play.valve.stickband == pytest.approx(d.valve.band, rel=0.1)
 
@@ -117,3 +129,22 @@ def test_a_limit_cycle_far_wider_than_its_backlash_is_the_valves():
     assert verdict.cause is Cause.VALVE
     assert verdict.fault is Fault.BACKLASH
     assert verdict.require_measured.play.valve.stickband == pytest.approx(d.valve.band, rel=0.05)
+
+
+def test_short_holes_all_day_hide_no_worn_valve():
+    """Four of 30 rows are bad all day, a thirtieth of a period each: bridged, they hide no worn valve under a sine,
+    and its width is within 5 %."""
+    d = loop(574, "worn-sine", 6)
+    found = assessed(d, holed(d, 4, 30)).verdict
+    assert found.fault is Fault.BACKLASH
+    assert found.require_measured.play.valve.stickband == pytest.approx(d.valve.band, rel=0.05)
+
+
+def test_a_day_without_whole_blocks_neither_shows_nor_denies_a_fault():
+    """With 10 of 20 rows bad no block of 16 s is good: the whole day shows no worn valve, and denies none that its
+    stretch, in blocks of a row, has."""
+    d = loop(574, "worn-sine", 7)
+    measured = judged(d).verdict.require_measured
+    asked = WornValve(holed(d, 10, 20), measured, d.period_s, CONFIG.cause)
+    assert asked.is_likelier
+    assert not asked.is_seen
