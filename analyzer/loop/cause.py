@@ -6,7 +6,8 @@
 3. Load: the load has a line that keeps its phase, and the cycle keeps its size.
 
 The models are compared under one load, a smooth one (ringing.py). A valve also needs evidence under a free noise
-model, and a width that is a large share of OP's travel. Where no model leads by the penalty of its constants the
+model, and a width that is a large share of OP's travel, or evidence in the whole record (worn_valve.py), which also
+shows a worn valve in loops that cycle for another cause. Where no model leads by the penalty of its constants the
 cause is undecided. A loop that does not oscillate can only have a valve fault. For a valve fault each slip is tested:
 does the valve stick at distances that scatter, instead of backlash?
 """
@@ -247,9 +248,9 @@ def _rings(m: Measured, ringing: Ringing, limits: CauseLimits) -> Verdict:
 def _may_be_cause(m: Measured, ringing: Ringing, limits: CauseLimits, beside: WornValve | None) -> bool:
     """Whether a valve fault may be the cause of a cycle: PV shows it, it is not too small for OP's travel, and the
     loop's harmonic balance is not far from a limit cycle. A valve loses the same travel at each reversal, so more
-    than half of the half-cycles must show it: a few may follow set point moves. A periodic load has harmonics that
-    backlash explains too: beside one the whole record must show it, unless nearly all half-cycles do, or it explains
-    far more than a line."""
+    than half of the half-cycles must show it: a few may follow set point moves. Unless nearly all of them do, two
+    faults must be shown by the whole record: backlash under a periodic load, whose harmonics it explains too, and one
+    that is narrow for OP's travel, which must also explain far more than a line."""
     if m.evidence < ringing.penalty or not speaks(m, limits, True) or imbalance(m) > limits.imbalance:
         return False
     if m.trials is not None and m.trials.signs < SIGN_TEST:
@@ -260,7 +261,7 @@ def _may_be_cause(m: Measured, ringing: Ringing, limits: CauseLimits, beside: Wo
     if beside is None or not (narrow or doubted):
         return not narrow
     if ringing.valve_nat - max(ringing.line_nat, 0.0) >= limits.beside_evidence:
-        return beside.has_evidence  # OP of a tight loop moves by several times its backlash
+        return beside.has_evidence  # OP of a tight loop travels several times its backlash
     return not narrow and beside.is_seen
 
 
