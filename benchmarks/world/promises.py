@@ -22,6 +22,7 @@ from analyzer.loop.tune import tune
 from benchmarks.world.__main__ import export, spec_of, told
 from benchmarks.world.draw import Drawn, drawn, run
 from benchmarks.world.recorder import Recording, recorded
+from benchmarks.world.settings import outcome
 from benchmarks.world.simulate import Controller
 from identification.models import Estimate
 from proofs.common import command_line, table
@@ -59,10 +60,8 @@ def forecast_of(d: Drawn, record: Recording, row: dict[str, Any]) -> tuple[Estim
 
 def changes(d: Drawn, new: Controller, day: int) -> tuple[float, float]:
     """Changes of the average absolute error and the stem travel on a day of the true plant [-]."""
-    old, ours = run(d, day), run(d, day, settings=new)
-    error = [float(np.mean(np.abs(t.pv - t.sp))) for t in (old, ours)]
-    travel = [float(np.abs(np.diff(t.stem)).sum()) for t in (old, ours)]
-    return error[1] / error[0] - 1.0, travel[1] / max(travel[0], 1e-9) - 1.0
+    error, travel, _, _ = outcome(d, new, day)
+    return error - 1.0, travel - 1.0
 
 
 def promises(kind: str, seeds: list[int], each: int, way: str, jobs: int) -> list[Promise]:

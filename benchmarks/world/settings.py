@@ -16,9 +16,9 @@ from benchmarks.world.simulate import Controller, sensitivity
 from proofs.common import command_line, table
 
 
-def outcome(d: Drawn, new: Controller) -> tuple[float, float, float, float]:
+def outcome(d: Drawn, new: Controller, day: int = 0) -> tuple[float, float, float, float]:
     """Error and stem travel of a day over those before, maximum sensitivity before and after, all [-]."""
-    old, ours = run(d), run(d, settings=new)
+    old, ours = run(d, day), run(d, day, settings=new)
     error = [float(np.mean(np.abs(t.pv - t.sp))) for t in (old, ours)]
     travel = [float(np.abs(np.diff(t.stem)).sum()) for t in (old, ours)]
     return error[1] / error[0], travel[1] / max(travel[0], 1e-9), d.ms, sensitivity(d.process, new)[0]
