@@ -154,7 +154,7 @@ def tune(loop: PlantLoop) -> of_settings.Tuning:
     if found.verdict.measured is None:
         raise NotAssessedError(f"{loop.spec.loop}: {found.verdict.needs or 'no model can be identified'}")
     keep = withheld(found, loop.spec, controller, loop.prepared.scale.span, loop.plant.config)
-    return of_settings.tune(found, controller, loop.plant.config, keep)
+    return of_settings.tune(found, controller, loop.plant.config, keep, loop.prepared, loop.spec.type)
 
 
 def explain(loop: PlantLoop) -> Explained:

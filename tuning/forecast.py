@@ -163,11 +163,13 @@ def _estimates(value: Floats, draws: Floats, units: bool = True) -> dict[str, Es
 
 
 def predict(loop: Loop, controller: Pid, load: Floats, uncertainty: Sequence[Loop] = ()) -> Forecast:
-    """The present and a new controller on the same load, on the identified loop and on its uncertainty samples.
+    """The present and a new controller on the same load, on the identified loop and on its uncertainty samples, with
+    intervals for another stretch of the same length and kind of load.
 
     The load, shape (n,), and noise add to PV on the controller's clock [% PV]; ValueError for fewer than ten scans a
     block. The controllers of `uncertainty`, other loops consistent with the data, are not used. Blocks do not overlap
-    (Kunsch 1989).
+    (Kunsch 1989). The load of the coming stretch scatters about the mean as that of the recorded one does, so both
+    are drawn; models are uncertain by METHOD.unmodelled beyond their samples.
     """
     if load.size < 10 * METHOD.blocks:
         raise ValueError(f"a forecast needs {10 * METHOD.blocks} scans of load, has {load.size}")
@@ -176,24 +178,26 @@ def predict(loop: Loop, controller: Pid, load: Floats, uncertainty: Sequence[Loo
     cases = [replace(one, controller=loop.controller) for one in whole]
     old = [_blocks(settled(run(one, load))) for one in cases]
     new = [_blocks(settled(run(replace(one, controller=controller), load))) for one in cases]
-    draws = [
-        rng.integers(0, METHOD.blocks, METHOD.blocks) for _ in range(max(METHOD.draws // len(cases), 20))
-    ]
-    before = np.array([b[d].mean(axis=0) for b in old for d in draws])
-    after = np.array([b[d].mean(axis=0) for b in new for d in draws])
     first, second = old[0].mean(axis=0), new[0].mean(axis=0)
+    unmodelled = 0.0 if controller == loop.controller else METHOD.unmodelled
+    before, after = [], []
+    for b, a in zip(old, new, strict=True):
+        for _ in range(max(METHOD.draws // len(cases), 20)):
+            mean, coming = rng.integers(0, METHOD.blocks, (2, METHOD.blocks))
+            off = np.exp(unmodelled * rng.standard_normal(len(NAMES)))
+            before.append(b[mean].mean(axis=0) * _ratio(old[0][coming].mean(axis=0), first))
+            after.append(a[mean].mean(axis=0) * _ratio(new[0][coming].mean(axis=0), second) * off)
     return Forecast(
-        _estimates(first, before),
-        _estimates(second, after),
-        _estimates(_change(first, second), _change(before, after), units=False),
+        _estimates(first, np.array(before)),
+        _estimates(second, np.array(after)),
+        _estimates(_ratio(second, first) - 1.0, _ratio(np.array(after), np.array(before)) - 1.0, units=False),
     )
 
 
-def _change(before: Floats, after: Floats) -> Floats:
-    """after/before - 1, 0 where both are zero; any shape."""
+def _ratio(after: Floats, before: Floats) -> Floats:
+    """after/before [-], 1 where nothing was before; any shape."""
     nothing = before <= 1e-12
-    ratio = after / np.where(nothing, 1.0, before) - 1.0
-    return np.where(nothing, 0.0, ratio)
+    return np.where(nothing, 1.0, after / np.where(nothing, 1.0, before))
 
 
 @dataclass(frozen=True, slots=True)

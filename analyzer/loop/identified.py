@@ -7,18 +7,21 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import binom
 
 from analyzer.config import AdviceLimits
 from analyzer.limits import LOOP
+from analyzer.loop.candidates import SEARCHED
+from analyzer.loop.fit_window import across, scans_of, whole_window
 from analyzer.loop.measure import Measured
 from identification.controller.check import op_step
-from identification.estimation.between_samples import without_noise
+from identification.estimation.between_samples import scans_per_row, with_scans, without_noise
 from identification.estimation.descent import NINETY, half_width, reaching
-from identification.estimation.gauss_newton import covariance, disturbance
+from identification.estimation.gauss_newton import covariance, disturbance, residual
 from identification.estimation.window import Fit, Window
 from identification.limits import INTERVALS
 from identification.models import Estimate, Fopdt, Integrator, Loop, Pid, Process
-from identification.record import Floats
+from identification.record import Floats, LoopRecord, Mask
 from identification.signals.robust import robust_deviation
 from identification.simulation.pi import kept
 from identification.simulation.valve import StemLaw
@@ -36,6 +39,9 @@ the two loops of benchmarks/world (seeds 97, 99, every 10 s) whose settings rais
 MOST_OF_SWING = 0.8
 """Largest width over OP's range in a cycle that is tried [-]; ours: the stem does not move at 1, and near it noise
 decides whether it does."""
+NIGHT_BLOCKS, NIGHT_SCANS = 30_000, 200_000
+"""Blocks in which the load of a night is reconstructed, and its latest scans that are simulated, at most; ours: two
+days at one scan a second, a day in blocks of 3 s."""
 COARSE = 2.0
 """Digits of OP within which the median of its jumps is that of whole digits."""
 
@@ -87,18 +93,61 @@ def load_of(fit: Fit, controller: Pid) -> Floats:
     Blocks do not contain the noise from scan to scan, rows contain it at their own interval only. OP still contains
     it, times the gain, and it dithers the stem; white noise of that size is added.
     """
-    window = fit.window
+    _, load = _on_scans(disturbance(fit), fit.window, controller)
+    return _with_noise(load[-LOOP.load_scans :], fit.window, controller)
+
+
+def load_of_night(fit: Fit, controller: Pid, record: LoopRecord, period_s: float) -> Floats:
+    """As `load_of`, of the whole record [% PV] instead of the stretch that is fitted, shape (m,); its unusable parts
+    are left out. A working loop has compensated offset and drift, which the model's start does not know."""
+    window = whole_window(record, fit.window, NIGHT_BLOCKS, period_s)
+    dead_s = max(fit.process.dead_time_s - window.half_block_s, 0.0)
+    whole = replace(fit, window=window, dead_time_s=dead_s)
+    scans = None if fit.window.steps == 1 else scans_of(record, window, controller)
+    if scans is not None:
+        whole = with_scans(whole, scans, SEARCHED)
+    window = whole.window
+    t = np.linspace(-1.0, 1.0, window.y.size)
+    faded = np.exp(-0.5 * (1.0 + t) * window.duration_s / fit.time_constant_s)
+    left = regressed(residual(whole), np.column_stack([np.ones(t.size), t, faded]), window.usable)
+    clock, load = _on_scans(across(left, ~window.usable), window, controller)
+    usable = window.usable[np.minimum((clock / window.dt_s).astype(int), t.size - 1)]
+    return _with_noise(joined(load, usable)[-NIGHT_SCANS:], window, controller)
+
+
+def joined(load: Floats, usable: Mask) -> Floats:
+    """The usable parts of a load, shape (m,), one after the other, each moved to where the one before ends."""
+    at = np.flatnonzero(usable)
+    kept, next_part = load[at], np.diff(at, prepend=at[:1]) > 1
+    return np.asarray(kept - np.cumsum(np.where(next_part, np.diff(kept, prepend=kept[:1]), 0.0)))
+
+
+def regressed(y: Floats, terms: Floats, usable: Mask) -> Floats:
+    """y, shape (n,), less its least-squares fit of terms, shape (n, k), on the usable samples."""
+    slope, *_ = np.linalg.lstsq(terms[usable], y[usable], rcond=None)
+    return np.asarray(y - terms @ slope)
+
+
+def _on_scans(left: Floats, window: Window, controller: Pid) -> tuple[Floats, Floats]:
+    """Clock of the controller's scans [s] and the smooth part of a load on it [% PV], the set point subtracted."""
     scan_s = controller.scan_s or window.dt_s
-    left = disturbance(fit)
-    lost = window.factor > 1 or window.steps > 1
-    if window.factor == 1 and lost:
+    if window.factor == 1 and _loses_noise(window, controller):
         left = without_noise(left)
     if window.sp is not None:
         left = left - (window.sp - window.sp.mean())
-    clock = np.arange(int(window.duration_s / scan_s)) * scan_s
-    load = np.interp(clock, np.arange(left.size) * window.dt_s, left)[-LOOP.load_scans :]
-    if lost:
-        load += scan_noise(window, controller) * np.random.default_rng(SEED).normal(size=load.size)
+    clock: Floats = scan_s * np.arange(int(window.duration_s / scan_s), dtype=np.float64)
+    return clock, np.asarray(np.interp(clock, np.arange(left.size) * window.dt_s, left), dtype=np.float64)
+
+
+def _loses_noise(window: Window, controller: Pid) -> bool:
+    """Whether blocks, or rows of several scans, hide the noise from scan to scan."""
+    return window.factor > 1 or scans_per_row(controller, window.row_s) > 1
+
+
+def _with_noise(load: Floats, window: Window, controller: Pid) -> Floats:
+    """A load with the noise that its window does not contain [% PV], shape (m,)."""
+    if _loses_noise(window, controller):
+        load = load + scan_noise(window, controller) * np.random.default_rng(SEED).normal(size=load.size)
     return np.asarray(load, dtype=np.float64)
 
 
@@ -114,24 +163,39 @@ def recorded_error(fit: Fit, controller: Pid, last: int = 0) -> float:
 
 
 def scan_noise(window: Window, controller: Pid) -> float:
-    """Standard deviation of PV's noise from sample to sample [% PV], from OP's second differences.
+    """Standard deviation of PV's noise from sample to sample [% PV], from OP's differences where OP is free: the
+    smaller of second and fourth ones, because a fast cycle adds to both, to the fourth ones far less."""
+    found = []
+    for one in (window, window.of_rows):  # simulated between the rows, and recorded alone
+        held = max(round(controller.scan_s / one.step_s), 1)  # OP is constant between two scans
+        op, a = one.op[::held], kept(controller.pv_filter_s, max(controller.scan_s, one.step_s))
+        free = (op > controller.op_lo) & (op < controller.op_hi)  # at a limit OP does not follow PV
+        found += [_noise_of(op, free, order, a) for order in (2, 4)]
+    least = min((x for x in found if x is not None), default=0.0)
+    return least / abs(controller.kp) if controller.kp else 0.0
 
-    Those of white noise have sqrt(6) times its deviation, and behind a filter of PV that keeps a share a
-    (1 - a) sqrt(2 (3 - a) / (1 + a)) times; OP's rounding is subtracted. The median ignores steps (Rousseeuw, Croux
-    1993); if it is within a few digits of OP it is a digit's, and the mean square of jumps of that size is used
-    (Sheppard 1898).
+
+def _noise_of(op: Floats, free: Mask, order: int, a: float) -> float | None:
+    """Standard deviation of white noise in OP, shape (n,), before a filter that keeps a share a, from its differences
+    of an even order at free samples.
+
+    Their variance follows from the autocorrelation a^k of the filtered noise; that of OP's rounding is subtracted.
+    The median ignores steps (Rousseeuw, Croux 1993). If it is within a few digits of OP it is a digit's: the mean
+    square of jumps of that size is used then (Sheppard 1898), and higher orders have only the digit.
     """
-    held = max(round(controller.scan_s / window.step_s), 1)  # OP is constant between two scans
-    op = window.op[::held]
-    jumps = np.abs(np.diff(op, 2))
-    if jumps.size == 0 or controller.kp == 0:
-        return 0.0
-    a = kept(controller.pv_filter_s, max(controller.scan_s, window.step_s))
-    spread, digit = robust_deviation(jumps), op_step(op)
+    whole = np.convolve(free, np.ones(order + 1), "valid") == order + 1
+    jumps, digit = np.abs(np.diff(op, order))[whole], op_step(op)
+    if jumps.size == 0:
+        return None
+    weights = binom(order, np.arange(order + 1)) * (-1.0) ** np.arange(order + 1)
+    spread, rounding = robust_deviation(jumps), float(weights @ weights) / 12.0 * digit**2
     if spread < COARSE * digit:
+        if order > 2:
+            return None
         spread = math.sqrt(float(np.mean(jumps[jumps <= 2.0 * COARSE * digit] ** 2)))
-    seen = math.sqrt(max(spread**2 - 0.5 * digit**2, 0.0))
-    return seen / ((1.0 - a) * math.sqrt(2.0 * (3.0 - a) / (1.0 + a)) * abs(controller.kp))
+    apart = np.abs(np.subtract.outer(np.arange(order + 1), np.arange(order + 1)))
+    share = (1.0 - a) / (1.0 + a) * float(weights @ a**apart @ weights)
+    return math.sqrt(max(spread**2 - rounding, 0.0) / share)
 
 
 def uncertain(fit: Fit, loop: Loop, samples: int = 6) -> tuple[Loop, ...]:

@@ -43,11 +43,15 @@ Known = tuple[Fit, dict[str, Estimate]]
 @dataclass(frozen=True, slots=True)
 class FasterSettings:
     """New settings [%, s] of a sluggish loop, the factor by which they reject a load faster (Kp/Ti over the present
-    one) [-], and the change of the average absolute error in simulation [-], None of a first step."""
+    one) [-], and the change of the average absolute error in simulation [-], None of a first step; the loop on which
+    they are based, its fit, and the loops at the limits that the record allows."""
 
     new: Pid
     times: float
     change: float | None
+    loop: Loop
+    fit: Fit
+    others: tuple[Loop, ...]
 
 
 def faster_settings(
@@ -107,7 +111,9 @@ def _first_step(fits: list[Known], present: Pid, config: Config) -> FasterSettin
         return None
     if room < FIRST_STEP or slow < config.lanes.sluggish_times:
         return None
-    return FasterSettings(replace(present, kp=rounded(FIRST_STEP * present.kp)), FIRST_STEP, None)
+    loops = [Loop(p, present) for p in (likeliest[0], *allowed)]
+    new = replace(present, kp=rounded(FIRST_STEP * present.kp))
+    return FasterSettings(new, FIRST_STEP, None, loops[0], fits[0][0], tuple(loops[1:]))
 
 
 def _allowed(process: Process, known: dict[str, Estimate]) -> tuple[Process, ...]:
@@ -138,4 +144,6 @@ def _proposed(
     load = in_digits(detrend(load_of(fit, present)))  # a working loop has compensated offset and drift
     loop = Loop(between_samples(fit.process, fit.window, present), present)  # the loop with this load
     change = mean_error((loop,), new, load) / max(mean_error((loop,), present, load), 1e-9) - 1.0
-    return FasterSettings(new, times, change) if change <= -limits.sluggish_gain else None
+    if change > -limits.sluggish_gain:
+        return None
+    return FasterSettings(new, times, change, loop, fit, tuple(Loop(p, present) for p in allowed))

@@ -16,10 +16,13 @@ from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.decisions import Action, Cause, Requirement, RequirementKind, Status
 from analyzer.loop.experiments import Learned, learned
 from analyzer.loop.fitness import at_limits, unfit_for_cause
-from analyzer.loop.identified import intervals, load_of, tuned
+from analyzer.loop.identified import intervals, load_of, load_of_night, tuned
 from analyzer.loop.judged_stretch import controller_of
+from analyzer.loop.measure import time_scale
+from analyzer.loop.quality import Prepared
 from analyzer.loop.sample_clock import onto_clock
 from analyzer.loop.settings_side_by_side import compared, middle_ti
+from analyzer.loop.sluggish import faster_settings
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import experiments, sentences
@@ -57,7 +60,8 @@ class Tuning:
 
     estimates by name with 90 % intervals; model, the identified loop with its present controller; period_s and
     amplitude_pct of the recorded cycle [s], [% of span], None if there is none; cycle, the simulated one; proposal;
-    forecast, None if nothing is proposed; load [% PV] on the scan's clock; others, other possible loops.
+    forecast, under the load of the whole record, None if nothing is proposed; load [% PV] of the fitted stretch on
+    the scan's clock; others, other possible loops.
     """
 
     estimates: dict[str, Estimate]
@@ -85,11 +89,14 @@ def tune(
     controller: Pid,
     config: Config,
     kept: Advice | None,
+    prepared: Prepared,
+    kind: str,
     decided: tuple[Action, Pid | None] | None = None,
 ) -> Tuning:
     """Propose settings for one assessed loop with stated ones `controller` [%, s], and further terms found in the
-    record; `kept`, the reason if none are to be proposed (advice.withheld); decided, action and settings of all
-    nights, which have precedence. Raises NotAssessedError if the loop's trends give no model."""
+    record; `kept`, the reason if none are to be proposed (advice.withheld); prepared, its record, and kind, its type;
+    decided, action and settings of all nights, which have precedence. Raises NotAssessedError if the loop's trends
+    give no model."""
     verdict, controller = found.verdict, found.shown or controller
     first = found.oscillations.first
     period = first.period_s if first else None
@@ -102,10 +109,15 @@ def tune(
         action, typed = decided
         own = typed and replace(controller, kp=typed.kp, ti_s=typed.ti_s, td_s=typed.td_s)
         proposal = _as_decided(proposal, action, own)
-    load = load_of(fit, controller)
     new = proposal.new
-    is_long = load.size >= config.tuning.least_steps
-    forecast = predict(model, new, load, others) if new and is_long else None
+    if new is not None and verdict.cause is Cause.NONE:
+        slow = faster_settings(prepared.record, controller, kind, config)
+        model, fit, others = (model, fit, others) if slow is None else (slow.loop, slow.fit, slow.others)
+    forecast = None
+    if new is not None:
+        scale_s = time_scale(prepared.record, first, controller)
+        night = load_of_night(fit, controller, prepared.record, scale_s)
+        forecast = predict(model, new, night, others) if night.size >= config.tuning.least_steps else None
     return Tuning(
         intervals(verdict.fit, verdict.cause is Cause.VALVE, config.advice),
         model,
@@ -114,7 +126,7 @@ def tune(
         confirm(model),
         proposal,
         forecast,
-        load,
+        load_of(fit, controller),
         others,
     )
 
@@ -149,7 +161,9 @@ def _cycle_lines(t: Tuning) -> list[str]:
 def _forecast_lines(t: Tuning) -> list[str]:
     if t.forecast is None:
         return []
-    lines = ["forecast on the reconstructed load (90 % intervals):"]
+    lines = [
+        "forecast on the reconstructed load of the record (90 % intervals for the next record of such a load):"
+    ]
     for key in FORECAST:
         b, a, c = t.forecast.before[key], t.forecast.after[key], t.forecast.change[key]
         change = f"{100 * c.value:+.0f} % ({100 * c.low:+.0f} to {100 * c.high:+.0f})"
@@ -323,7 +337,7 @@ def _routine(one: PlantLoop, stated: Pid | None, decision: Decided, drawn: bool)
     if action is Action.RETUNE:
         new = controller_of(replace(spec, kp=row["kp_new"], ti=row["ti_new"]), prepared)
     kept = withheld(found, spec, stated, prepared.scale.span, config)
-    tuning = tune(found, stated, config, kept, (action, new))
+    tuning = tune(found, stated, config, kept, prepared, spec.type, (action, new))
     text += proposal_lines(tuning, spec, prepared.scale.span)
     lines, files = _with_settings_beside(tuning, spec, prepared.scale.span, config, row["night"], text, drawn)
     return TuningReport(lines, files, row, tuning)

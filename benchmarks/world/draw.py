@@ -110,19 +110,35 @@ def _settings(rng: np.random.Generator, kind: str, p: Process) -> Controller | N
     return c if sensitivity(p, c)[0] <= 2.3 else None
 
 
-def loads(d: Drawn, n: int, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
-    """Load before and behind the process, and noise, shape (n,) each."""
+@dataclass(frozen=True)
+class Character:
+    """What the loads of a plant have in common on all days: corner time [s] and size [% OP] of the random walk,
+    whether it also steps, and the standard deviation of PV's noise [% PV]."""
+
+    corner_s: float
+    size: float
+    steps: bool
+    noise: float
+
+
+def loads(
+    d: Drawn, n: int, rng: np.random.Generator, like: Character | None = None
+) -> tuple[Floats, Floats, Character]:
+    """Load before the process, and noise, shape (n,) each, of a character drawn, or of a given one."""
     h = d.controller.scan_s
     scale = d.process.dead_s + d.process.second_s
     corner = float(np.exp(rng.uniform(math.log(2 * scale), math.log(600 * scale))))
     size = float(np.exp(rng.uniform(math.log(0.15), math.log(0.8))))
+    if like is not None:
+        corner, size = like.corner_s, like.size
     before = size * wander(rng, n, corner, h)
-    if rng.random() < 0.4:
+    steps = rng.random() < 0.4 if like is None else like.steps
+    if steps:
         at = rng.integers(0, n, 4)
         for k in at:
             before[k:] += rng.normal() * size * 2
-    noise = float(np.exp(rng.uniform(math.log(0.01), math.log(0.08)))) * rng.standard_normal(n)
-    behind = np.zeros(n)
+    deviation = float(np.exp(rng.uniform(math.log(0.01), math.log(0.08)))) if like is None else like.noise
+    noise = deviation * rng.standard_normal(n)
     if d.kind in ("load", "worn-sine"):
         period = d.period_s
         phase = 2 * math.pi * np.arange(n) * h / period
@@ -132,7 +148,7 @@ def loads(d: Drawn, n: int, rng: np.random.Generator) -> tuple[Floats, Floats, F
         if d.kind == "load" and rng.random() < 0.3:
             wave = np.clip(2.0 * wave, -1, 1)
         before = before + (3.0 if d.kind == "load" else 2.0) * max(size, 0.4) * wave
-    return before, behind, noise
+    return before, noise, Character(corner, size, steps, deviation)
 
 
 def set_point(d: Drawn, n: int, rng: np.random.Generator) -> Floats:
@@ -149,14 +165,23 @@ def run(
     hours: float = HOURS,
     settings: Controller | None = None,
     valve: Valve | None = None,
+    alike: bool = False,
 ) -> Trends:
-    """One day of a loop: other days have other loads; with other settings or another valve on the same load."""
+    """One day of a loop, with other settings or another valve on the same load. Other days have other loads, of any
+    character or, `alike`, of that of the first day."""
     n = int(hours * 3600 / d.controller.scan_s)
+    like = loads(d, n, np.random.default_rng([d.seed, 0]))[2] if alike and day else None
     rng = np.random.default_rng([d.seed, day])
-    before, behind, noise = loads(d, n, rng)
+    before, noise, _ = loads(d, n, rng, like)
     sp = set_point(d, n, rng)
     return simulate(
-        d.process, settings or d.controller, d.valve if valve is None else valve, sp, before, behind, noise
+        d.process,
+        settings or d.controller,
+        d.valve if valve is None else valve,
+        sp,
+        before,
+        np.zeros(n),
+        noise,
     )
 
 

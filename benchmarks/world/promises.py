@@ -54,7 +54,7 @@ def forecast_of(d: Drawn, record: Recording, row: dict[str, Any]) -> tuple[Estim
     found = assess(one, present, config)
     new = controller_of(replace(spec, kp=row["kp_new"], ti=row["ti_new"]), one)
     kept = withheld(found, spec, present, one.scale.span, config)
-    forecast = tune(found, present, config, kept, (Action.RETUNE, new)).forecast
+    forecast = tune(found, present, config, kept, one, spec.type, (Action.RETUNE, new)).forecast
     return None if forecast is None else (forecast.change[FIGURES[0]], forecast.change[FIGURES[1]])
 
 

@@ -17,8 +17,9 @@ from proofs.common import command_line, table
 
 
 def outcome(d: Drawn, new: Controller, day: int = 0) -> tuple[float, float, float, float]:
-    """Error and stem travel of a day over those before, maximum sensitivity before and after, all [-]."""
-    old, ours = run(d, day), run(d, day, settings=new)
+    """Error and stem travel over those before, on a day of the same kind of load, and maximum sensitivity before and
+    after, all [-]."""
+    old, ours = (run(d, day, settings=c, alike=True) for c in (d.controller, new))
     error = [float(np.mean(np.abs(t.pv - t.sp))) for t in (old, ours)]
     travel = [float(np.abs(np.diff(t.stem)).sum()) for t in (old, ours)]
     return error[1] / error[0], travel[1] / max(travel[0], 1e-9), d.ms, sensitivity(d.process, new)[0]

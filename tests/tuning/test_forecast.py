@@ -75,6 +75,19 @@ def test_intervals_cover_the_long_run():
     assert hits >= 15
 
 
+def test_intervals_cover_the_next_record():
+    """Of 40 pairs of records of one slow load the 90 % interval from the first holds the change in the second in at
+    least 34, though a record holds only some twenty of its moves."""
+    loop, rng, hits = Loop(Fopdt(1.0, 20, 2), Pid(2.0, 20)), np.random.default_rng(6), 0
+    new = replace(loop.controller, kp=1.0)
+    for _ in range(40):
+        moves = np.repeat(rng.normal(size=60) * rng.lognormal(0.0, 0.8, 60), 200)
+        loads = np.split(moves + 0.02 * rng.normal(size=12_000), 2)
+        first, second = (predict(loop, new, x).change["average_absolute_error"] for x in loads)
+        hits += first.low <= second.value <= first.high
+    assert hits >= 34
+
+
 def test_short_load_is_refused():
     """A load of too few scans is an error that says how many are needed."""
     case = backlash_case(0)
