@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from itertools import pairwise
@@ -88,11 +89,15 @@ def loop_in_digits(loop: Loop) -> Loop:
 def run(loop: Loop, load: Floats) -> LoopRecord:
     """The loop at a constant set point of 0 under a load on the controller's clock, shape (n,) [% PV].
 
-    OP rests in the middle of the controller's range. A loop with backlash gets one kick before the record begins:
-    from rest a small load would not leave the backlash, unlike in a cycling plant. Stick-slip needs no kick, because
-    integral action moves it.
+    OP rests in the middle of the controller's range. Without integral action the bias of OP compensates the mean of
+    the load, as an operator sets it. A loop with backlash gets one kick before the record begins: from rest a small
+    load would not leave the backlash, unlike in a cycling plant. Stick-slip needs no kick, because integral action
+    moves it.
     """
-    c, before = loop.controller, _prelude(loop, load)
+    c, off = loop.controller, math.isinf(integral_s(loop.controller))
+    if off and load.size:
+        load = in_digits(load - load.mean())
+    before = np.concatenate((np.zeros(int(off)), _prelude(loop, load)))  # it begins with OP at its bias
     whole = np.concatenate((before, load))
     record = closed_loop(loop, np.zeros(whole.size), whole, op_start=0.5 * (c.op_lo + c.op_hi))
     return record.span(before.size, whole.size)

@@ -243,17 +243,18 @@ def _simc_settings(
 ) -> list[tuple[Pid, float]]:
     """Robust SIMC settings with their Ms, from the `first` closed-loop time constant on, for all samples.
 
-    Integral times are between the loop's own time constant and the shortest of its samples'. The gain of a ringing
-    loop is not raised. The derivative is not changed.
+    Integral times are between the loop's own time constant and the shortest of its samples'; integral action that is
+    off remains off. The gain of a ringing loop is not raised. The derivative is not changed.
     """
-    h = scan_step(loop)
+    h, off = scan_step(loop), math.isinf(integral_s(loop.controller))
     tau_c = METHOD.tau_c_per_delay * effective_delay(loop.process, h)
     most = (limits.ms_most, *(limits.ms_most_sample for _ in others))
     lags = [one.process.time_constant_s for one in others if isinstance(one.process, Fopdt)]
     found = []
     for k in range(first, limits.slower_most):
         nominal = simc(loop.process, tau_c * limits.slower**k, h)
-        for ti in dict.fromkeys(np.geomspace(nominal.ti_s, min([nominal.ti_s, *lags]), INTEGRAL_TIMES)):
+        times = np.geomspace(nominal.ti_s, min([nominal.ti_s, *lags]), INTEGRAL_TIMES)
+        for ti in [math.inf] if off else dict.fromkeys(times):
             kp = math.copysign(min(abs(nominal.kp), abs(loop.controller.kp)), nominal.kp)
             new = replace(loop.controller, kp=rounded(kp), ti_s=rounded(ti))
             ms = robust((loop, *others), new, most)
@@ -316,7 +317,8 @@ def _worth(candidate: Candidate, now: Pid, limits: TuningLimits) -> bool:
     """Whether a candidate reduces travel enough for a change; the threshold is higher if it differs from the present
     settings by no more than the advice of two nights does."""
     new = candidate.controller
-    gain, time = abs(math.log(new.kp / now.kp)), abs(math.log(integral_s(new) / integral_s(now)))
+    gain, times = abs(math.log(new.kp / now.kp)), (integral_s(new), integral_s(now))
+    time = 0.0 if times == (math.inf, math.inf) else abs(math.log(times[0] / times[1]))
     near = gain <= math.log(limits.near_gain) and time <= math.log(limits.near_time)
     return candidate.travel <= 1.0 - (limits.worth_near if near else limits.worth_travel)
 

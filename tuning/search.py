@@ -237,7 +237,7 @@ def _kept(table: Bench, most: Rejection, settings: list[Pid]) -> list[Candidate]
     """The settings that keep robustness, load rejection and error, tested on every loop."""
     process, found = table.loops[0].process, []
     for pid in settings:
-        if pid.ti_s / abs(pid.kp) > most.integral:
+        if math.isfinite(pid.ti_s) and pid.ti_s / abs(pid.kp) > most.integral:
             continue
         ms = robust(table.loops, pid, table.most_ms)
         if ms is None or rejection(process, pid).peak > most.peak:
@@ -249,14 +249,18 @@ def _kept(table: Bench, most: Rejection, settings: list[Pid]) -> list[Candidate]
 
 def _grid(loop: Loop, most: Rejection, limits: TuningLimits) -> tuple[Floats, Floats]:
     """Gains [% OP / % PV] and integral times [s] of the coarse grid. With backlash before a lag the best is often at
-    the time constant (the source study's Eq. 6), but not always: the simulation decides."""
+    the time constant (the source study's Eq. 6), but not always: the simulation decides. Integral action that is off
+    remains off."""
     nominal, now = simc(loop.process, scan_s=scan_step(loop)), loop.controller
     high = min(limits.gain_up * abs(now.kp), 2.0 * abs(nominal.kp))
     down = limits.gain_down_play if is_play(loop.valve) else limits.gain_down_stick
     low = min(limits.gain_down * abs(now.kp), down * abs(nominal.kp))
+    gains = np.geomspace(low, high, GAINS)
+    if math.isinf(integral_s(now)):
+        return gains, np.array([math.inf])
     shortest = 0.5 * min(integral_s(now), nominal.ti_s)
     longest = max(most.integral * high, 2.0 * shortest)
-    return np.geomspace(low, high, GAINS), np.geomspace(shortest, longest, TIMES)
+    return gains, np.geomspace(shortest, longest, TIMES)
 
 
 def search(table: Bench) -> tuple[Candidate, ...]:
@@ -272,7 +276,7 @@ def search(table: Bench) -> tuple[Candidate, ...]:
         return ()
     best = min(coarse, key=lambda c: c.score).controller
     step = np.linspace(-1.0, 1.0, FINE)
-    longer = np.maximum(best.ti_s * (times[1] / times[0]) ** step, times[0])
+    longer = times if times.size == 1 else np.maximum(best.ti_s * (times[1] / times[0]) ** step, times[0])
     near = np.clip(abs(best.kp) * (gains[1] / gains[0]) ** step, gains[0], gains[-1])
     fine = pairs(loop, np.unique(near), np.unique(longer))
     return tuple(sorted(coarse + _kept(table, most, fine), key=lambda c: c.score))

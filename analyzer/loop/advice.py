@@ -308,11 +308,11 @@ def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Con
     rests = confirm(sought).cycle is None
     if rests and period_s is None:
         return Proposed(Proposal(Action.REPAIR_VALVE, SAID["calm"]))
-    if rests and math.isinf(integral_s(loop.controller)):
-        return Proposed(Proposal(Action.CHECK_SETTINGS, SAID["no_integral"]))
     load = load_of(fit, loop.controller)
     if period_s is not None and load.size >= config.tuning.least_steps:
         apart = agreement(sought, fit, load).worst(config.advice)
+        if apart is not None and rests and math.isinf(integral_s(loop.controller)):
+            return Proposed(Proposal(Action.CHECK_SETTINGS, SAID["no_integral"]))
         if apart is not None:
             differs = SAID["off_by"].format(*apart) if apart[1] > 0.0 else SAID["no_cycle"]
             return Proposed(Proposal(Action.UNDECIDED, SAID["disagrees"].format(differs)))

@@ -90,7 +90,8 @@ def _typed(c: Comparison, name: str, spec: LoopSpec) -> str:
     kp, ti = as_stated(pid, spec, c.pv_span)
     gain = gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit)
     derivative = "" if name != DERIVATIVE else f" and {_td(c, pid, spec)}"
-    return f"Kp {number(kp)} {gain} and Ti {number(ti)} {spec.ti_unit}{derivative}"
+    integral = f"and Ti {number(ti)} {spec.ti_unit}" if ti else "without integral action"
+    return f"Kp {number(kp)} {gain} {integral}{derivative}"
 
 
 def _td(c: Comparison, pid: Pid, spec: LoopSpec) -> str:

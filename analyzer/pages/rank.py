@@ -238,7 +238,7 @@ def _setting_text(now: float | None, new: float | None, unit: str, off: str = "0
     if now is None:
         return ""
     present = number(now) if now else off
-    if new is not None:
+    if new:
         return f"{present} -> {number(new)} {unit}"
     return f"{present} {unit}" if now else off
 

@@ -66,7 +66,7 @@ def decision_lines(row: Row) -> list[str]:
     if _do(row):
         lines.append(f"do: {_do(row)}")
     if row["action"] == Action.RETUNE:
-        ti = f"{number(row['ti_new'])} {row['ti_unit'] or 's'}"
+        ti = f"{number(row['ti_new'])} {row['ti_unit'] or 's'}" if row["ti_new"] else "off"
         form = f"{row['gain_unit'] or 'percent'}, {row['form'] or 'ideal'}"
         lines.append(f"new settings: kp {number(row['kp_new'])}, ti {ti} ({form})")
     if row["reason"]:

@@ -73,8 +73,10 @@ def changed_settings(row: Row) -> str:
     if row["gain_unit"] == "band" and old[0] and new[0]:
         more = "more" if new[0] < old[0] else "less"
         kp += f" ({more} gain: {arrow(100 / old[0], 100 / new[0])} %/%)"
-    ti = f"Ti {arrow(old[1] or None, new[1])} {time}"
-    if time != "s" and new[1] is not None:
+    if old[1] == 0 and new[1] == 0:
+        return f"{kp}, Ti off"
+    ti = f"Ti {arrow(old[1] or None, new[1] or None)} {time}"
+    if time != "s" and new[1]:
         ti += f" ({arrow(*(None if t is None else seconds_of(t, time) for t in (old[1], new[1])))} s)"
     return f"{kp}, {ti}"
 
