@@ -39,7 +39,7 @@ def advised(d: Drawn, hours: float = 8.0) -> tuple[Assessment, Advice, Pid]:
 def test_a_loop_that_rings_gets_a_gain_alone(process: Process, kp: float) -> None:
     """The new gain takes 30 % of the stem's travel off the true plant, and the error rises by less than 15 %."""
     d = drawn(process, kp, Valve())
-    _, advice, _ = advised(d)
+    _, advice, _ = advised(d, 24.0)
     assert advice.action == "retune"
     assert advice.ti_new == 0.0
     error, travel, _, ms = outcome(d, replace(d.controller, kp=advice.kp_new))
