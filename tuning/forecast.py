@@ -167,24 +167,36 @@ def _estimates(value: Floats, draws: Floats, units: bool = True) -> dict[str, Es
     }
 
 
-def predict(loop: Loop, controller: Pid, load: Floats, uncertainty: Sequence[Loop] = ()) -> Forecast:
+def predict(
+    loop: Loop,
+    controller: Pid,
+    load: Floats,
+    uncertainty: Sequence[Loop] = (),
+    indistinguishable: Sequence[tuple[Loop, Floats]] = (),
+    unmodelled: float = METHOD.unmodelled,
+) -> Forecast:
     """The present and a new controller on the same load, on the identified loop and on its uncertainty samples, with
     intervals for another stretch of the same length and kind of load.
 
     The load, shape (n,), and noise add to PV on the controller's clock [% PV]; ValueError for fewer than ten scans a
-    block. The controllers of `uncertainty`, other loops consistent with the data, are not used. Blocks do not overlap
-    (Kunsch 1989). The load of the coming stretch scatters about the mean as that of the recorded one does, so both
-    are drawn; models are uncertain by METHOD.unmodelled beyond their samples.
+    block. `uncertainty`, other loops consistent with the data, and `indistinguishable`, others with a load of their
+    own: their controllers are not used. Blocks do not overlap (Kunsch 1989). The load of the coming stretch scatters
+    about the mean as that of the recorded one does, so both are drawn; models are uncertain by `unmodelled`, of the
+    logarithm of a figure, beyond their samples.
     """
     if load.size < 10 * METHOD.blocks:
         raise ValueError(f"a forecast needs {10 * METHOD.blocks} scans of load, has {load.size}")
     rng = np.random.default_rng(SEED)
-    load, whole = in_digits(load), (loop_in_digits(one) for one in (loop, *uncertainty))
-    cases = [replace(one, controller=loop.controller) for one in whole]
-    old = [_blocks(settled(run(one, load))) for one in cases]
-    new = [_blocks(settled(run(replace(one, controller=controller), load))) for one in cases]
+    cases = [(one, load) for one in (loop, *uncertainty)] + list(indistinguishable)
+    old, new = (
+        [
+            _blocks(settled(run(loop_in_digits(replace(one, controller=pid)), in_digits(x))))
+            for one, x in cases
+        ]
+        for pid in (loop.controller, controller)
+    )
     first, second = old[0].mean(axis=0), new[0].mean(axis=0)
-    unmodelled = 0.0 if controller == loop.controller else METHOD.unmodelled
+    unmodelled = 0.0 if controller == loop.controller else unmodelled
     before, after = [], []
     for b, a in zip(old, new, strict=True):
         for _ in range(max(METHOD.draws // len(cases), 20)):

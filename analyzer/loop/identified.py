@@ -212,9 +212,11 @@ def uncertain(fit: Fit, loop: Loop, samples: int = 6) -> tuple[Loop, ...]:
     return tuple(_drawn(draw, fit, loop) for draw in draws)
 
 
-def indistinguishable(fit: Fit, loop: Loop, period_s: float) -> tuple[LoadedLoop, ...]:
+def indistinguishable(
+    fit: Fit, loop: Loop, period_s: float, record: LoopRecord | None = None
+) -> tuple[LoadedLoop, ...]:
     """Loops that the cycle of a period [s] cannot distinguish from the fitted one, each with its residual load [% PV]
-    of the record, as `load_of`.
+    of the stretch, as `load_of`, or of a whole record.
 
     A limit cycle determines the product of the process and the valve's describing function at its own frequency alone
     (Astrom, Hagglund 1984). OP between two rows of a record, or within a digit, is unknown and biases the rest: the
@@ -237,7 +239,9 @@ def indistinguishable(fit: Fit, loop: Loop, period_s: float) -> tuple[LoadedLoop
         dead_s = max(fit.dead_time_s - later_s, 0.0)
         other = replace(fit, gain=gain, time_constant_s=slow_s, dead_time_s=dead_s, valve=law)
         process = Fopdt(gain, slow_s, max(loop.process.dead_time_s - later_s, 0.0))
-        found.append((replace(loop, process=process, valve=valve), load_of(other, loop.controller)))
+        pid = loop.controller
+        load = load_of(other, pid) if record is None else load_of_night(other, pid, record, period_s)
+        found.append((replace(loop, process=process, valve=valve), load))
     return tuple(found)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +17,10 @@ from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.decisions import Action, Cause, Requirement, RequirementKind, Status
 from analyzer.loop.experiments import Learned, learned
 from analyzer.loop.fitness import at_limits, unfit_for_cause
-from analyzer.loop.identified import intervals, load_of, load_of_night, tuned
+from analyzer.loop.identified import indistinguishable, intervals, load_of, load_of_night, tuned
 from analyzer.loop.judged_stretch import controller_of
 from analyzer.loop.measure import time_scale
+from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
 from analyzer.loop.sample_clock import onto_clock
 from analyzer.loop.settings_side_by_side import compared, middle_ti
@@ -30,14 +32,17 @@ from analyzer.words.decision import as_data, decision_lines
 from analyzer.words.reason import sign_in_full
 from analyzer.words.units import number
 from identification.errors import InputError, NotAssessedError
+from identification.estimation.between_samples import scans_per_row
+from identification.estimation.window import Fit
 from identification.models import Estimate, Loop, Pid, Process, Valve
 from identification.record import Floats, LoopRecord
 from reports.pages import Field, Line, Panels, Picture, Place, Plot
 from tuning.describing import describe
 from tuning.forecast import Forecast, in_digits, loop_in_digits, predict, run
-from tuning.frequency_response import is_stable, slowest_s
+from tuning.frequency_response import integral_s, is_stable, slowest_s
 from tuning.harmonic_balance import curves, travel_map
 from tuning.limit_cycle import Confirmed, confirm
+from tuning.limits import METHOD
 from tuning.recommend import WHY, WITHOUT_SETTINGS, Proposal
 
 if TYPE_CHECKING:
@@ -113,11 +118,7 @@ def tune(
     if new is not None and verdict.cause is Cause.NONE:
         slow = faster_settings(prepared.record, controller, kind, config)
         model, fit, others = (model, fit, others) if slow is None else (slow.loop, slow.fit, slow.others)
-    forecast = None
-    if new is not None:
-        scale_s = time_scale(prepared.record, first, controller)
-        night = load_of_night(fit, controller, prepared.record, scale_s)
-        forecast = predict(model, new, night, others) if night.size >= config.tuning.least_steps else None
+    forecast = None if new is None else _forecast(model, new, fit, others, prepared.record, first, config)
     return Tuning(
         intervals(verdict.fit, verdict.cause is Cause.VALVE, config.advice),
         model,
@@ -129,6 +130,32 @@ def tune(
         load_of(fit, controller),
         others,
     )
+
+
+def _forecast(
+    model: Loop,
+    new: Pid,
+    fit: Fit,
+    others: tuple[Loop, ...],
+    record: LoopRecord,
+    oscillation: Oscillation | None,
+    config: Config,
+) -> Forecast | None:
+    """The effect of new settings under the load of the whole record; None if the load is too short, or if the loop
+    with the present settings does not have the recorded error under it."""
+    now = model.controller
+    period_s = time_scale(record, oscillation, now)
+    night = load_of_night(fit, now, record, period_s)
+    if night.size < config.tuning.least_steps:
+        return None
+    sparse = scans_per_row(now, record.dt_s) > 1 and model.valve is not None
+    same = indistinguishable(fit, model, period_s, record) if sparse else ()
+    unmodelled = METHOD.unmodelled_sparse if sparse else METHOD.unmodelled
+    found = predict(model, new, night, others, same, unmodelled)
+    error = record.error[record.usable]
+    recorded = float(np.mean(np.abs(error - error.mean() * math.isinf(integral_s(now)))))
+    apart = abs(math.log(found.before[FORECAST[0]].value / max(recorded, 1e-9)))
+    return found if apart <= math.log(config.advice.agree_error) else None
 
 
 def _as_decided(found: Proposal, action: Action, new: Pid | None) -> Proposal:
@@ -159,8 +186,10 @@ def _cycle_lines(t: Tuning) -> list[str]:
 
 
 def _forecast_lines(t: Tuning) -> list[str]:
-    if t.forecast is None:
+    if t.proposal.new is None:
         return []
+    if t.forecast is None:
+        return [SAID["no_forecast"]]
     lines = [
         "forecast on the reconstructed load of the record (90 % intervals for the next record of such a load):"
     ]
