@@ -1,10 +1,11 @@
-"""Advice taken: new settings typed in on the true plant under the same load: python -m
-benchmarks.world.settings --seed 1"""
+"""Advice taken: new settings typed in on the true plant under the same load, and with --grid the loops that some
+settings would improve: python -m benchmarks.world.settings --seed 1"""
 
 from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,21 @@ def outcome(d: Drawn, new: Controller, day: int = 0) -> tuple[float, float, floa
     error = [float(np.mean(np.abs(t.pv - t.sp))) for t in (old, ours)]
     travel = [float(np.abs(np.diff(t.stem)).sum()) for t in (old, ours)]
     return error[1] / error[0], travel[1] / max(travel[0], 1e-9), d.ms, sensitivity(d.process, new)[0]
+
+
+GAINS, TIMES, MOST_MS = np.geomspace(0.15, 12.0, 14), np.geomspace(0.3, 12.0, 12), 2.0
+"""Settings of the grid over the present ones, and the largest sensitivity that it allows [-]."""
+
+
+def reachable(d: Drawn) -> bool:
+    """Whether robust settings of a grid improve the loop on its true plant."""
+    for k, t in product(GAINS, TIMES):
+        new = replace(d.controller, kp=d.controller.kp * float(k), ti_s=d.controller.ti_s * float(t))
+        if sensitivity(d.process, new)[0] > MOST_MS:
+            continue
+        if verdict(*outcome(d, new)[:2], d.kind) == "improved":
+            return True
+    return False
 
 
 def verdict(error: float, travel: float, kind: str = "") -> str:
@@ -48,13 +64,17 @@ def line(d: Drawn, row: dict[str, Any], found: tuple[float, ...] | None) -> str:
 
 def main() -> None:
     """Draw, record, assess, type in, count."""
-    asked = command_line(__doc__, seed=[1], each=8, way="plain", jobs=2, kinds=["tight"], show=False)
+    asked = command_line(
+        __doc__, seed=[1], each=8, way="plain", jobs=2, kinds=["tight"], show=False, grid=False
+    )
     rows, n = [], asked.each * len(asked.seed)
     for kind in asked.kinds:
         found: list[tuple[float, ...]] = []
+        possible = 0
         for seed in asked.seed:
             loops = drawn(seed, asked.each, (kind,))
             told_of = told(loops, {d.name: recorded(run(d), asked.way, d.seed) for d in loops}, asked.jobs)
+            possible += sum(reachable(d) for d in loops) if asked.grid else 0
             for d in loops:
                 row, came = told_of[d.name], None
                 if row["kp_new"] is not None:
@@ -67,9 +87,11 @@ def main() -> None:
         middle = [f"{100 * (np.median(a[:, k]) - 1):+.0f}" if found else "" for k in (0, 1)]
         worst = f"{100 * (a[:, 0].max() - 1):+.0f}" if found else ""
         ms = f"{a[:, 3].max():.2f}" if found else ""
-        rows.append((kind, n, len(found), said.count("improved"), said.count("harm"), *middle, worst, ms))
+        counts = (said.count("improved"), possible if asked.grid else "", said.count("harm"))
+        rows.append((kind, n, len(found), *counts, *middle, worst, ms))
     heads = (
-        "kind|loops|new settings|improved|harm|error, median %|stem travel, median %|worst error %|largest Ms"
+        "kind|loops|new settings|improved|a grid improves|harm|error, median %|stem travel, median %|"
+        "worst error %|largest Ms"
     )
     print(table(heads, rows, True))
 
