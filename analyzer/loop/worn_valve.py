@@ -20,6 +20,7 @@ from identification.estimation.between_samples import with_scans
 from identification.estimation.search import Dynamics
 from identification.estimation.smooth_load import as_fit
 from identification.estimation.window import Fit, Window
+from identification.mismatch.recording import held_move
 from identification.record import LoopRecord
 
 BLOCKS = 5400
@@ -67,7 +68,8 @@ class WornValve:
         """Whether the whole record is likelier with the fault than with an ideal valve, under a load with real poles:
         a free noise model of one stretch can take over the process at a single move of the set point. True if the
         whole record cannot answer."""
-        return self.measured.window.position is not None or self._is_thin or self.found.evidence > 0.0
+        silent = self.measured.window.position is not None or self._is_thin or self._is_held
+        return silent or self.found.evidence > 0.0
 
     @property
     def shown(self) -> tuple[Fault, Measured]:
@@ -93,7 +95,7 @@ class WornValve:
         m, limits = self.measured, self.limits
         if m.ringing is None or m.window.position is not None or m.window.cycle_range >= WHOLE_PCT:
             return True
-        if self._is_thin:
+        if self._is_thin or self._is_held:
             return True
         return self.period_s < limits.samples_told * self.record.dt_s and m.ringing.rings(limits)
 
@@ -101,6 +103,12 @@ class WornValve:
     def _is_thin(self) -> bool:
         """Whether too few blocks of the whole record follow good ones: those of the stretch are shorter."""
         return judged_count(self._window) < self.limits.judged
+
+    @cached_property
+    def _is_held(self) -> bool:
+        """Whether a historian recorded only changes of PV of some size: what it keeps lags behind PV in either
+        direction, as a stem does behind OP."""
+        return held_move(self.record.pv[~self.record.bad]) > 0.0
 
     @property
     def _is_crossed(self) -> bool:

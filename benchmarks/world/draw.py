@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from benchmarks.world.simulate import (
@@ -166,9 +167,10 @@ def run(
     settings: Controller | None = None,
     valve: Valve | None = None,
     alike: bool = False,
+    auto: NDArray[np.bool_] | None = None,
 ) -> Trends:
     """One day of a loop, with other settings or another valve on the same load. Other days have other loads, of any
-    character or, `alike`, of that of the first day."""
+    character or, `alike`, of that of the first day. auto, shape (n,): False in manual; None: always in automatic."""
     n = int(hours * 3600 / d.controller.scan_s)
     like = loads(d, n, np.random.default_rng([d.seed, 0]))[2] if alike and day else None
     rng = np.random.default_rng([d.seed, day])
@@ -182,6 +184,7 @@ def run(
         before,
         np.zeros(n),
         noise,
+        auto,
     )
 
 

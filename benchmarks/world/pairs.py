@@ -8,14 +8,25 @@ from collections import Counter
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from benchmarks.world.__main__ import right, told
-from benchmarks.world.draw import KINDS, Drawn, drawn, run
+from benchmarks.world.draw import HOURS, KINDS, Drawn, drawn, run
 from benchmarks.world.recorder import WAYS, Recording, recorded
+from benchmarks.world.simulate import Trends, Valve
 from proofs.common import command_line, table
 
-DAYS = ("another day", "SP moves", "PV filter")
+DAYS = ("another day", "SP moves", "PV filter", "manual spell", "ten hours of it")
 """Variations of the day itself: another load; eight set point moves; a filter of 5 s on the PV that the controller
-sees, which loops.csv does not state."""
+sees, which loops.csv does not state; three hours in manual, which no mode states; fourteen hours of the same loop in
+good order, then ten hours with the fault."""
+MANUAL = (0.4, 0.525)
+"""The spell in manual, as shares of the day."""
+FITTING = 3.5
+"""Factor of a process gain for which the settings of a loop that is too tight are well chosen; such loops are drawn
+with 2.2 to 3.6 times the gain, or a third to a fourteenth of the integral time."""
+WITH_FAULT = 10.0
+"""Hours with the fault at the end of a day that is otherwise in good order."""
 UNSTATED = "settings unstated"
 """The plain record of a loop for which loops.csv has no settings."""
 SIZE, PERIOD = 0.2, 0.05
@@ -30,7 +41,26 @@ def varied(d: Drawn, way: str) -> Recording:
         return recorded(run(replace(d, moves=8.0)), "plain", d.seed)
     if way == "PV filter":
         return recorded(run(d, settings=replace(d.controller, pv_filter_s=5.0)), "plain", d.seed)
+    if way == "manual spell":
+        at = np.arange(run(d).pv.size) / run(d).pv.size
+        return recorded(run(d, auto=(at < MANUAL[0]) | (at >= MANUAL[1])), "plain", d.seed)
+    if way == "ten hours of it":
+        return recorded(joined(calm(d), run(d, hours=WITH_FAULT)), "plain", d.seed)
     return recorded(run(d), way, d.seed)
+
+
+def calm(d: Drawn) -> Trends:
+    """The hours before the fault: the loop with a new valve, without its periodic load, or, if it is too tight, with
+    a process gain that its settings are made for."""
+    process = replace(d.process, gain=d.process.gain / FITTING) if d.cause == "tuning" else d.process
+    good = replace(d, kind="healthy", valve=Valve(), process=process)
+    return run(good, day=1, hours=HOURS - WITH_FAULT, alike=True)
+
+
+def joined(first: Trends, second: Trends) -> Trends:
+    """Two stretches of a loop, one after the other."""
+    both = (np.concatenate((getattr(first, x), getattr(second, x))) for x in ("sp", "pv", "op", "stem"))
+    return Trends(*both, first.scan_s)
 
 
 def size(row: dict[str, Any]) -> float | None:

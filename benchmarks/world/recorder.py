@@ -8,13 +8,29 @@ from benchmarks.world.simulate import Floats, Trends
 
 Recording = dict[str, Floats]
 """stamp_s [s from the start], sp, pv, op, shape (m,) each."""
-WAYS = ("plain", "every 5 s", "every 10 s", "rounded", "rows missing", "late stamps", "averages")
+WAYS = (
+    *("plain", "every 5 s", "every 10 s", "rounded", "rows missing", "late stamps", "averages"),
+    *("by exception", "gaps"),
+)
+EXCEPTION = 0.05
+"""Change of PV or OP from which a historian by exception keeps a new value [% of span]."""
+GAPS = ((0.2, 0.215), (0.55, 0.58), (0.8, 0.8035))
+"""Holes of 22, 43 and 5 minutes in a day, as shares of it: two outages of the recorder and a restart."""
 
 
 def plain(t: Trends, every: int = 1) -> Recording:
     """Snapshots of every so many scans."""
     k = np.arange(0, t.pv.size, every)
     return {"stamp_s": k * t.scan_s, "sp": t.sp[k], "pv": np.round(t.pv[k], 4), "op": np.round(t.op[k], 4)}
+
+
+def by_exception(x: Floats) -> Floats:
+    """A signal of which each new value is kept when it differs from the last one kept, held in between."""
+    out, held = np.empty_like(x), x[0]
+    for k, value in enumerate(x):
+        held = value if abs(value - held) > EXCEPTION else held
+        out[k] = held
+    return out
 
 
 def recorded(t: Trends, way: str, seed: int) -> Recording:
@@ -27,6 +43,12 @@ def recorded(t: Trends, way: str, seed: int) -> Recording:
         return {**r, "pv": np.round(r["pv"], 1), "op": np.round(r["op"], 1)}
     if way == "rows missing":
         keep = rng.random(r["pv"].size) > 0.03
+        return {name: x[keep] for name, x in r.items()}
+    if way == "by exception":
+        return {**r, "pv": by_exception(r["pv"]), "op": by_exception(r["op"])}
+    if way == "gaps":
+        at = np.arange(r["pv"].size) / r["pv"].size
+        keep = ~np.any([(at >= a) & (at < b) for a, b in GAPS], axis=0)
         return {name: x[keep] for name, x in r.items()}
     if way == "late stamps":
         late = rng.random(r["pv"].size) < 0.12

@@ -112,6 +112,13 @@ def straightened(x: Floats, share: float, limits: RecorderLimits) -> bool:
 
 
 def least_jump(pv: Floats, limits: RecorderLimits = LIMITS.recorder) -> float:
+    """The smallest move [% PV] of a trend that is held, if it is large beside the trend's range too; otherwise 0."""
+    jump = held_move(pv, limits)
+    low, high = np.quantile(pv, [0.05, 0.95]) if jump else (0.0, 0.0)
+    return jump if jump > limits.jump_share * float(high - low) else 0.0
+
+
+def held_move(pv: Floats, limits: RecorderLimits = LIMITS.recorder) -> float:
     """The smallest move [% PV] of a trend that stays constant and then jumps, far above its resolution; otherwise 0.
 
     A sticking sensor makes such a trend, or a historian that records only changes of some size.
@@ -121,9 +128,7 @@ def least_jump(pv: Floats, limits: RecorderLimits = LIMITS.recorder) -> float:
     if moves.size < limits.jumps or moves.size > (1.0 - limits.stands) * pv.size:
         return 0.0
     jump = float(np.quantile(moves, 0.02))
-    low, high = np.quantile(pv, [0.05, 0.95])
-    least = max(limits.jump_steps * float(np.quantile(gaps, 0.1)), limits.jump_share * float(high - low))
-    return jump if jump > least else 0.0
+    return jump if jump > limits.jump_steps * float(np.quantile(gaps, 0.1)) else 0.0
 
 
 def unlogged(stamp_s: Floats, n: int, dt_s: float, limits: RecorderLimits = LIMITS.recorder) -> Mask:
