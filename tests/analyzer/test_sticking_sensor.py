@@ -10,6 +10,9 @@ import pytest
 from analyzer.loop.assess import assess
 from analyzer.loop.decisions import MissingData
 from analyzer.loop.fitness import pv_that_jumps
+from benchmarks.world.draw import drawn, run
+from benchmarks.world.recorder import recorded
+from identification.models import Pid
 from proofs.plant import CONFIG, Sketch, Trends, prepared
 
 HEALTHY = Sketch("none", (1.2, 60.0, 10.0), 1.2, 60.0, noise=0.1, load_std=1.0)
@@ -50,6 +53,18 @@ def test_a_sound_sensor_is_not_doubted() -> None:
     assert found.verdict.needs is None or "is constant for" not in str(found.verdict.needs)
 
 
+@pytest.mark.parametrize(("kind", "number"), [("stiction", 0), ("stiction", 3)])
+def test_a_historian_that_leaves_out_small_changes_is_no_sensor_that_sticks(kind: str, number: int) -> None:
+    """PV is constant for nine samples of ten, as behind a sticking sensor, but OP responds to what was left out: the
+    sticking valve is named as in the full record."""
+    d = drawn(621, number + 1, (kind,))[number]
+    kept = recorded(run(d), "by exception", d.seed)
+    assert np.mean(np.diff(kept["pv"]) == 0.0) > 0.9
+    pid = Pid(d.controller.kp, d.controller.ti_s, scan_s=1.0)
+    found = assess(prepared(Trends(kept["sp"], kept["pv"], kept["op"], kept["op"])), pid, CONFIG)
+    assert (str(found.verdict.cause), str(found.verdict.fault)) == ("valve", kind)
+
+
 def test_held_over_values_of_a_gap_do_not_stand_as_a_sensor_does() -> None:
     """What stands and jumps is asked of the samples that were recorded: half a record without any, held over from the
     last, changes neither the share that stands nor the least jump."""
@@ -58,7 +73,9 @@ def test_held_over_values_of_a_gap_do_not_stand_as_a_sensor_does() -> None:
     gap = record.pv.size
     with_gap = replace(
         record,
+        sp=np.append(record.sp, np.full(gap, record.sp[-1])),
         pv=np.append(record.pv, np.full(gap, record.pv[-1])),
+        op=np.append(record.op, np.full(gap, record.op[-1])),
         bad=np.append(record.bad, np.ones(gap, dtype=bool)),
     )
     assert alone is not None
