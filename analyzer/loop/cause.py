@@ -280,7 +280,7 @@ def _quiet(m: Measured, limits: CauseLimits, beside: WornValve | None) -> Verdic
     signs = quiet_signs(m, limits)
     pct = combined(signs)
     is_valve = len(signs) >= limits.signs and pct >= limits.named_pct
-    is_valve = is_valve and (beside is None or beside.is_likelier)
+    is_valve = is_valve and (beside is None or (beside.is_likelier and not beside.is_held))
     if not is_valve:
         pct = min(pct, 0.5 * limits.named_pct)
     confidence = {Cause.VALVE: pct, Cause.TUNING: 0.0, Cause.LOAD: 0.0}

@@ -68,8 +68,7 @@ class WornValve:
         """Whether the whole record is likelier with the fault than with an ideal valve, under a load with real poles:
         a free noise model of one stretch can take over the process at a single move of the set point. True if the
         whole record cannot answer."""
-        silent = self.measured.window.position is not None or self._is_thin or self._is_held
-        return silent or self.found.evidence > 0.0
+        return self.measured.window.position is not None or self._is_thin or self.found.evidence > 0.0
 
     @property
     def shown(self) -> tuple[Fault, Measured]:
@@ -95,7 +94,7 @@ class WornValve:
         m, limits = self.measured, self.limits
         if m.ringing is None or m.window.position is not None or m.window.cycle_range >= WHOLE_PCT:
             return True
-        if self._is_thin or self._is_held:
+        if self._is_thin or self.is_held:
             return True
         return self.period_s < limits.samples_told * self.record.dt_s and m.ringing.rings(limits)
 
@@ -105,7 +104,7 @@ class WornValve:
         return judged_count(self._window) < self.limits.judged
 
     @cached_property
-    def _is_held(self) -> bool:
+    def is_held(self) -> bool:
         """Whether a historian recorded only changes of PV of some size: what it keeps lags behind PV in either
         direction, as a stem does behind OP."""
         return held_move(self.record.pv[~self.record.bad]) > 0.0
