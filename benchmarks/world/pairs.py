@@ -45,7 +45,7 @@ def varied(d: Drawn, way: str) -> Recording:
         at = np.arange(run(d).pv.size) / run(d).pv.size
         return recorded(run(d, auto=(at < MANUAL[0]) | (at >= MANUAL[1])), "plain", d.seed)
     if way == "ten hours of it":
-        return recorded(joined(calm(d), run(d, hours=WITH_FAULT)), "plain", d.seed)
+        return recorded(joined(calm(d), run(d)), "plain", d.seed)
     return recorded(run(d), way, d.seed)
 
 
@@ -57,9 +57,10 @@ def calm(d: Drawn) -> Trends:
     return run(good, day=1, hours=HOURS - WITH_FAULT, alike=True)
 
 
-def joined(first: Trends, second: Trends) -> Trends:
-    """Two stretches of a loop, one after the other."""
-    both = (np.concatenate((getattr(first, x), getattr(second, x))) for x in ("sp", "pv", "op", "stem"))
+def joined(first: Trends, day: Trends) -> Trends:
+    """Hours of a loop, and the last hours of a day of it."""
+    n = first.pv.size
+    both = (np.concatenate((getattr(first, x), getattr(day, x)[n:])) for x in ("sp", "pv", "op", "stem"))
     return Trends(*both, first.scan_s)
 
 

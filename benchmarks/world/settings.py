@@ -1,5 +1,6 @@
-"""Advice taken: new settings typed in on the true plant under the same load, and with --grid the loops that some
-settings would improve: python -m benchmarks.world.settings --seed 1"""
+"""Advice taken: new settings typed in on the true plant under the same load: python -m
+benchmarks.world.settings --seed 1. With --grid also the loops that some settings would improve; with --nights 2 the
+loop is recorded with its new settings on another day, and what is then advised is typed in too."""
 
 from __future__ import annotations
 
@@ -58,14 +59,31 @@ def line(d: Drawn, row: dict[str, Any], found: tuple[float, ...] | None) -> str:
     if found is None:
         return f"{what}: {row['cause']} {row['action']} {row['reason']} | {row['advice']}"
     error, travel, _, ms = found
-    new = f"{row['kp_new']:.3g} {row['ti_new']:.0f}"
+    new = f"new {row['kp_new']:.3g} {row['ti_new']:.0f}"
     return f"{what}: {new} error {error:.2f} travel {travel:.2f} Ms {ms:.2f} {verdict(error, travel, d.kind)}"
+
+
+def advised(
+    loops: list[Drawn], way: str, nights: int, jobs: int
+) -> list[tuple[Drawn, dict[str, Any], Controller]]:
+    """Each loop, its last row with settings or its first one, and its controller after so many nights of advice."""
+    told_of, typed = {}, {d.name: d.controller for d in loops}
+    for night in range(nights):
+        now = [replace(d, controller=typed[d.name]) for d in loops]
+        rows = told(now, {d.name: recorded(run(d, night, alike=True), way, d.seed) for d in now}, jobs)
+        for d in now:
+            row = rows[d.name]
+            if row["kp_new"] is not None:
+                typed[d.name] = replace(d.controller, kp=row["kp_new"], ti_s=row["ti_new"])
+            if night == 0 or row["kp_new"] is not None:
+                told_of[d.name] = row
+    return [(d, told_of[d.name], typed[d.name]) for d in loops]
 
 
 def main() -> None:
     """Draw, record, assess, type in, count."""
     asked = command_line(
-        __doc__, seed=[1], each=8, way="plain", jobs=2, kinds=["tight"], show=False, grid=False
+        __doc__, seed=[1], each=8, way="plain", jobs=2, kinds=["tight"], show=False, grid=False, nights=1
     )
     rows, n = [], asked.each * len(asked.seed)
     for kind in asked.kinds:
@@ -73,13 +91,10 @@ def main() -> None:
         possible = 0
         for seed in asked.seed:
             loops = drawn(seed, asked.each, (kind,))
-            told_of = told(loops, {d.name: recorded(run(d), asked.way, d.seed) for d in loops}, asked.jobs)
             possible += sum(reachable(d) for d in loops) if asked.grid else 0
-            for d in loops:
-                row, came = told_of[d.name], None
-                if row["kp_new"] is not None:
-                    came = outcome(d, replace(d.controller, kp=row["kp_new"], ti_s=row["ti_new"]))
-                    found.append(came)
+            for d, row, new in advised(loops, asked.way, asked.nights, asked.jobs):
+                came = None if new == d.controller else outcome(d, new)
+                found += [] if came is None else [came]
                 if asked.show:
                     print(line(d, row, came), file=sys.stderr)
         said = [verdict(e, t, kind) for e, t, *_ in found]
