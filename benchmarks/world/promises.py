@@ -111,7 +111,7 @@ def main() -> None:
     rows = [line(k, promises(k, asked.seed, asked.each, asked.way, asked.jobs)) for k in asked.kinds]
     heads = (
         "kind|settings|error forecast, median %|came|within 90 %|next day|travel forecast, median %|came|within "
-        "90 %|next day|error said to fall, rose"
+        "90 %|next day|fall forecast, rise came"
     )
     print(table(heads, rows, True))
 
