@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import files
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from tuning.search import (
     Candidate,
     LoadedLoop,
     bench,
-    mean_error,
+    figures,
     rejection,
     robust,
     rounded,
@@ -134,22 +135,26 @@ def _tight(
     limits: TuningLimits,
     halfway: bool,
 ) -> Proposal:
-    """SIMC for a loop that rings because of its tuning: nominal, or under a known load the one of least error.
+    """SIMC for a loop that rings because of its tuning: nominal, or chosen under a known load.
 
-    The aim is robustness. The error may rise up to tight_price, by the models and by the recorded error's spectrum.
-    If robust settings cost more, or the model does not determine them, a first step follows from the ringing alone.
+    The aim is robustness. Of settings that raise the error on no model the ones with the least product of error and
+    travel are chosen. If there are none, the error may rise up to tight_price, by the models and by the recorded
+    error's spectrum. If robust settings cost more, or the model does not determine them, a first step follows from
+    the ringing alone.
     """
     now, old = maximum_sensitivity(loop), loop.controller
     if now <= limits.ms_most:
         return Proposal(Action.UNDECIDED, WHY["robust"].format(ms=robustness(now)), ms_before=now)
     found = _simc_settings(loop, others, 0 if cases is None else -limits.faster_most, limits)
-    found = [pair for pair in found if _is_allowed(old, pair[0], seen, limits)]
+    found = [pair for pair in found if sensitivity_at(old, pair[0], seen.period_s) <= limits.step_ms]
     if not found or halfway:
         return _first_step(old, now, seen, limits)
-    new, ms = found[0] if cases is None else min(found, key=lambda pair: cases.mean(pair[0]))
-    left = max(1.0 if cases is None else cases.worst(new), error_ratio(old, new, seen))
-    if left > limits.tight_price:
+    best = None if cases is None else _without_price(found, cases)
+    if best is None:
+        best = _within_price(found, cases, lambda new: error_ratio(old, new, seen), limits)
+    if best is None:
         return _first_step(old, now, seen, limits)
+    new, ms, left = best
     known = {"old": settings(old), "new": settings(new), "ms": robustness(ms)}
     was = robustness(now) + " on the identified process" * math.isinf(now)
     why = WHY["tight"].format(was=was, **known)
@@ -158,10 +163,35 @@ def _tight(
     return Proposal(Action.RETUNE, why, new, ms_before=now, ms=ms)
 
 
-def _is_allowed(old: Pid, new: Pid, seen: ObservedRinging, limits: TuningLimits) -> bool:
-    """Whether new settings reduce the observed ringing, within the price by the recorded error's spectrum."""
-    calm = sensitivity_at(old, new, seen.period_s) <= limits.step_ms
-    return calm and error_ratio(old, new, seen) <= limits.tight_price
+_Priced = tuple[Pid, float, float]
+"""Settings with their Ms and the largest error over the present one that is expected with them [-]."""
+
+
+def _without_price(found: Sequence[tuple[Pid, float]], cases: _Cases) -> _Priced | None:
+    """Of the settings that raise the error on no model those with the least product of error and travel, if any."""
+    tests = [cases.test(new) for new, _ in found]
+    free = [k for k, x in enumerate(tests) if x.worst <= 1.0]
+    if not free:
+        return None
+    best = min(free, key=lambda k: tests[k].error * tests[k].travel)
+    return *found[best], 1.0
+
+
+def _within_price(
+    found: Sequence[tuple[Pid, float]],
+    cases: _Cases | None,
+    by_spectrum: Callable[[Pid], float],
+    limits: TuningLimits,
+) -> _Priced | None:
+    """Of the settings within the price by the recorded error's spectrum those of least error, or the first without a
+    load; None if they cost more by the models."""
+    allowed = [pair for pair in found if by_spectrum(pair[0]) <= limits.tight_price]
+    if not allowed:
+        return None
+    tests = [] if cases is None else [cases.test(new) for new, _ in allowed]
+    best = min(range(len(tests)), key=lambda k: tests[k].error) if tests else 0
+    left = max(tests[best].worst if tests else 1.0, by_spectrum(allowed[best][0]))
+    return (*allowed[best], left) if left <= limits.tight_price else None
 
 
 def _first_step(old: Pid, now: float, seen: ObservedRinging, limits: TuningLimits) -> Proposal:
@@ -210,6 +240,15 @@ def _alone(loop: Loop) -> ObservedRinging:
     return ObservedRinging(period_s, np.array([2.0 * math.pi / period_s]), np.ones(1))
 
 
+class _Test(NamedTuple):
+    """Result of settings: mean travel [%/h] and error [% PV] of the loops, and the largest error over the present one
+    on any loop [-]."""
+
+    travel: float
+    error: float
+    worst: float
+
+
 @dataclass(frozen=True, slots=True)
 class _Cases:
     """Test cases of settings: loops consistent with the data, including the cautious one, one rounded load [% PV],
@@ -220,17 +259,14 @@ class _Cases:
     load: Floats
     error: float | None
 
-    def mean(self, new: Pid) -> float:
-        """Mean error of the loops with a controller [% PV]."""
-        return mean_error(self.loops, new, self.load)
-
-    def worst(self, new: Pid) -> float:
-        """Largest error with a controller over the present one, on any loop [-]."""
-        return max(
-            mean_error((one,), new, self.load)
-            / max(self.error or mean_error((one,), one.controller, self.load), 1e-9)
-            for one in (*self.loops, self.cautious)
-        )
+    def test(self, new: Pid) -> _Test:
+        """The result of new settings."""
+        cases = (*self.loops, self.cautious)
+        did = [figures(replace(one, controller=new), self.load) for one in cases]
+        now = [self.error or figures(one, self.load)[1] for one in cases]
+        travel, error = np.mean(did[:-1], axis=0)
+        worst = max(e / max(before, 1e-9) for (_, e), before in zip(did, now, strict=True))
+        return _Test(float(travel), float(error), worst)
 
 
 def _cases(loop: Loop, others: Sequence[Loop], load: Floats, error: float | None) -> _Cases:
@@ -259,8 +295,6 @@ def _simc_settings(
             new = replace(loop.controller, kp=rounded(kp), ti_s=rounded(ti))
             ms = robust((loop, *others), new, most)
             found += [] if ms is None else [(new, ms)]
-        if len({new.kp for new, _ in found}) >= limits.enough:
-            break
     return found
 
 

@@ -82,7 +82,7 @@ def _as_simulated(loop: Loop) -> Loop:
     return loop_in_digits(replace(loop, process=mirrored, controller=replace(c, kp=abs(c.kp))))
 
 
-def _figures(loop: Loop, load: Floats) -> tuple[float, float]:
+def figures(loop: Loop, load: Floats) -> tuple[float, float]:
     """Stem travel [%/h] and average absolute error [% PV] under a rounded load, without the warm-up."""
     r = settled(run(_as_simulated(loop), load))
     travel = float(np.abs(np.diff(r.stem)).sum())
@@ -91,7 +91,7 @@ def _figures(loop: Loop, load: Floats) -> tuple[float, float]:
 
 def mean_error(loops: Sequence[Loop], controller: Pid, load: Floats) -> float:
     """Average absolute error [% PV] under a rounded load, shape (n,), mean over the loops with one controller."""
-    return float(np.mean([_figures(replace(one, controller=controller), load)[1] for one in loops]))
+    return float(np.mean([figures(replace(one, controller=controller), load)[1] for one in loops]))
 
 
 LoadedLoop = tuple[Loop, Floats]
@@ -112,8 +112,8 @@ def bench(
     loads = tuple(cut if k % 2 == 0 else np.ascontiguousarray(cut[::-1]) for k in range(len(loops)))
     loops += tuple(one for one, _ in indistinguishable)
     loads += tuple(in_digits(own[-limits.most_steps :]) for _, own in indistinguishable)
-    figures = np.array([_figures(*case) for case in zip(loops, loads, strict=True)])
-    return Bench(loops, loads, figures[:, 0], figures[:, 1], most_ms(loops, limits), limits)
+    results = np.array([figures(*case) for case in zip(loops, loads, strict=True)])
+    return Bench(loops, loads, results[:, 0], results[:, 1], most_ms(loops, limits), limits)
 
 
 def try_out(table: Bench, controller: Pid, ms: float | None = None, loops: int | None = None) -> Candidate:
@@ -122,9 +122,9 @@ def try_out(table: Bench, controller: Pid, ms: float | None = None, loops: int |
         ms = maximum_sensitivity(replace(table.loops[0], controller=controller))
     some = table.loops[:loops]
     cases = zip(some, table.loads, strict=False)
-    figures = np.array([_figures(replace(one, controller=controller), load) for one, load in cases])
-    travel = figures[:, 0] / np.maximum(table.travel[: len(some)], 1e-9)
-    error = figures[:, 1] / np.maximum(table.error[: len(some)], 1e-9)
+    results = np.array([figures(replace(one, controller=controller), load) for one, load in cases])
+    travel = results[:, 0] / np.maximum(table.travel[: len(some)], 1e-9)
+    error = results[:, 1] / np.maximum(table.error[: len(some)], 1e-9)
     limits = table.limits
     aim = limits.error_aim if is_play(table.loops[0].valve) else limits.error_aim_stick
     score = _score(travel, error, aim, limits)

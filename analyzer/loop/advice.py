@@ -12,7 +12,16 @@ from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
 from analyzer.loop.decisions import Action, Cause, Due, Fault, MissingData, Requirement, RequirementKind
 from analyzer.loop.fitness import too_thin
-from analyzer.loop.identified import cautious, indistinguishable, load_of, recorded_error, tuned, uncertain
+from analyzer.loop.identified import (
+    cautious,
+    error_of_night,
+    indistinguishable,
+    load_of,
+    load_of_night,
+    recorded_error,
+    tuned,
+    uncertain,
+)
 from analyzer.loop.oscillation import counting
 from analyzer.loop.quality import Prepared
 from analyzer.loop.ringing import between_samples
@@ -26,7 +35,7 @@ from analyzer.words.units import beside_settings, intervals_of, number, of_contr
 from identification.estimation.window import Fit
 from identification.limits import FIT
 from identification.models import Loop, Pid
-from identification.record import Floats
+from identification.record import Floats, LoopRecord
 from tuning.frequency_response import integral_s, is_stable
 from tuning.limit_cycle import Cycle, confirm
 from tuning.recommend import WITHOUT_SETTINGS, Proposal, recommend
@@ -85,11 +94,14 @@ def advise(
     pv_span: float,
     config: Config,
     held: Pid | None = None,
+    record: LoopRecord | None = None,
 ) -> Advice:
     """The advice on one assessed loop.
 
     controller, its stated settings in percent and seconds; pv_span, span of PV in its own unit, for settings in
-    engineering units; held, settings reported by earlier nights, which are then compared with the present ones.
+    engineering units; held, settings reported by earlier nights, which are then compared with the present ones;
+    record, the whole one, on whose load the settings of a loop that is too tight are tested, None: that of the fitted
+    stretch.
     """
     kept, oscillation = withheld(found, spec, controller, pv_span, config), counting(found.oscillations)
     if not found.op_scaled and found.for_settings is not None:
@@ -98,7 +110,7 @@ def advise(
         return kept
     assert controller is not None  # else `withheld` has given the reason
     assert oscillation is not None
-    proposed = propose(found.verdict, controller, oscillation.period_s, config)
+    proposed = propose(found.verdict, controller, oscillation.period_s, config, record)
     proposal = proposed.proposal
     if proposal.action is Action.UNDECIDED and found.verdict.cause is Cause.VALVE:
         proposal = replace(proposal, action=Action.REPAIR_VALVE)
@@ -258,18 +270,26 @@ def sought_for(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple
     return loop, fit, uncertain(fit, loop)
 
 
-def propose(verdict: Verdict, controller: Pid, period_s: float | None, config: Config) -> Proposed:
-    """The tuning package's proposal on the model of a verdict, on its uncertainty, and on its residual load; if that
-    is not the model which the verdict reports, its reason states this."""
+def propose(
+    verdict: Verdict,
+    controller: Pid,
+    period_s: float | None,
+    config: Config,
+    record: LoopRecord | None = None,
+) -> Proposed:
+    """The tuning package's proposal on the model of a verdict, on its uncertainty, and on its residual load, in a
+    whole record if that is given; if that is not the model which the verdict reports, its reason states this."""
     sought_on = verdict.for_settings
-    found = _proposed(sought_on, controller, period_s, config)
+    found = _proposed(sought_on, controller, period_s, config, record)
     if sought_on is verdict or not found.proposal.reason:
         return found
     reason = f"{SAID['one_friction']} {found.proposal.reason}"
     return replace(found, proposal=replace(found.proposal, reason=reason))
 
 
-def _proposed(verdict: Verdict, controller: Pid, period_s: float | None, config: Config) -> Proposed:
+def _proposed(
+    verdict: Verdict, controller: Pid, period_s: float | None, config: Config, record: LoopRecord | None
+) -> Proposed:
     """The proposal on the model of a verdict used for settings."""
     loop = model_of(verdict, controller)
     right_way = loop.controller.kp * loop.process.slope > 0.0
@@ -280,23 +300,28 @@ def _proposed(verdict: Verdict, controller: Pid, period_s: float | None, config:
         shown = SAID["beyond_record"].format(number(dead_time_s), duration_s / 3600.0)
         return Proposed(Proposal(Action.UNDECIDED, shown))
     if verdict.cause is Cause.TUNING:
-        return _for_tuning(verdict, loop, period_s, config)
+        return _for_tuning(verdict, loop, period_s, config, record)
     if not is_stable(loop):
         return Proposed(Proposal(Action.UNDECIDED, SAID["unstable"]))
     return _for_valve(verdict, loop, period_s, config)
 
 
-def _for_tuning(verdict: Verdict, loop: Loop, period_s: float | None, config: Config) -> Proposed:
+def _for_tuning(
+    verdict: Verdict, loop: Loop, period_s: float | None, config: Config, record: LoopRecord | None
+) -> Proposed:
     fit = verdict.fit
     slow = replace(
         loop, process=replace(cautious(fit.process, period_s), dead_time_s=loop.process.dead_time_s)
     )
     others = (loop, *uncertain(fit, loop)[:2])
-    load = load_of(fit, loop.controller)
+    load = tested = load_of(fit, loop.controller)
     error = recorded_error(fit, loop.controller)
+    if record is not None:
+        tested = load_of_night(fit, loop.controller, record, period_s or 0.0)
+        error = error_of_night(record, loop.controller)
     thin = too_thin(fit.window.row_s, loop.controller, config) is not None
     seen = verdict.require_measured.observed
-    found = recommend(slow, verdict.cause, others, load, config.tuning, error, thin, seen)
+    found = recommend(slow, verdict.cause, others, tested, config.tuning, error, thin, seen)
     return Proposed(found, loop, load, others) if found.ms is not None else Proposed(found)
 
 

@@ -27,6 +27,7 @@ from identification.simulation.pi import kept
 from identification.simulation.valve import StemLaw
 from tuning.describing import describe, scaled_valve
 from tuning.forecast import SEED
+from tuning.frequency_response import integral_s
 from tuning.rules import simc
 from tuning.search import LoadedLoop
 
@@ -160,6 +161,16 @@ def recorded_error(fit: Fit, controller: Pid, last: int = 0) -> float:
     slow = float(np.mean(np.abs(error[usable]))) if usable.any() else math.nan
     fast = scan_noise(window, controller) if window.factor > 1 else 0.0
     return math.hypot(slow, math.sqrt(2.0 / math.pi) * fast)
+
+
+def error_of_night(record: LoopRecord, controller: Pid) -> float:
+    """Average absolute error of a record [% PV]; without integral action about its mean, for OP has a bias."""
+    error = record.error[record.usable]
+    return (
+        float(np.mean(np.abs(error - error.mean() * math.isinf(integral_s(controller)))))
+        if error.size
+        else math.nan
+    )
 
 
 def scan_noise(window: Window, controller: Pid) -> float:

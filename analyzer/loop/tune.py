@@ -17,7 +17,14 @@ from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.decisions import Action, Cause, Requirement, RequirementKind, Status
 from analyzer.loop.experiments import Learned, learned
 from analyzer.loop.fitness import at_limits, unfit_for_cause
-from analyzer.loop.identified import indistinguishable, intervals, load_of, load_of_night, tuned
+from analyzer.loop.identified import (
+    error_of_night,
+    indistinguishable,
+    intervals,
+    load_of,
+    load_of_night,
+    tuned,
+)
 from analyzer.loop.judged_stretch import controller_of
 from analyzer.loop.measure import time_scale
 from analyzer.loop.oscillation import Oscillation
@@ -39,7 +46,7 @@ from identification.record import Floats, LoopRecord
 from reports.pages import Field, Line, Panels, Picture, Place, Plot
 from tuning.describing import describe
 from tuning.forecast import Forecast, in_digits, loop_in_digits, predict, run
-from tuning.frequency_response import integral_s, is_stable, slowest_s
+from tuning.frequency_response import is_stable, slowest_s
 from tuning.harmonic_balance import curves, travel_map
 from tuning.limit_cycle import Confirmed, confirm
 from tuning.limits import METHOD
@@ -109,7 +116,7 @@ def tune(
     if kept is not None and kept.reason and kept.action is not None:
         proposal = Proposal(kept.action, kept.reason)
     else:
-        proposal = propose(verdict, controller, period, config).proposal
+        proposal = propose(verdict, controller, period, config, prepared.record).proposal
     if decided is not None:
         action, typed = decided
         own = typed and replace(controller, kp=typed.kp, ti_s=typed.ti_s, td_s=typed.td_s)
@@ -152,9 +159,8 @@ def _forecast(
     same = indistinguishable(fit, model, period_s, record) if sparse else ()
     unmodelled = METHOD.unmodelled_sparse if sparse else METHOD.unmodelled
     found = predict(model, new, night, others, same, unmodelled)
-    error = record.error[record.usable]
-    recorded = float(np.mean(np.abs(error - error.mean() * math.isinf(integral_s(now)))))
-    apart = abs(math.log(found.before[FORECAST[0]].value / max(recorded, 1e-9)))
+    ratio = found.before[FORECAST[0]].value / max(error_of_night(record, now), 1e-9)
+    apart = abs(math.log(max(ratio, 1e-9)))
     return found if apart <= math.log(config.advice.agree_error) else None
 
 

@@ -109,7 +109,7 @@ def assess_loop(
     if held is not None and held[0] == (spec.kp, spec.ti):
         kp, ti = held[1]
         pair = controller_of(replace(spec, kp=kp, ti=ti), prepared)
-    advice = advise(found, spec, found.shown or stated, prepared.scale.span, config, pair)
+    advice = advise(found, spec, found.shown or stated, prepared.scale.span, config, pair, prepared.record)
     if stated is None:
         advice = on_recorded(advice, found, spec, prepared.scale.span)
     return found, advice if stated is None else advise_if_sluggish(

@@ -31,8 +31,10 @@ def drawn(process: Process, kp: float, valve: Valve) -> Drawn:
 def advised(d: Drawn, hours: float = 8.0) -> tuple[Assessment, Advice, Pid]:
     """Its assessment, its advice and its controller."""
     pid = Pid(d.controller.kp, math.inf, scan_s=1.0)
-    found = assess(prepared(run(d, hours=hours)), pid, Config())
-    return found, advise(found, spec(kp=pid.kp, ti=0.0), pid, 100.0, Config()), pid
+    made = prepared(run(d, hours=hours))
+    found = assess(made, pid, Config())
+    stated = spec(kp=pid.kp, ti=0.0)
+    return found, advise(found, stated, pid, 100.0, Config(), record=made.record), pid
 
 
 @pytest.mark.parametrize(("process", "kp"), [(LAG, 13.5), (LEVEL, 48.0)], ids=["lag", "level"])
