@@ -149,7 +149,7 @@ def _tight(
     found = [pair for pair in found if sensitivity_at(old, pair[0], seen.period_s) <= limits.step_ms]
     if not found or halfway:
         return _first_step(old, now, seen, limits)
-    best = None if cases is None else _without_price(found, cases)
+    best = None if cases is None else _without_price(found, cases, limits)
     if best is None:
         best = _within_price(found, cases, lambda new: error_ratio(old, new, seen), limits)
     if best is None:
@@ -167,8 +167,11 @@ _Priced = tuple[Pid, float, float]
 """Settings with their Ms and the largest error over the present one that is expected with them [-]."""
 
 
-def _without_price(found: Sequence[tuple[Pid, float]], cases: _Cases) -> _Priced | None:
-    """Of the settings that raise the error on no model those with the least product of error and travel, if any."""
+def _without_price(found: Sequence[tuple[Pid, float]], cases: _Cases, limits: TuningLimits) -> _Priced | None:
+    """Of the settings that raise the error on no model those with the least product of error and travel, if any; None
+    if a model does not ring as recorded: what it lacks is in its load, and no settings would calm it."""
+    if cases.least_reproduced < limits.reproduced:
+        return None
     tests = [cases.test(new) for new, _ in found]
     free = [k for k, x in enumerate(tests) if x.worst <= 1.0]
     if not free:
@@ -258,6 +261,12 @@ class _Cases:
     cautious: Loop
     load: Floats
     error: float | None
+
+    @property
+    def least_reproduced(self) -> float:
+        """Least share of the recorded error that a loop has with the present settings [-]."""
+        now = min(figures(one, self.load)[1] for one in self.loops)
+        return now / (self.error or now or 1.0)
 
     def test(self, new: Pid) -> _Test:
         """The result of new settings."""
