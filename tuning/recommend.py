@@ -289,14 +289,19 @@ def _simc_settings(
     """Robust SIMC settings with their Ms, from the `first` closed-loop time constant on, for all samples.
 
     Integral times are between the loop's own time constant and the shortest of its samples'; integral action that is
-    off remains off. The gain of a ringing loop is not raised. The derivative is not changed.
+    off remains off. The gain of a ringing loop is not raised. The derivative is not changed. Another day may have a
+    slower load than the recorded one: if there are any, the closed loop is not made slower than three dead times, the
+    least of lambda tuning.
     """
     h, off = scan_step(loop), math.isinf(integral_s(loop.controller))
-    tau_c = METHOD.tau_c_per_delay * effective_delay(loop.process, h)
+    delay = effective_delay(loop.process, h)
+    tau_c = METHOD.tau_c_per_delay * delay
     most = (limits.ms_most, *(limits.ms_most_sample for _ in others))
     lags = [one.process.time_constant_s for one in others if isinstance(one.process, Fopdt)]
-    found = []
+    found: list[tuple[Pid, float]] = []
     for k in range(first, limits.slower_most):
+        if found and tau_c * limits.slower**k > METHOD.lambda_per_delay * delay:
+            break
         nominal = simc(loop.process, tau_c * limits.slower**k, h)
         times = np.geomspace(nominal.ti_s, min([nominal.ti_s, *lags]), INTEGRAL_TIMES)
         for ti in [math.inf] if off else dict.fromkeys(times):

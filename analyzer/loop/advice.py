@@ -316,9 +316,9 @@ def _for_tuning(
     others = (loop, *uncertain(fit, loop)[:2])
     load = tested = load_of(fit, loop.controller)
     error = recorded_error(fit, loop.controller)
-    if record is not None:
-        tested = load_of_night(fit, loop.controller, record, period_s or 0.0)
-        error = error_of_night(record, loop.controller)
+    night = load if record is None else load_of_night(fit, loop.controller, record, period_s or 0.0)
+    if record is not None and night.size > load.size:
+        tested, error = night, error_of_night(record, loop.controller)
     thin = too_thin(fit.window.row_s, loop.controller, config) is not None
     seen = verdict.require_measured.observed
     found = recommend(slow, verdict.cause, others, tested, config.tuning, error, thin, seen)

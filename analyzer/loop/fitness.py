@@ -59,8 +59,10 @@ def responds_to_more(record: LoopRecord) -> bool:
     """Whether OP responds to a PV that the record does not show, while the recorded one is constant.
 
     A controller behind a sticking sensor has its integral alone then: OP moves by the sign of the error, always. A
-    filter of PV acts in the first half of a constant PV, which does not count.
+    filter of PV acts in the first half of a constant PV, which does not count. Without a set point no error is known.
     """
+    if record.sp_estimated:
+        return False
     k, held = np.arange(len(record)), np.diff(record.pv, prepend=np.nan) == 0.0
     last = np.maximum.accumulate(np.where(held, 0, k))
     after = np.minimum.accumulate(np.where(held, len(record), k)[::-1])[::-1]

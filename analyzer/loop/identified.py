@@ -166,11 +166,10 @@ def recorded_error(fit: Fit, controller: Pid, last: int = 0) -> float:
 def error_of_night(record: LoopRecord, controller: Pid) -> float:
     """Average absolute error of a record [% PV]; without integral action about its mean, for OP has a bias."""
     error = record.error[record.usable]
-    return (
-        float(np.mean(np.abs(error - error.mean() * math.isinf(integral_s(controller)))))
-        if error.size
-        else math.nan
-    )
+    if error.size == 0:
+        return math.nan
+    bias = error.mean() if math.isinf(integral_s(controller)) else 0.0
+    return float(np.mean(np.abs(error - bias)))
 
 
 def scan_noise(window: Window, controller: Pid) -> float:

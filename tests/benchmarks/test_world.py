@@ -9,7 +9,7 @@ import pytest
 
 from analyzer.config import Config
 from analyzer.history.series import Series
-from analyzer.loop.advice import sought_for, withheld
+from analyzer.loop.advice import advise, sought_for, withheld
 from analyzer.loop.agreement import agreement
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.decisions import SignKind
@@ -19,6 +19,7 @@ from analyzer.loop.quality import prepare
 from benchmarks.world.__main__ import spec_of
 from benchmarks.world.draw import HOURS, Drawn, drawn, run
 from benchmarks.world.recorder import recorded
+from benchmarks.world.settings import outcome
 from benchmarks.world.simulate import BACKLASH, Controller, Process, Valve, sensitivity
 from identification.models import Pid
 
@@ -120,3 +121,24 @@ def test_a_worn_valve_is_told_beside_a_load_that_makes_the_cycle() -> None:
     assert (verdict.fault, sound.fault) == ("backlash", "none")
     assert verdict.measured is not None
     assert verdict.measured.play.valve.stickband == pytest.approx(2.0, rel=0.15)
+
+
+def test_models_that_do_not_ring_as_recorded_choose_no_settings() -> None:
+    """A tight loop whose models every 10 s have 84 % of the recorded error gets no settings that raise the error of
+    the true plant: by the models the calmest ones are best, which double it."""
+    d = drawn(613, 7, ("tight",))[6]
+    made = recorded(run(d), "every 10 s", d.seed)
+    spec, good = spec_of(d), np.zeros(made["pv"].size, dtype=bool)
+    stamp = START_S + made["stamp_s"]
+    one = prepare(
+        spec,
+        {f"{d.name}.{r.upper()}": Series(stamp, made[r], good) for r in ("sp", "pv", "op")},
+        Config().quality,
+    )
+    pid = controller_of(spec, one)
+    assert pid is not None
+    found = assess(one, pid, Config())
+    new = advise(found, spec, pid, 100.0, Config(), record=one.record)
+    assert new.kp_new is not None
+    error, *_ = outcome(d, replace(d.controller, kp=new.kp_new, ti_s=new.ti_new))
+    assert error < 1.0

@@ -227,6 +227,23 @@ def test_a_tight_loop_is_made_robust_though_its_error_hardly_falls():
     assert p.ms <= LIMITS.ms_most
 
 
+@pytest.mark.parametrize("corner_s", [10.0, 40.0])
+def test_a_lively_load_does_not_switch_control_off(corner_s):
+    """On a load that the loop only amplifies the gain falls, and travel with it, without more error, but not below
+    lambda tuning with three dead times: another day's load may be slower."""
+    process = Fopdt(1.5, 100, 8)
+    nominal = simc(process, scan_s=1.0)
+    loop = Loop(process, replace(nominal, kp=3 * nominal.kp))
+    lively = load(np.random.default_rng(3), 6000, 1.0, corner_s, 0.02)
+    p = recommend(loop, "tuning", load=lively)
+    (travel, now), (less, error) = (figures(loop, pid, lively) for pid in (loop.controller, p.controller))
+    assert error <= now
+    assert less < 0.7 * travel
+    assert p.controller.kp >= 0.98 * 100 / (
+        1.5 * 4 * 8.5
+    )  # T / (K (lambda + L)), half a scan counts as dead time
+
+
 def test_gain_with_play_stays_near_the_present(proposals):
     """With play the gain is kept within the stated factors, unless it was above the nominal one."""
     for case, p in proposals[:6]:
