@@ -17,6 +17,7 @@ from analyzer.finder.clock import Sampled, sampled
 from analyzer.finder.pair import FoundPair, known_pair
 from analyzer.finder.pairs import found_pairs
 from analyzer.finder.relations import at_rest, equal_at_times, halves, masters_of, ratios_to, scan_of
+from analyzer.finder.terms import terms_of
 from analyzer.history.export import Export
 from analyzer.limits import FINDER, HISTORY
 from analyzer.loops.spec import COLUMNS as STATED_COLUMNS
@@ -35,19 +36,24 @@ COLUMNS = (
         "pv_unit",
         "op_lo",
         "op_hi",
-        "kp",
-        "ti",
+        *("kp", "ti", "td", "td_filter", "pv_filter_s"),
         "gain_unit",
         "ti_unit",
     ),
     *("scan_s", "ranges", "found_by", "sure_pct", "says"),
 )
+SETTINGS = ("kp", "ti", "td", "td_filter", "pv_filter_s", "gain_unit")
+"""Columns of the settings found by data."""
 HEAD = (
     "# A draft. Check first: rows found by data, then ranges that are only recorded (column ranges), then settings.",
     f"# Rows behind # are less sure than {FINDER.sure_pct:g} %: remove the mark where they are right.",
 )
 
 
+TERMS = "its law has a derivative or a filter of PV"
+FAST_S = 30.0
+"""Integral time up to which a loop is as fast as a flow or a pressure [s]; usual flow loops have 3 to 30 s (Corripio,
+Tuning of Industrial Control Systems, 2000)."""
 UNIT = re.compile(r"[(\[]\s*([^()\[\]\d][^()\[\]]{0,14}?)\s*[)\]]\s*$")
 ISA_NAME = re.compile(rf"(?<![A-Za-z])([{''.join(STATED['types'])}])(?:D?[IRT]?C[AV]?|[IT]{{1,2}})[-_ ]?\d")
 WITHIN_PCT = 5.0
@@ -187,7 +193,7 @@ def _named(held: Sampled, spec: LoopSpec) -> Row:
     shown = _shown(own, pair)
     law = f"; {_law(own, pair)}" if pair.told >= FINDER.law_told and pair.kp else ""
     found = replace(spec, type=type_of(spec.loop), pv_unit=unit_of(str(spec.pv)), **shown)
-    return Row(found, "names", FINDER.surest_pct, said + law)
+    return Row(found, "names", FINDER.surest_pct, said + law + _beyond(shown, found.type))
 
 
 def _stated(held: Sampled, spec: LoopSpec, with_tags: LoopSpec | None) -> Row:
@@ -201,7 +207,7 @@ def _stated(held: Sampled, spec: LoopSpec, with_tags: LoopSpec | None) -> Row:
     shown = _shown(own, pair)
     if "kp" not in shown:
         return Row(spec, "stated", 100.0, f"stated; no settings: {_law(own, pair)}")
-    settings = {name: shown[name] for name in ("kp", "ti", "gain_unit")}
+    settings = {name: shown[name] for name in SETTINGS if name in shown}
     found = replace(spec, **settings, ti_unit="s", stated=spec.stated | {*settings, "ti_unit"})
     return Row(found, RECORDED, FINDER.sure_pct, f"stated but for its settings; {_law(own, pair)}")
 
@@ -264,20 +270,42 @@ def _row(held: Sampled, pair: FoundPair, outputs: dict[bytes, str], beside: dict
     says += f"; {spec.op} moves at once when {spec.sp} does" if pair.answers else ""
     says += f"; {spec.position} has the value of {spec.op}" if spec.position else ""
     says += f"; {spec.op} is constant only in one value of {spec.mode}" if spec.mode else ""
-    return Row(replace(spec, **_shown(held, pair)), "data", pair.sure_pct, says)
+    shown = _shown(held, pair, pair.sure_pct >= FINDER.sure_pct)
+    return Row(replace(spec, **shown), "data", pair.sure_pct, says + _beyond(shown, spec.type))
 
 
-def _shown(held: Sampled, pair: FoundPair) -> dict[str, Any]:
-    """Columns of loops.csv from the data of a loop: recorded ranges, and settings if the law is clear."""
+def _shown(held: Sampled, pair: FoundPair, certain: bool = True) -> dict[str, Any]:
+    """Columns of loops.csv from the data of a loop: recorded ranges, and settings if the law is clear; derivative and
+    filter of a pair that is certain."""
     pv, op = (held.values[:, k] for k in (pair.pv, pair.op))
     (pv_lo, pv_hi), (op_lo, op_hi) = _extremes(pv), _extremes(op)
     if op.min() >= -WITHIN_PCT and op.max() <= 100.0 + WITHIN_PCT:
         op_lo, op_hi = 0.0, 100.0
     shown: dict[str, Any] = {"pv_lo": pv_lo, "pv_hi": pv_hi, "op_lo": op_lo, "op_hi": op_hi}
+    terms = _terms(held, pair, (pv_lo, pv_hi), (op_lo, op_hi)) if certain else {}
+    if terms:
+        return {**shown, **terms}
     if pair.told < FINDER.law_told or not pair.kp or pair.ti_samples is None:
         return shown
     ti = 0.0 if math.isinf(pair.ti_samples) else pair.ti_samples * held.dt_s
     return {**shown, "kp": pair.kp, "ti": ti, "gain_unit": "engineering"}
+
+
+def _terms(
+    held: Sampled, pair: FoundPair, pv_range: tuple[float, float], op_range: tuple[float, float]
+) -> dict[str, Any]:
+    """The settings of a controller with a derivative or a filter of PV; nothing for any other."""
+    if pair.sp is None:
+        return {}
+    spans = pv_range[1] - pv_range[0], op_range[1] - op_range[0]
+    sp, pv = (100.0 * (held.values[:, k] - pv_range[0]) / spans[0] for k in (pair.sp, pair.pv))
+    found = terms_of(sp, pv, 100.0 * (held.values[:, pair.op] - op_range[0]) / spans[1], held.dt_s)
+    if found is None:
+        return {}
+    more = {"td": found.td_s, "td_filter": found.td_filter} if found.td_s else {}
+    more |= {"pv_filter_s": found.pv_filter_s} if found.pv_filter_s else {}
+    ti = 0.0 if math.isinf(found.ti_s) else found.ti_s
+    return {"kp": found.kp * spans[1] / spans[0], "ti": ti, "gain_unit": "engineering", **more}
 
 
 def _law(held: Sampled, pair: FoundPair) -> str:
@@ -290,6 +318,14 @@ def _law(held: Sampled, pair: FoundPair) -> str:
     )
     shown = f"explains {100 * pair.law:.0f} % of its moves"
     return f"{held.tags[pair.op]} follows {held.tags[pair.pv]} by a law ({law}) that {shown}"
+
+
+def _beyond(shown: dict[str, Any], kind: str) -> str:
+    """What else the settings show: further terms, and a fast loop whose type no name states."""
+    said = f"; {TERMS}" if "td" in shown or "pv_filter_s" in shown else ""
+    if not kind and 0.0 < shown.get("ti", 0.0) <= FAST_S:
+        said += f"; its integral acts in {shown['ti']:.2g} s, as of a flow or a pressure: type?"
+    return said
 
 
 def _joined(found: Sequence[Row], open_loops: Sequence[LoopSpec]) -> list[Row]:
@@ -362,7 +398,7 @@ def _cell(row: Row, column: str) -> str:
     if column in ("op_lo", "op_hi") and not row.op_ranged:
         return ""
     value = getattr(row.spec, column)
-    settings = column in ("kp", "ti", "gain_unit", "ti_unit")
+    settings = column in (*SETTINGS, "ti_unit")
     seen = (
         row.spec.kp is not None
         if settings
@@ -373,6 +409,6 @@ def _cell(row: Row, column: str) -> str:
         or column in row.spec.stated
         or column in ("loop", *ROLES)
     )
-    if value is None or not spoken:
+    if value is None or not spoken or (column == "pv_filter_s" and not value):
         return ""
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -13,6 +13,7 @@ from click.testing import CliRunner, Result
 from analyzer.cli import main
 from analyzer.finder.draft import Row, as_csv, type_of, unit_of
 from analyzer.loops.spec import LoopSpec, read_loops
+from proofs.controllers_plant import controlled
 from tests.analyzer.finder.test_finder_pairs import pi_loop, strangers
 
 
@@ -129,3 +130,22 @@ def test_a_type_is_told_by_isa_letters(tag: str) -> None:
 def test_the_unit_is_that_in_brackets_of_the_name(tag: str, unit: str) -> None:
     """A unit in brackets at the end of a name is PV's unit; a role or an index there is none."""
     assert unit_of(tag) == unit
+
+
+def test_a_draft_has_the_derivative_and_the_filter_that_the_data_show(tmp_path: Path) -> None:
+    """Of controllers simulated elsewhere a PID is drafted with its derivative time, a PI behind a filter with that
+    filter, and a PI with neither; gains and integral times are right within a tenth."""
+    made = {
+        f"TIC{k}": controlled(form, "set point moves", 61, 0.25)
+        for k, form in enumerate(("PI", "ideal PID", "PV filter"))
+    }
+    table = pd.concat([c.trends(tag, 1).set_index("timestamp") for tag, c in made.items()], axis=1)
+    table.reset_index().to_parquet(tmp_path / "export.parquet")
+    done = triage("loops", tmp_path / "export.parquet", "--out", tmp_path / "loops.csv")
+    assert done.exit_code == 0
+    plain, pid, filtered = read_loops(tmp_path / "loops.csv")
+    assert (plain.td, plain.pv_filter_s, filtered.td) == (None, 0.0, None)
+    assert pid.td == pytest.approx(made["TIC1"].ideal[2], rel=0.25)
+    assert filtered.pv_filter_s == pytest.approx(float(str(made["TIC2"].extras["pv_filter_s"])), rel=0.25)
+    for spec, c in zip((plain, pid, filtered), made.values(), strict=True):
+        assert (spec.kp, spec.ti) == pytest.approx(c.ideal[:2], rel=0.1)
