@@ -36,11 +36,13 @@ BAND = LoopSpec(
 )
 PARALLEL = replace(BAND, loop="FIC2", kp=0.5, ti=40.0, gain_unit="percent", ti_unit="s", form=Form.PARALLEL)
 ENGINEERING = replace(BAND, loop="FIC3", kp=0.3, ti=2.5, gain_unit="engineering", ti_unit="repeats/min")
+ALONE = replace(BAND, loop="FIC4", kp=0.5, ti=0.0, gain_unit="percent", ti_unit="s")
 CASES = {
     "play": (BAND, Backlash(3.0)),
     "stick-slip": (PARALLEL, Stiction(4.0, 2.0, Motion.RESTS)),
     "dry friction": (ENGINEERING, Stiction(3.0, 1.0, Motion.HALTS)),
     "free": (BAND, None),
+    "gain alone": (ALONE, Backlash(3.0)),
 }
 
 

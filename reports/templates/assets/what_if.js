@@ -42,7 +42,7 @@
   }
 
   /* The load, after a kick that sets a loop with play going. */
-  function driven(model, load, kp, tiS) {
+  function kicked(model, load, kp, tiS) {
     const p = model.prelude, slowest = Math.max(p.slowest_s, isFinite(tiS) ? tiS : 0);
     if (!(p.kick > 0)) return { load, skipped: 0 };
     const hold = Math.floor(Math.min(Math.max(p.times * slowest / model.scan_s, p.least), load.length));
@@ -51,6 +51,16 @@
     for (let k = 1; k <= half; k += 1) out[k] += kick;
     out.set(load, 1 + half + hold);
     return { load: out, skipped: 1 + half + hold };
+  }
+
+  /* Without integral action the bias of OP compensates the load's mean, and the simulation begins with it. */
+  function driven(model, load, kp, tiS) {
+    if (isFinite(tiS) && tiS > 0) return kicked(model, load, kp, tiS);
+    const mean = load.reduce((sum, x) => sum + x, 0) / Math.max(load.length, 1);
+    const all = kicked(model, Float64Array.from(load, (x) => x - mean), kp, Infinity);
+    const out = new Float64Array(1 + all.load.length);
+    out.set(all.load, 1);
+    return { load: out, skipped: 1 + all.skipped };
   }
 
   function simulate(model, load, kp, tiS) {
