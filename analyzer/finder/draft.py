@@ -50,7 +50,6 @@ HEAD = (
 )
 
 
-TERMS = "its law has a derivative or a filter of PV"
 FAST_S = 30.0
 """Integral time up to which a loop is as fast as a flow or a pressure [s]; usual flow loops have 3 to 30 s (Corripio,
 Tuning of Industrial Control Systems, 2000)."""
@@ -322,7 +321,8 @@ def _law(held: Sampled, pair: FoundPair) -> str:
 
 def _beyond(shown: dict[str, Any], kind: str) -> str:
     """What else the settings show: further terms, and a fast loop whose type no name states."""
-    said = f"; {TERMS}" if "td" in shown or "pv_filter_s" in shown else ""
+    said = f"; a derivative of {shown['td']:.3g} s" if "td" in shown else ""
+    said += f"; a filter of PV of {shown['pv_filter_s']:.3g} s" if "pv_filter_s" in shown else ""
     if not kind and 0.0 < shown.get("ti", 0.0) <= FAST_S:
         said += f"; its integral acts in {shown['ti']:.2g} s, as of a flow or a pressure: type?"
     return said

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from analyzer.config import SettingsLimits
 from analyzer.finder.law import TINY
 from identification.controller.free_law import free_law
 from identification.models import Pid
@@ -17,8 +18,6 @@ MORE = 0.25
 (proofs/controllers_plant.py, seed 51)."""
 LEAST = 200
 """Samples from which the law is fitted; ours."""
-EXPLAINED = 0.95
-"""Share of OP's moves that the law has to explain; ours, as settings.explained_alone."""
 LATEST = 8640
 """Samples of the whole law: ours, a third of a second for each such loop."""
 SCALE = 60.0
@@ -28,24 +27,25 @@ SCALE = 60.0
 def terms_of(sp: Floats, pv: Floats, op: Floats, dt_s: float) -> Pid | None:
     """The controller of SP, PV and OP [%], shape (n,) each, if it has a derivative or a filter of PV; else None."""
     sp, pv, op = sp[-LATEST:], pv[-LATEST:], op[-LATEST:]
-    if pv.size < LEAST or _left_by_slopes(sp, pv, op) < MORE:
+    if pv.size < LEAST or _explained_by_slopes(sp, pv, op) < MORE:
         return None
     record = LoopRecord("", 0.0, dt_s, sp, pv, op, np.zeros(pv.size, dtype=bool))
-    law = free_law(record, SCALE * dt_s)
-    if law is None or law.several or law.explained < EXPLAINED:
+    law, limits = free_law(record, SCALE * dt_s), SettingsLimits()
+    known = limits.explained_alone, limits.ti_samples, limits.filter_of_ti
+    if law is None or not law.is_clear(dt_s, *known):
         return None
     return law.found if law.found.td_s > 0.0 or law.found.pv_filter_s > 0.0 else None
 
 
-def _left_by_slopes(sp: Floats, pv: Floats, op: Floats) -> float:
-    """Share of the moves of OP left by gain and integral that the latest slopes of PV explain [-]."""
+def _explained_by_slopes(sp: Floats, pv: Floats, op: Floats) -> float:
+    """Share that the latest slopes of PV explain of what gain and integral leave of OP's moves [-]; 0 of nothing."""
     error, slopes, moves = sp - pv, np.diff(pv, 2), np.diff(op)[SLOPES:]
     plain = np.column_stack([np.diff(error)[SLOPES:], error[SLOPES + 1 :]])
     more = [slopes[SLOPES - 1 - k : slopes.size - k] for k in range(SLOPES)]
     left = _misfit(plain, moves)
-    return 1.0 - _misfit(np.column_stack([plain, *more]), moves) / max(
-        left, TINY * float(moves @ moves), TINY
-    )
+    if left <= TINY * float(moves @ moves):
+        return 0.0
+    return 1.0 - _misfit(np.column_stack([plain, *more]), moves) / left
 
 
 def _misfit(x: Floats, y: Floats) -> float:

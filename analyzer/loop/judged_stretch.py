@@ -177,11 +177,8 @@ def recorded(record: LoopRecord, scale_s: float, limits: SettingsLimits) -> Free
     """The law identified in a record whatever is stated; None if none explains nearly all of OP, if its gain differs
     between parts of a range, or if its integral acts, or its filter of PV is longer, than the samples show."""
     law = free_law(record, scale_s)
-    if law is None or law.several or law.explained < limits.explained_alone:
-        return None
-    ti_s = abs(law.found.ti_s)
-    unseen = law.found.kp != 0.0 and ti_s < limits.ti_samples * record.dt_s
-    return None if unseen or law.found.pv_filter_s > limits.filter_of_ti * ti_s else law
+    known = limits.explained_alone, limits.ti_samples, limits.filter_of_ti
+    return law if law is not None and law.is_clear(record.dt_s, *known) else None
 
 
 def as_recorded(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits) -> Pid:

@@ -58,6 +58,14 @@ class FreeLaw:
     ti_s: Estimate
     several: bool = False
 
+    def is_clear(self, dt_s: float, explained: float, ti_samples: float, filter_of_ti: float) -> bool:
+        """Whether the law has one gain and explains at least a share of OP [-], its integral time is at least so many
+        samples of an interval [s], and its filter of PV at most a share of that time [-]."""
+        ti_s = abs(self.found.ti_s)
+        seen = self.found.kp == 0.0 or ti_s >= ti_samples * dt_s
+        clear = not self.several and self.explained >= explained
+        return clear and seen and self.found.pv_filter_s <= filter_of_ti * ti_s
+
 
 def free_law(record: LoopRecord, scale_s: float) -> FreeLaw | None:
     """The law that OP follows; None where OP follows none.
