@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from typing import NamedTuple
@@ -138,63 +138,35 @@ def _tight(
     """SIMC for a loop that rings because of its tuning: nominal, or chosen under a known load.
 
     The aim is robustness. Of settings that raise the error on no model the ones with the least product of error and
-    travel are chosen. If there are none, the error may rise up to tight_price, by the models and by the recorded
-    error's spectrum. If robust settings cost more, or the model does not determine them, a first step follows from
-    the ringing alone.
+    travel are chosen. If there are none, or the model does not determine them, a first step follows from the ringing
+    alone.
     """
     now, old = maximum_sensitivity(loop), loop.controller
     if now <= limits.ms_most:
         return Proposal(Action.UNDECIDED, WHY["robust"].format(ms=robustness(now)), ms_before=now)
     found = _simc_settings(loop, others, 0 if cases is None else -limits.faster_most, limits)
     found = [pair for pair in found if sensitivity_at(old, pair[0], seen.period_s) <= limits.step_ms]
-    if not found or halfway:
-        return _first_step(old, now, seen, limits)
-    best = None if cases is None else _without_price(found, cases, limits)
-    if best is None:
-        best = _within_price(found, cases, lambda new: error_ratio(old, new, seen), limits)
+    best = None
+    if found and not halfway:
+        best = found[0] if cases is None else _least_of_both(found, cases, limits)
     if best is None:
         return _first_step(old, now, seen, limits)
-    new, ms, left = best
+    new, ms = best
     known = {"old": settings(old), "new": settings(new), "ms": robustness(ms)}
     was = robustness(now) + " on the identified process" * math.isinf(now)
-    why = WHY["tight"].format(was=was, **known)
-    if left > 1.0:
-        why = f"{why} {WHY['tight_price'].format(size=100.0 * (left - 1.0))}"
-    return Proposal(Action.RETUNE, why, new, ms_before=now, ms=ms)
+    return Proposal(Action.RETUNE, WHY["tight"].format(was=was, **known), new, ms_before=now, ms=ms)
 
 
-_Priced = tuple[Pid, float, float]
-"""Settings with their Ms and the largest error over the present one that is expected with them [-]."""
-
-
-def _without_price(found: Sequence[tuple[Pid, float]], cases: _Cases, limits: TuningLimits) -> _Priced | None:
+def _least_of_both(
+    found: Sequence[tuple[Pid, float]], cases: _Cases, limits: TuningLimits
+) -> tuple[Pid, float] | None:
     """Of the settings that raise the error on no model those with the least product of error and travel, if any; None
     if a model does not ring as recorded: what it lacks is in its load, and no settings would calm it."""
     if cases.least_reproduced < limits.reproduced:
         return None
     tests = [cases.test(new) for new, _ in found]
     free = [k for k, x in enumerate(tests) if x.worst <= 1.0]
-    if not free:
-        return None
-    best = min(free, key=lambda k: tests[k].error * tests[k].travel)
-    return *found[best], 1.0
-
-
-def _within_price(
-    found: Sequence[tuple[Pid, float]],
-    cases: _Cases | None,
-    by_spectrum: Callable[[Pid], float],
-    limits: TuningLimits,
-) -> _Priced | None:
-    """Of the settings within the price by the recorded error's spectrum those of least error, or the first without a
-    load; None if they cost more by the models."""
-    allowed = [pair for pair in found if by_spectrum(pair[0]) <= limits.tight_price]
-    if not allowed:
-        return None
-    tests = [] if cases is None else [cases.test(new) for new, _ in allowed]
-    best = min(range(len(tests)), key=lambda k: tests[k].error) if tests else 0
-    left = max(tests[best].worst if tests else 1.0, by_spectrum(allowed[best][0]))
-    return (*allowed[best], left) if left <= limits.tight_price else None
+    return found[min(free, key=lambda k: tests[k].error * tests[k].travel)] if free else None
 
 
 def _first_step(old: Pid, now: float, seen: ObservedRinging, limits: TuningLimits) -> Proposal:

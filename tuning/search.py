@@ -89,11 +89,6 @@ def figures(loop: Loop, load: Floats) -> tuple[float, float]:
     return travel / r.duration_s * 3600.0, float(np.mean(np.abs(r.pv)))
 
 
-def mean_error(loops: Sequence[Loop], controller: Pid, load: Floats) -> float:
-    """Average absolute error [% PV] under a rounded load, shape (n,), mean over the loops with one controller."""
-    return float(np.mean([figures(replace(one, controller=controller), load)[1] for one in loops]))
-
-
 LoadedLoop = tuple[Loop, Floats]
 """A loop with the load [% PV] that the record leaves to it."""
 

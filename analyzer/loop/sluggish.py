@@ -29,7 +29,7 @@ from identification.record import LoopRecord
 from tuning.forecast import in_digits
 from tuning.from_test import settings_from
 from tuning.rules import simc
-from tuning.search import mean_error, rounded
+from tuning.search import figures, rounded
 
 FIRST_STEP = 2.0
 """Factor of a first step of the gain: that of a careful engineer; SIMC's own gain margin is 3 (Skogestad 2003)."""
@@ -143,7 +143,8 @@ def _proposed(
     times = new.kp / new.ti_s / present.ki
     load = in_digits(detrend(load_of(fit, present)))  # a working loop has compensated offset and drift
     loop = Loop(between_samples(fit.process, fit.window, present), present)  # the loop with this load
-    change = mean_error((loop,), new, load) / max(mean_error((loop,), present, load), 1e-9) - 1.0
+    after, before = (figures(replace(loop, controller=c), load)[1] for c in (new, present))
+    change = after / max(before, 1e-9) - 1.0
     if change > -limits.sluggish_gain:
         return None
     return FasterSettings(new, times, change, loop, fit, tuple(Loop(p, present) for p in allowed))
