@@ -137,6 +137,11 @@ class Pid:
         return (self.kp or 1.0) / self.ti_s if self.ti_s and math.isfinite(self.ti_s) else 0.0
 
     @property
+    def sign(self) -> float:
+        """1 where OP falls when PV rises, else -1: the sign of the gain, or of the integral where that is alone."""
+        return math.copysign(1.0, self.kp or self.ti_s)
+
+    @property
     def slope_filter_s(self) -> float:
         """Time constant of the derivative's filter [s], 0 for none."""
         return self.td_s / self.td_filter if self.td_filter else 0.0

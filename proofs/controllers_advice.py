@@ -22,9 +22,9 @@ from analyzer.night.chunk import assess_loop
 from proofs.common import command, command_line, publish, table
 from proofs.controllers_plant import Controlled, controlled
 
-ASKED = ("gap", "limit of OP", "limit of OP's rate", "PV filter", "slow scan", "gain schedule")
-STATED = ("gain schedule",)
+STATED = ("gain schedule", "P only", "integral only")
 """Controllers of which all is stated."""
+ASKED = ("gap", "limit of OP", "limit of OP's rate", "PV filter", "slow scan", *STATED)
 CASES = {"worn": ("worn", 1.5), "too tight": ("healthy", 3.0), "unstable": ("healthy", 5.0)}
 """Scene, and times the usual gain."""
 

@@ -155,7 +155,9 @@ def _with_derivative(law: _Law, form: str, settings: tuple[float, float, float],
         law.row |= {"form": "parallel", "ti": ti / kp, "td": kp * td}
 
 
-def _with_form(law: _Law, form: str, plant: Plant, load: np.ndarray, rng: np.random.Generator) -> None:
+def _with_form(
+    law: _Law, form: str, plant: Plant, load: np.ndarray, rng: np.random.Generator, tight: float
+) -> None:
     """What a form has beside gain and integral time."""
     gain, lag, dead = plant
     kp, ti, _ = law.ideal
@@ -163,7 +165,9 @@ def _with_form(law: _Law, form: str, plant: Plant, load: np.ndarray, rng: np.ran
         case "P only":
             law.ki, law.row["ti"], law.ideal = 0.0, 0.0, (kp, math.inf, 0.0)
         case "integral only":
-            law.ki = 0.5 / (gain * (lag + dead) * rng.uniform(1.0, 2.0))
+            law.ki = (
+                0.5 / (gain * (lag + dead) * rng.uniform(1.0, 2.0)) * tight**2
+            )  # of a lag: damping by its root
             law.row |= {"kp": 0.0, "ti": 1.0 / law.ki}
             law.kp, law.ideal = 0.0, (0.0, 1.0 / law.ki, 0.0)
         case "gap":
@@ -239,11 +243,11 @@ def controlled(
     law = _Law(kp, kp / ti, kp * td, settings, {"kp": kp, "ti": ti, "td": td, "form": "ideal"})
     if "PID" in form:
         _with_derivative(law, form, settings, narrow)
-    _with_form(law, form, plant, load, rng)
+    _with_form(law, form, plant, load, rng, tight)
     law.row["scan_s"] = SCAN_S * law.hold
     if typed is not None:
         law.row["kp"], law.row["ti"] = typed
-        law.kp, law.ki = typed[0], typed[0] / typed[1]
+        law.kp, law.ki = typed[0], (typed[0] or 1.0) / typed[1] if typed[1] else 0.0
     play = rng.uniform(0.5, 2.5) if scene == "worn" else 0.0
     out, tracks = np.empty((3, n)), float(rng.random() < 0.5)
     gains = law.kp, law.ki, law.kd, float(td / narrow)

@@ -15,8 +15,8 @@ from identification.record import Floats, LoopRecord
 from identification.signals.correlation import lag_sums
 from identification.simulation.closed_loop import closed_loop, scan_step
 from tuning.describing import band, is_play
-from tuning.frequency_response import integral_s, maximum_sensitivity, slowest_s
-from tuning.limit_cycle import KICK
+from tuning.frequency_response import integral_s, maximum_sensitivity, rejects_s, slowest_s
+from tuning.limit_cycle import kick_of
 from tuning.limits import METHOD
 from tuning.rules import backlash_rule, lambda_settings, simc
 
@@ -109,8 +109,7 @@ def _prelude(loop: Loop, load: Floats) -> Floats:
     if not is_play(loop.valve) or width <= 0.0 or load.size == 0:
         return np.empty(0)
     hold = int(min(max(METHOD.prelude * slowest_s(loop) / scan_step(loop), METHOD.least_prelude), load.size))
-    kick = KICK * width / abs(loop.controller.kp)
-    return load[0] + kick * np.repeat([0.0, 1.0, 0.0], [1, hold // 2, hold])
+    return load[0] + kick_of(loop, width) * np.repeat([0.0, 1.0, 0.0], [1, hold // 2, hold])
 
 
 def autocorrelation_peak(error: Floats) -> float:
@@ -241,6 +240,8 @@ def alternatives(loop: Loop, new: Pid | None, chosen: Mapping[str, Pid] | None =
     without duplicates. All have the present derivative, except chosen settings with their own."""
     now, h = loop.controller, scan_step(loop)
     found = {NOW: now} | ({} if new is None else {RECOMMENDED: new}) | dict(chosen or {})
+    if now.kp == 0.0:  # no rule is for an integral alone
+        return found
     rules = {SIMC: simc(loop.process, scan_s=h), LAMBDA: lambda_settings(loop.process, h)}
     found |= {name: replace(now, kp=pid.kp, ti_s=pid.ti_s) for name, pid in rules.items()}
     if not isinstance(loop.process, Integrator):
@@ -259,5 +260,5 @@ def tried(loop: Loop, load: Floats, settings: Mapping[str, Pid]) -> tuple[Tried,
         record = settled(run(one, load))
         did, peak = assess(record), float(np.max(np.abs(record.error), initial=0.0))
         known = maximum_sensitivity(one), did.stem_travel, did.average_absolute_error, peak
-        found.append(Tried(name, pid, *known, integral_s(pid) / abs(pid.kp), record))
+        found.append(Tried(name, pid, *known, rejects_s(pid), record))
     return tuple(found)

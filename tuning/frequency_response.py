@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numba import njit
@@ -26,9 +27,26 @@ time is used, which shifts the phase by 1/8000 of the dead time's own, so that n
 """
 
 
+NO_GAIN = 1e-9
+"""Gain as which an integral alone is calculated [% OP / % PV]: its response is then exact to the ninth digit."""
+
+
 def integral_s(controller: Pid) -> float:
     """Integral time [s], inf where the integral is off (given as 0 or inf)."""
     return controller.ti_s if controller.ti_s > 0 else math.inf
+
+
+def rejects_s(controller: Pid) -> float:
+    """Integral of the error after a step of the load at OP, over the step [s % PV / % OP]: Ti/abs(Kp), inf without
+    integral action."""
+    return 1.0 / abs(controller.ki) if controller.ki else math.inf
+
+
+def with_gain(controller: Pid) -> Pid:
+    """A controller with integral action alone as one with negligible gain; any other unchanged."""
+    if controller.kp != 0.0:
+        return controller
+    return replace(controller, kp=controller.sign * NO_GAIN, ti_s=NO_GAIN * abs(controller.ti_s))
 
 
 def _rate(controller: Pid) -> float:
@@ -53,7 +71,7 @@ def process_response(process: Process, scan_s: float, omega: Floats) -> Complexe
 def controller_response(controller: Pid, omega: Floats) -> Complexes:
     """C [% OP / % PV] at omega [rad/s], shape (m,), with its filters and without a gap: the velocity form with
     backward Euler at its scan, or the PID with a filtered derivative, continuous, where scan_s is 0."""
-    c, h = controller, controller.scan_s
+    c, h = with_gain(controller), controller.scan_s
     s = (1.0 - np.exp(-1j * omega * h)) / h if h > 0 else 1j * omega
     slope = c.td_s * s / (1.0 + c.slope_filter_s * s)
     return np.asarray(c.kp * (1.0 + _rate(c) / s + slope) / (1.0 + c.pv_filter_s * s), np.complex128)
@@ -66,11 +84,13 @@ def loop_response(loop: Loop, omega: Floats) -> Complexes:
 
 
 def slowest_s(loop: Loop) -> float:
-    """The slowest time of the loop [s]: time constant, finite integral time, filter of PV, dead time and scan."""
-    c, ti = loop.controller, integral_s(loop.controller)
+    """The slowest time of the loop [s]: time constant, finite integral time, filter of PV, dead time and scan; with
+    integral action alone also the time in which it corrects an error before a process without lag."""
+    c, ti = loop.controller, integral_s(with_gain(loop.controller))
     times = [loop.process.dead_time_s, c.scan_s, c.pv_filter_s, ti if math.isfinite(ti) else 0.0]
     if isinstance(loop.process, Fopdt):
-        times.append(loop.process.time_constant_s)
+        alone_s = rejects_s(c) / max(abs(loop.process.gain), 1e-12) if c.kp == 0.0 else 0.0
+        times += [loop.process.time_constant_s, alone_s]
     return max(times)
 
 
@@ -153,7 +173,7 @@ def stable_gains(loop: Loop, kp: Floats) -> Mask:
     unit circle; their number is the winding number along the circle.
     """
     h = max(scan_step(loop), loop.process.dead_time_s / MOST_DELAY)
-    d, c = discretize(loop.process, h), loop.controller
+    d, c = discretize(loop.process, h), with_gain(loop.controller)
     process, law = (d.pole, d.now, d.before, d.delay), _acting(c, h)
     low, points = 1e-3 * h / max(slowest_s(loop), h), CIRCLE + 8 * d.delay
     return np.array([_half_turns(process, float(k), law, low, points) == 0 for k in np.asarray(kp)])
@@ -161,7 +181,7 @@ def stable_gains(loop: Loop, kp: Floats) -> Mask:
 
 def is_stable(loop: Loop) -> bool:
     """Whether the sampled linear loop, without its valve, is stable."""
-    return bool(stable_gains(loop, np.array([loop.controller.kp]))[0])
+    return bool(stable_gains(loop, np.array([with_gain(loop.controller).kp]))[0])
 
 
 def maximum_sensitivity(loop: Loop) -> float:
@@ -169,7 +189,7 @@ def maximum_sensitivity(loop: Loop) -> float:
     stable."""
     if not is_stable(loop):
         return math.inf
-    omega, c = frequencies(loop, LOOKED_AT, lowest=1e-2), loop.controller
+    omega, c = frequencies(loop, LOOKED_AT, lowest=1e-2), with_gain(loop.controller)
     if c.scan_s <= 0:
         return float(np.max(1.0 / np.abs(1.0 + loop_response(loop, omega))))
     d = discretize(loop.process, c.scan_s)

@@ -14,7 +14,7 @@ from identification.models import Fopdt, Integrator, Loop, Motion, Stiction
 from identification.record import Floats, LoopRecord
 from identification.simulation.closed_loop import closed_loop, scan_step
 from tuning.describing import band
-from tuning.frequency_response import integral_s, slowest_s
+from tuning.frequency_response import rejects_s, slowest_s
 from tuning.harmonic_balance import Balance, predicted_cycle
 from tuning.limits import METHOD
 
@@ -105,7 +105,7 @@ def confirm(loop: Loop) -> Confirmed:
     if width <= 0.0:
         return Confirmed(None, True, None)
     h = scan_step(loop)
-    kick = KICK * width / abs(loop.controller.kp)
+    kick = kick_of(loop, width)
     scale = max(4.0 * slowest_s(loop), _ramp_s(loop))
     if predicted is not None:
         kick, scale = max(kick, 3.0 * predicted.pv_amplitude), predicted.period_s
@@ -119,12 +119,18 @@ def confirm(loop: Loop) -> Confirmed:
     return found
 
 
+def kick_of(loop: Loop, width: float) -> float:
+    """An error that moves OP by several widths [% PV], by an integral alone within the loop's slowest time."""
+    c = loop.controller
+    return KICK * width / (abs(c.kp) or abs(c.ki) * slowest_s(loop))
+
+
 def _ramp_s(loop: Loop) -> float:
     """Time [s] in which integral action moves OP by four stickbands at an error of half a band."""
     c = loop.controller
-    if isinstance(loop.process, Integrator) or math.isinf(integral_s(c)):
+    if isinstance(loop.process, Integrator) or not c.ki:
         return 0.0
-    return 8.0 * c.ti_s / abs(c.kp * loop.process.gain)
+    return 8.0 * rejects_s(c) / abs(loop.process.gain)
 
 
 def _settle(loop: Loop, steps: int, kick: float, width: float, predicted: Balance | None) -> Confirmed:

@@ -14,13 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.models import Backlash, Fopdt, Integrator, Loop, Pid
+from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Process
 from identification.record import Floats
 from identification.simulation.closed_loop import scan_step
 from tuning import Action, Cause
 from tuning.describing import band, is_play
 from tuning.forecast import in_digits
-from tuning.frequency_response import integral_s, maximum_sensitivity, resonance_s
+from tuning.frequency_response import integral_s, maximum_sensitivity, rejects_s, resonance_s
 from tuning.limit_cycle import Confirmed, Cycle, confirm
 from tuning.limits import LIMITS, METHOD, TuningLimits
 from tuning.ringing import ObservedRinging, error_ratio, from_ringing, process_of, sensitivity_at
@@ -45,6 +45,8 @@ WHY: Mapping[str, str] = tomllib.loads((files("tuning") / "reasons.toml").read_t
 INTEGRAL_TIMES = 5
 """Number of integral times tried, from the longest to the shortest lag consistent with the record: neighbours differ
 by less than two if the ends differ by ten."""
+STEPS_ALONE = 25
+"""Steps of an integral time that is alone, at most: ours, a factor of 200."""
 SHARES_KEPT, CALM_MS = (0.5, 0.6, 0.67, 0.75, 0.8), 7.0
 """Shares of the response at the ringing period that a first step keeps; the most robust with an error within the
 price is chosen. Maximum sensitivity of the fitted process up to which it is robust: with four fifths of the response
@@ -118,7 +120,7 @@ def recommend(
     if cause not in (Cause.VALVE, Cause.TUNING):
         return Proposal(WITHOUT_SETTINGS[Cause(cause)], WHY[cause])
     kp, slope = loop.controller.kp, loop.process.slope
-    if kp * slope <= 0.0:
+    if loop.controller.sign * slope <= 0.0:
         return Proposal(Action.CHECK_SETTINGS, WHY["wrong_sign"].format(kp=kp, slope=slope))
     if cause == Cause.TUNING:
         cases = None if load is None else _cases(loop, uncertainty, load, error)
@@ -144,13 +146,17 @@ def _tight(
     now, old = maximum_sensitivity(loop), loop.controller
     if now <= limits.ms_most:
         return Proposal(Action.UNDECIDED, WHY["robust"].format(ms=robustness(now)), ms_before=now)
-    found = _simc_settings(loop, others, 0 if cases is None else -limits.faster_most, limits)
+    if old.kp:
+        found = _simc_settings(loop, others, 0 if cases is None else -limits.faster_most, limits)
+    else:
+        found = _integral_times(loop, others, limits)
     found = [pair for pair in found if sensitivity_at(old, pair[0], seen.period_s) <= limits.step_ms]
     best = None
     if found and not halfway:
         best = found[0] if cases is None else _least_of_both(found, cases, limits)
     if best is None:
-        return _first_step(old, now, seen, limits)
+        alone = None if old.kp else (*others, loop)[0].process
+        return _first_step(old, now, seen, limits, alone)
     new, ms = best
     known = {"old": settings(old), "new": settings(new), "ms": robustness(ms)}
     was = robustness(now) + " on the identified process" * math.isinf(now)
@@ -169,26 +175,50 @@ def _least_of_both(
     return found[min(free, key=lambda k: tests[k].error * tests[k].travel)] if free else None
 
 
-def _first_step(old: Pid, now: float, seen: ObservedRinging, limits: TuningLimits) -> Proposal:
+def _first_step(
+    old: Pid, now: float, seen: ObservedRinging, limits: TuningLimits, process: Process | None = None
+) -> Proposal:
     """The most robust step from the observed ringing alone with an error within the price; among equals the one of
-    least error; with a higher gain only if there is no other; none if there is none."""
-    tried = _steps(old, seen)
-    within = [x for x in tried if x.error <= limits.tight_price]
+    least error; with a higher gain only if there is no other; none if there is none. An integral alone rings before
+    any long lag, so its steps are tested on the identified process."""
+    tried = _steps(old, seen, process)
+    best = _calmest(old, tried, limits)
     known: dict[str, object] = {"period": _seconds(seen.period_s)}
-    if not within:
+    if best is None:
         least = min(tried, key=lambda x: x.error, default=None)
         if least is None:
             return Proposal(Action.UNDECIDED, WHY["no_step"].format(**known), ms_before=now)
         known |= {"new": settings(least.new), "size": 100.0 * (least.error - 1.0)}
         return Proposal(Action.UNDECIDED, WHY["costly_step"].format(**known), ms_before=now)
-    best = min(within, key=lambda x: (abs(x.new.kp) > abs(old.kp), max(x.ms, limits.ms_most_sample), x.error))
     known |= {"new": settings(best.new), "size": 100.0 * (best.error - 1.0)}
+    if process is not None:
+        why = WHY["first_step_alone"].format(
+            **known, most=100.0 * (limits.tight_price - 1.0), pi=settings(simc(process, scan_s=old.scan_s))
+        )
+        return Proposal(Action.RETUNE, why, best.new, ms_before=now)
     known["left"] = sensitivity_at(old, best.new, seen.period_s)
     return Proposal(Action.RETUNE, WHY["first_step"].format(**known), best.new, ms_before=now)
 
 
+def calmer_step(old: Pid, seen: ObservedRinging, limits: TuningLimits = LIMITS) -> Step | None:
+    """The step that `recommend` takes from the ringing alone, without a model; None if there is none within the
+    price in error, or the controller has integral action alone."""
+    return _calmest(old, _steps(old, seen, None), limits) if old.kp else None
+
+
+def _calmest(old: Pid, steps: Sequence[Step], limits: TuningLimits) -> Step | None:
+    """The most robust step within the price in error; among equals that of least error, with a higher gain only if
+    there is no other."""
+    within = [x for x in steps if x.error <= limits.tight_price]
+
+    def rank(x: Step) -> tuple[bool, float, float]:
+        return abs(x.new.kp) > abs(old.kp), max(x.ms, limits.ms_most_sample), x.error
+
+    return min(within, key=rank, default=None)
+
+
 @dataclass(frozen=True, slots=True)
-class _Step:
+class Step:
     """Settings from the ringing alone, their maximum sensitivity on the process fitted to the ringing [-], and their
     error relative to the present one by the recorded error's spectrum [-]."""
 
@@ -197,15 +227,15 @@ class _Step:
     error: float
 
 
-def _steps(old: Pid, seen: ObservedRinging) -> list[_Step]:
+def _steps(old: Pid, seen: ObservedRinging, known: Process | None) -> list[Step]:
     """The steps from the ringing alone that make the fitted process robust enough."""
-    process, made = process_of(old, seen.period_s), []
+    process, made = known or process_of(old, seen.period_s), []
     for share in SHARES_KEPT:
         for one in from_ringing(old, seen.period_s, share):
             new = replace(one, kp=rounded(one.kp), ti_s=rounded(one.ti_s))
             ms = maximum_sensitivity(Loop(process, new))
             if ms <= CALM_MS:
-                made.append(_Step(new, ms, error_ratio(old, new, seen)))
+                made.append(Step(new, ms, error_ratio(old, new, seen, process)))
     return made
 
 
@@ -284,6 +314,26 @@ def _simc_settings(
     return found
 
 
+def _integral_times(loop: Loop, others: Sequence[Loop], limits: TuningLimits) -> list[tuple[Pid, float]]:
+    """Robust settings of a controller with integral action alone, with their Ms: its present integral time in steps,
+    up to lambda tuning of a process whose whole lag counts as dead time, for which that is the controller (Skogestad
+    2003)."""
+    old, process = loop.controller, loop.process
+    if not isinstance(process, Fopdt):
+        return []  # two integrators in series are not stable
+    delay = effective_delay(process, scan_step(loop)) + process.time_constant_s
+    slowest = (METHOD.lambda_per_delay + 1.0) * delay * abs(process.gain)
+    most = (limits.ms_most, *(limits.ms_most_sample for _ in others))
+    found: list[tuple[Pid, float]] = []
+    for k in range(1, STEPS_ALONE):
+        new = replace(old, ti_s=rounded(old.ti_s * limits.slower**k))
+        if found and rejects_s(new) > slowest:
+            break
+        ms = robust((loop, *others), new, most)
+        found += [] if ms is None else [(new, ms)]
+    return found
+
+
 def _valve(
     loop: Loop,
     others: Sequence[Loop],
@@ -337,8 +387,10 @@ def _worth(candidate: Candidate, now: Pid, limits: TuningLimits) -> bool:
     """Whether a candidate reduces travel enough for a change; the threshold is higher if it differs from the present
     settings by no more than the advice of two nights does."""
     new = candidate.controller
-    gain, times = abs(math.log(new.kp / now.kp)), (integral_s(new), integral_s(now))
-    time = 0.0 if times == (math.inf, math.inf) else abs(math.log(times[0] / times[1]))
+    alone = now.kp == 0.0
+    gain, times = new.ki / now.ki if alone else new.kp / now.kp, (integral_s(new), integral_s(now))
+    gain = abs(math.log(gain))
+    time = 0.0 if alone or times == (math.inf, math.inf) else abs(math.log(times[0] / times[1]))
     near = gain <= math.log(limits.near_gain) and time <= math.log(limits.near_time)
     return candidate.travel <= 1.0 - (limits.worth_near if near else limits.worth_travel)
 
@@ -357,8 +409,7 @@ def _apart(candidates: list[Candidate], apart: float) -> list[Candidate]:
     """Candidates that differ from every better one by more than `apart`; the others would behave alike."""
     kept: list[Candidate] = []
     for c in candidates:
-        here = np.log([abs(c.controller.kp), c.controller.ti_s])
-        others = [np.log([abs(k.controller.kp), k.controller.ti_s]) for k in kept]
+        here, *others = (np.log([abs(k.controller.kp) or 1.0, abs(k.controller.ti_s)]) for k in (c, *kept))
         if all(np.abs(here - other).max() > apart for other in others):
             kept.append(c)
     return kept
@@ -395,6 +446,8 @@ def _seconds(x: float) -> str:
 
 def settings(controller: Pid) -> str:
     """Text for Kp and Ti, in percent of spans and seconds."""
+    if controller.kp == 0.0:
+        return f"Ti {_seconds(controller.ti_s)} s (integral action only)"
     ti = integral_s(controller)
     return f"Kp {controller.kp:.3g} %/%, Ti {f'{_seconds(ti)} s' if math.isfinite(ti) else 'off'}"
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.models import Integrator, Loop, Pid
+from identification.models import Integrator, Loop, Pid, Process
 from identification.record import Floats
 from identification.signals.spectrum import Spectrum, tapered_power
 from tuning.frequency_response import controller_response, integral_s, loop_response
@@ -59,7 +59,7 @@ def process_of(old: Pid, period_s: float) -> Integrator:
     """The integrator with dead time that rings at a period [s] with these settings: above that frequency its phase
     decreases faster than that of a lag with dead time through the same point."""
     there, ringing = at_period(old, period_s), 2.0 * math.pi / period_s
-    way = math.copysign(1.0, old.kp)  # a direct-acting controller has a process of the opposite sign
+    way = old.sign  # a direct-acting controller has a process of the opposite sign
     dead_time_s = max(0.5 * math.pi + float(np.angle(way * there)), 0.0) / ringing
     return Integrator(way * ringing / abs(there), dead_time_s)
 
@@ -68,8 +68,10 @@ def from_ringing(old: Pid, period_s: float, share: float) -> list[Pid]:
     """Settings that keep a share of the loop's present response at the ringing period [s].
 
     The integral time is raised up to that period over 1.2, unless it is longer or off. Kp follows; it rises by at
-    most RAISED if the integral time caused the ringing.
+    most RAISED if the integral time caused the ringing. An integral alone is made slower.
     """
+    if old.kp == 0.0:
+        return [replace(old, ti_s=old.ti_s / share)]
     longest = max(integral_s(old), period_s / PER_INTEGRAL)
     times = np.geomspace(integral_s(old), longest, TIMES) if longest > integral_s(old) else [old.ti_s]
     made = [replace(old, ti_s=float(ti)) for ti in times]
@@ -77,15 +79,15 @@ def from_ringing(old: Pid, period_s: float, share: float) -> list[Pid]:
     return [replace(new, kp=old.kp * k) for new, k in zip(made, kept, strict=True) if k <= RAISED]
 
 
-def error_ratio(old: Pid, new: Pid, seen: ObservedRinging) -> float:
+def error_ratio(old: Pid, new: Pid, seen: ObservedRinging, process: Process | None = None) -> float:
     """Error of new settings over the present one [-], by the spectrum of the recorded error.
 
     The error is the load or the set point times 1/(1 + L), so each of its frequencies changes by (1 + L)/(1 + L').
     Well below the ringing both responses are large and the ratio is that of the controllers; at the ringing L is -1.
-    In between, the process is taken as the integrator with dead time that gives -1 there.
+    In between, the process is taken as the integrator with dead time that gives -1 there, unless it is given.
     """
     laws = [replace(c, scan_s=0.0) for c in (old, new)]
-    process = process_of(laws[0], seen.period_s)
+    process = process or process_of(laws[0], seen.period_s)
     before, after = (1.0 + loop_response(Loop(process, c), seen.omega) for c in laws)
     ratio = float(np.sum(seen.power * np.abs(before / after) ** 2)) / max(float(np.sum(seen.power)), 1e-300)
     return math.sqrt(ratio)

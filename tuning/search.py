@@ -18,12 +18,14 @@ from identification.simulation.closed_loop import closed_loop, scan_step
 from identification.simulation.lag import discretize, respond
 from tuning.describing import band, is_play
 from tuning.forecast import in_digits, loop_in_digits, run, settled
-from tuning.frequency_response import integral_s, maximum_sensitivity, slowest_s
+from tuning.frequency_response import integral_s, maximum_sensitivity, rejects_s, slowest_s
 from tuning.limits import TuningLimits
 from tuning.rules import effective_delay, simc
 
 GAINS, TIMES = 11, 13
 """Points of the coarse grid in Kp and Ti."""
+ALONE = 4.0
+"""Reach of the grid of a controller with integral action alone, to either side of its present integral time: ours."""
 FINE = 5
 """Points of the fine grid in each direction, over one coarse step to either side of the best."""
 
@@ -78,8 +80,8 @@ def _as_simulated(loop: Loop) -> Loop:
     """The rounded loop with positive controller gain: mirrored about OP's middle, travel and error are the same."""
     p, c = loop.process, loop.controller
     gain, *times = astuple(p)
-    mirrored = type(p)(math.copysign(1.0, c.kp) * gain, *times)
-    return loop_in_digits(replace(loop, process=mirrored, controller=replace(c, kp=abs(c.kp))))
+    upright = replace(c, kp=abs(c.kp), ti_s=abs(c.ti_s))
+    return loop_in_digits(replace(loop, process=type(p)(c.sign * gain, *times), controller=upright))
 
 
 def figures(loop: Loop, load: Floats) -> tuple[float, float]:
@@ -161,13 +163,13 @@ def rejection(process: Process, controller: Pid) -> Rejection:
     """Peak and integral of the error after a unit load step at the process input, without the valve."""
     loop = Loop(process, replace(controller, op_lo=-1e9, op_hi=1e9))
     h = scan_step(loop)
-    ti = integral_s(controller)
+    ti = integral_s(controller) if controller.kp else slowest_s(loop)
     horizon = 20.0 * effective_delay(process, h) + (2.0 * ti if math.isfinite(ti) else 0.0)
     steps = int(min(max(horizon / h, 100), 20_000))
     d = discretize(process, h)
     load = respond(np.r_[0.0, np.ones(steps)], d)
     pv = closed_loop(loop, np.zeros(load.size), load, op_start=0.0).pv
-    return Rejection(float(np.abs(pv).max()), ti / abs(controller.kp))
+    return Rejection(float(np.abs(pv).max()), rejects_s(controller))
 
 
 def allowed(loop: Loop, limits: TuningLimits) -> Rejection:
@@ -184,8 +186,9 @@ def allowed(loop: Loop, limits: TuningLimits) -> Rejection:
     longest = max(lag, nominal.ti_s)
     most = limits.integral_factor * longest / abs(nominal.kp)
     ramp = limits.integral_factor_ramp * nominal.ti_s / abs(nominal.kp)
-    rule = longest / min(abs(nominal.kp), abs(loop.controller.kp))
-    integral = ramp if isinstance(loop.process, Integrator) else max(min(most, ramp), min(1.5 * rule, most))
+    gain = min(abs(nominal.kp), abs(loop.controller.kp))
+    rule = min(1.5 * longest / gain, most) if gain else 0.0  # no rule is for an integral alone
+    integral = ramp if isinstance(loop.process, Integrator) else max(min(most, ramp), rule)
     present = now.integral if math.isfinite(now.integral) else 0.0
     return Rejection(
         max(limits.peak_factor * best.peak, limits.peak_growth * now.peak), max(integral, present)
@@ -198,10 +201,13 @@ def rounded(x: float) -> float:
 
 
 def pairs(loop: Loop, gains: Floats, times: Floats) -> list[Pid]:
-    """Settings of every gain [% OP / % PV] with every integral time [s], with the loop's present sign."""
-    now, sign = loop.controller, math.copysign(1.0, loop.controller.kp)
+    """Settings of every gain [% OP / % PV] with every integral time [s], with the loop's present sign; an integral
+    alone has its sign in the time."""
+    now, sign = loop.controller, loop.controller.sign
+    time = 1.0 if now.kp else sign
     return [
-        replace(now, kp=rounded(sign * float(k)), ti_s=rounded(float(t))) for k, t in product(gains, times)
+        replace(now, kp=rounded(sign * float(k)), ti_s=rounded(time * float(t)))
+        for k, t in product(gains, times)
     ]
 
 
@@ -232,7 +238,7 @@ def _kept(table: Bench, most: Rejection, settings: list[Pid]) -> list[Candidate]
     """The settings that keep robustness, load rejection and error, tested on every loop."""
     process, found = table.loops[0].process, []
     for pid in settings:
-        if math.isfinite(pid.ti_s) and pid.ti_s / abs(pid.kp) > most.integral:
+        if most.integral < rejects_s(pid) < math.inf:
             continue
         ms = robust(table.loops, pid, table.most_ms)
         if ms is None or rejection(process, pid).peak > most.peak:
@@ -245,8 +251,10 @@ def _kept(table: Bench, most: Rejection, settings: list[Pid]) -> list[Candidate]
 def _grid(loop: Loop, most: Rejection, limits: TuningLimits) -> tuple[Floats, Floats]:
     """Gains [% OP / % PV] and integral times [s] of the coarse grid. With backlash before a lag the best is often at
     the time constant (the source study's Eq. 6), but not always: the simulation decides. Integral action that is off
-    remains off."""
+    remains off, and an integral alone remains alone."""
     nominal, now = simc(loop.process, scan_s=scan_step(loop)), loop.controller
+    if now.kp == 0.0:
+        return np.zeros(1), abs(now.ti_s) * np.geomspace(1.0 / ALONE, ALONE, TIMES)
     high = min(limits.gain_up * abs(now.kp), 2.0 * abs(nominal.kp))
     down = limits.gain_down_play if is_play(loop.valve) else limits.gain_down_stick
     low = min(limits.gain_down * abs(now.kp), down * abs(nominal.kp))
@@ -271,7 +279,10 @@ def search(table: Bench) -> tuple[Candidate, ...]:
         return ()
     best = min(coarse, key=lambda c: c.score).controller
     step = np.linspace(-1.0, 1.0, FINE)
-    longer = times if times.size == 1 else np.maximum(best.ti_s * (times[1] / times[0]) ** step, times[0])
-    near = np.clip(abs(best.kp) * (gains[1] / gains[0]) ** step, gains[0], gains[-1])
+    longer, near = times, gains
+    if times.size > 1:
+        longer = np.maximum(abs(best.ti_s) * (times[1] / times[0]) ** step, times[0])
+    if gains.size > 1:
+        near = np.clip(abs(best.kp) * (gains[1] / gains[0]) ** step, gains[0], gains[-1])
     fine = pairs(loop, np.unique(near), np.unique(longer))
     return tuple(sorted(coarse + _kept(table, most, fine), key=lambda c: c.score))

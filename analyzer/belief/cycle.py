@@ -150,13 +150,13 @@ class Pair:
 
     @property
     def at(self) -> tuple[float, float]:
-        """Coordinates in which distances are ratios; the second is 0 without integral action, stated as 0."""
-        return math.log(abs(self.kp)), math.log(abs(self.ti)) if self.ti else 0.0
+        """Coordinates in which distances are ratios; 0 without proportional or integral action, stated as 0."""
+        return math.log(abs(self.kp) or 1.0), math.log(abs(self.ti)) if self.ti else 0.0
 
 
 def advised_pair(row: Row) -> Pair | None:
     """The pair that a night advises, if any."""
-    advises = row["action"] == Action.RETUNE and row["kp_new"] and row["ti_new"] is not None
+    advises = row["action"] == Action.RETUNE and row["kp_new"] is not None and row["ti_new"] is not None
     return Pair(row["night"], *(row[c] for c in WITH_PAIR)) if advises else None
 
 

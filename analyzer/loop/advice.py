@@ -241,8 +241,6 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
     if found.scheduled_over is not None:
         said = SAID["scheduled"].format(found.scheduled_over.over.upper())
         return _or_repair(found.verdict, Advice(Action.NONE, said))
-    if controller.kp == 0.0:
-        return _or_repair(found.verdict, Advice(Action.NONE, SAID["integral_alone"]))
     if found.judged_h < config.advice.least_h:
         return _lacking(
             Requirement(MissingData.LONGER, RequirementKind.HOURS, (config.advice.least_h, found.judged_h))
@@ -265,7 +263,7 @@ def sought_for(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple
     verdict = verdict.for_settings
     fit = verdict.fit
     loop = model_of(verdict, controller)
-    if verdict.cause is Cause.VALVE:
+    if verdict.cause is Cause.VALVE and controller.kp:  # an integral alone is not stable before an integrator
         loop = replace(loop, process=tuned(fit, True, limits))
     return loop, fit, uncertain(fit, loop)
 
@@ -292,7 +290,7 @@ def _proposed(
 ) -> Proposed:
     """The proposal on the model of a verdict used for settings."""
     loop = model_of(verdict, controller)
-    right_way = loop.controller.kp * loop.process.slope > 0.0
+    right_way = loop.controller.sign * loop.process.slope > 0.0
     if not right_way or verdict.cause not in (Cause.VALVE, Cause.TUNING):
         return Proposed(recommend(loop, verdict.cause, limits=config.tuning))
     duration_s, dead_time_s = verdict.fit.window.duration_s, loop.process.dead_time_s
@@ -310,9 +308,10 @@ def _for_tuning(
     verdict: Verdict, loop: Loop, period_s: float | None, config: Config, record: LoopRecord | None
 ) -> Proposed:
     fit = verdict.fit
-    slow = replace(
-        loop, process=replace(cautious(fit.process, period_s), dead_time_s=loop.process.dead_time_s)
-    )
+    slow = loop
+    if loop.controller.kp:
+        lagging = cautious(fit.process, period_s)
+        slow = replace(loop, process=replace(lagging, dead_time_s=loop.process.dead_time_s))
     others = (loop, *uncertain(fit, loop)[:2])
     load = tested = load_of(fit, loop.controller)
     error = recorded_error(fit, loop.controller)
@@ -341,7 +340,8 @@ def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Con
         if apart is not None:
             differs = SAID["off_by"].format(*apart) if apart[1] > 0.0 else SAID["no_cycle"]
             return Proposed(Proposal(Action.UNDECIDED, SAID["disagrees"].format(differs)))
-    same = () if period_s is None else indistinguishable(fit, sought, period_s)
+    none = period_s is None or loop.controller.kp == 0.0  # an integral alone rings before these
+    same = () if none else indistinguishable(fit, sought, period_s or 0.0)
     found = recommend(sought, verdict.cause, others, load, config.tuning, indistinguishable=same)
     return Proposed(found, sought, load, others, same)
 

@@ -136,7 +136,7 @@ def _crossed(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
 def speaks(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
     """Whether PV shows a valve fault: enough evidence, a process gain of the controller's sign, and a width that OP
     has crossed."""
-    wrong_way = m.controller is not None and m.controller.kp * m.play.gain < 0
+    wrong_way = m.controller is not None and m.controller.sign * m.play.gain < 0
     return m.evidence >= needed(m, limits, oscillating) and not wrong_way and _crossed(m, limits, oscillating)
 
 

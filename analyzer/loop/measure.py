@@ -163,7 +163,7 @@ def recovered(record: LoopRecord, scale_s: float, least: float = 0.5) -> Pid | N
 
 def _amplification(process: Fopdt, controller: Pid | None, period_s: float) -> tuple[float | None, bool]:
     """|S| of the identified loop at the period, and whether the loop is stable."""
-    if controller is None or process.gain * controller.kp <= 0:
+    if controller is None or process.gain * controller.sign <= 0:
         return None, True
     loop = Loop(process, controller)
     omega = np.array([2 * math.pi / period_s])

@@ -174,7 +174,7 @@ def between_samples(process: Process, window: Window, controller: Pid) -> Proces
 def calm_resonance(linear: Fit, controller: Pid | None, scale_s: float) -> tuple[float, float]:
     """Maximum sensitivity [-] of the identified loop of a record without a cycle, and the period [s] of its peak; 1
     without settings, or if they act the wrong way."""
-    if controller is None or controller.kp == 0.0:
+    if controller is None:
         return 1.0, scale_s
     window, dead_s = linear.window, max(linear.dead_time_s, 0.0)
     begins = [(linear.time_constant_s, dead_s), *((f * scale_s, 0.05 * scale_s) for f in (0.05, 0.5, 3.0))]
@@ -188,7 +188,7 @@ def ringing_of(linear: Fit, valves: tuple[Fit, ...], controller: Pid | None, per
     linear, the night's fit with an ideal valve; valves, those with faulty ones that explain PV better.
     """
     window = linear.window
-    law = None if controller is None or controller.kp == 0.0 else controller
+    law = controller
     begins = [(x.time_constant_s, max(x.dead_time_s, 0.0)) for x in (linear, *valves)]
     begins += [(share * period_s, 0.05 * period_s) for share in (0.3, 2.0)]
     plain = [(begin, None) for begin in begins]
@@ -214,7 +214,7 @@ def _resonant(window: Window, period_s: float, law: Pid | None) -> list[tuple[Dy
 def _peak(smooth: SmoothFit, window: Window, law: Pid | None, scale_s: float) -> tuple[float, float]:
     """Maximum sensitivity [-] of the loop of a fit, and the period [s] of its peak; 1 without a law, or if it acts
     the wrong way."""
-    if law is None or law.kp * smooth.process.gain <= 0.0:
+    if law is None or law.sign * smooth.process.gain <= 0.0:
         return 1.0, scale_s
     loop = Loop(between_samples(smooth.process, window, law), law)
     return maximum_sensitivity(loop), resonance_s(loop)

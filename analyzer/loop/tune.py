@@ -226,7 +226,7 @@ def pictures(t: Tuning, title: str) -> tuple[Picture, ...]:
     """Describing functions, travel map and forecast, those that exist."""
     out: tuple[Picture, ...] = ()
     if t.model.valve is not None:
-        out = (_curves(t, title), _map_field(t, title))
+        out = (_curves(t, title), *([_map_field(t, title)] if t.model.controller.kp else []))
     return out if t.proposal.new is None else (*out, _trend_panels(t, t.proposal.new, title))
 
 

@@ -114,7 +114,7 @@ class WornValve:
         """Whether OP crosses the backlash at least once in the record, the backlash is no small share of its range in
         a cycle, and the process gain has the controller's sign."""
         m, play = self.measured, self.found.play
-        right_way = m.controller is None or m.controller.kp * play.gain > 0.0
+        right_way = m.controller is None or m.controller.sign * play.gain > 0.0
         width = play.valve.stickband
         crossed = width <= self.limits.widest * play.window.op_range
         return right_way and crossed and width >= self.limits.beside_size * m.window.reach

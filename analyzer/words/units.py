@@ -42,7 +42,7 @@ def gain_unit(kind: str | None, pv_unit: str | None, op_unit: str | None = "%") 
 
 def settings(kp: float | None, ti: float | None, gain: str, time: str) -> str:
     """Kp and Ti with their units; '' if neither is known, 'no integral action' for a Ti of 0."""
-    parts = [f"Kp {number(kp)} {gain}"] if kp is not None else []
+    parts = [f"Kp {number(kp)} {gain}" if kp else "integral action only"] if kp is not None else []
     if ti is not None:
         parts.append(f"Ti {number(ti)} {time}" if ti else "no integral action")
     return ", ".join(parts)
@@ -69,7 +69,7 @@ def changed_settings(row: Row) -> str:
     """Old and new settings of a row with their units; a band also as gain and other times also in seconds."""
     gain, time = gain_unit(row["gain_unit"], row["pv_unit"], row.get("op_unit")), row["ti_unit"] or "s"
     old, new = (row["kp"], row["ti"]), (row["kp_new"], row["ti_new"])
-    kp = f"Kp {arrow(old[0], new[0])} {gain}"
+    kp = "integral action only" if new[0] == 0 else f"Kp {arrow(old[0], new[0])} {gain}"
     if row["gain_unit"] == "band" and old[0] and new[0]:
         more = "more" if new[0] < old[0] else "less"
         kp += f" ({more} gain: {arrow(100 / old[0], 100 / new[0])} %/%)"
