@@ -75,7 +75,8 @@ def of_nights(
     if worn:
         return Action.REPAIR_VALVE, Due.SHUTDOWN
     if cause is not Cause.LOAD:
-        return settled, None
+        steps = cause is own_cause is Cause.UNDECIDED and own_action is voted is Action.RETUNE
+        return Action.RETUNE if steps else settled, None
     followed = own_cause is not Cause.LOAD or own_action is Action.SEE_SOURCE_LOOP
     return Action.FIND_DISTURBANCE if followed else own_action, None
 

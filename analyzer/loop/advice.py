@@ -26,7 +26,7 @@ from analyzer.loop.oscillation import counting
 from analyzer.loop.quality import Prepared
 from analyzer.loop.ringing import between_samples
 from analyzer.loop.settings_side_by_side import Comparison, compared
-from analyzer.loop.sluggish import faster_settings
+from analyzer.loop.sluggish import FasterSettings, faster_settings, rejecting_settings
 from analyzer.loops.slips import slip
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
@@ -38,7 +38,7 @@ from identification.models import Loop, Pid
 from identification.record import Floats, LoopRecord
 from tuning.frequency_response import integral_s, is_stable
 from tuning.limit_cycle import Cycle, confirm
-from tuning.recommend import WITHOUT_SETTINGS, Proposal, recommend
+from tuning.recommend import WITHOUT_SETTINGS, Proposal, calmer_step, recommend
 from tuning.search import LoadedLoop, rounded
 
 SAID = sentences("settings")
@@ -123,23 +123,51 @@ def advise(
     return replace(_as_advice(proposal, spec, pv_span), compared=beside)
 
 
-def advise_if_sluggish(
+def advise_beyond_faults(
     found: Assessment, advice: Advice, prepared: Prepared, spec: LoopSpec, controller: Pid, config: Config
 ) -> Advice:
-    """The advice on a calm loop without other findings: faster settings if it is sluggish."""
-    calm = counting(found.oscillations) is None and found.verdict.cause is Cause.NONE
-    if advice.action is not Action.NONE or not calm or found.outdated or found.settings is not None:
+    """The advice on a loop without a fault of its own: faster settings if it is sluggish, others if it amplifies an
+    external cycle that it could reject, and a first step if it rings in a cycle whose cause is undecided."""
+    if found.outdated or found.settings is not None or found.scheduled_over is not None:
         return advice
-    if not (prepared.op_known and prepared.op_scaled) or found.scheduled_over is not None:
+    if not (prepared.op_known and prepared.op_scaled):
         return advice
-    slow = faster_settings(prepared.record, controller, spec.type, config)
-    if slow is None:
+    cause, cycles = found.verdict.cause, counting(found.oscillations) is not None
+    new, reason = None, ""
+    if (cause, cycles, advice.action) == (Cause.NONE, False, Action.NONE):
+        new, reason = _faster(faster_settings(prepared.record, controller, spec.type, config), "sluggish")
+    elif (cause, cycles, advice.action) == (Cause.LOAD, True, Action.FIND_DISTURBANCE):
+        new, reason = _faster(rejecting_settings(prepared.record, controller, spec.type, config), "rejects")
+    elif cause is Cause.UNDECIDED and cycles and found.verdict.fault is Fault.NONE:
+        new, reason = _calmer(found.verdict, config)
+    if new is None:
         return advice
-    kp, ti = as_stated(slow.new, spec, prepared.scale.span)
-    reason = SAID["first_step"]
-    if slow.change is not None:
-        reason = SAID["sluggish"].format(slow.times, 100.0 * slow.change)
+    kp, ti = as_stated(new, spec, prepared.scale.span)
     return Advice(Action.RETUNE, reason, rounded(kp), rounded(ti))
+
+
+def _faster(found: FasterSettings | None, said: str) -> tuple[Pid | None, str]:
+    """New settings and their reason."""
+    if found is None:
+        return None, ""
+    if found.change is None or found.travel is None:
+        return found.new, SAID["first_step"]
+    return found.new, SAID[said].format(found.times, 100.0 * found.change, 100.0 * found.travel)
+
+
+def _calmer(verdict: Verdict, config: Config) -> tuple[Pid | None, str]:
+    """A first step from the ringing alone for an undecided cycle at which the loop has little damping, and its
+    reason: it is right for a loop that is too tight, and a load at its period is amplified less. None if a faulty
+    valve is as likely as another cause: its cycle is no ringing."""
+    m = verdict.measured
+    if m is None or m.ringing is None or m.controller is None or m.observed is None:
+        return None, ""
+    valve, *others = (verdict.confidence[c] for c in (Cause.VALVE, Cause.TUNING, Cause.LOAD))
+    if not m.ringing.rings(config.cause) or (valve > min(others) and m.evidence > 0.0):
+        return None, ""
+    step = calmer_step(m.controller, m.observed, config.tuning)
+    most = 100.0 * (config.tuning.tight_price - 1.0)
+    return (None, "") if step is None else (step.new, SAID["rings"].format(most))
 
 
 def with_controller_told(

@@ -31,7 +31,7 @@ from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
 from analyzer.loop.sample_clock import onto_clock
 from analyzer.loop.settings_side_by_side import compared, middle_ti
-from analyzer.loop.sluggish import faster_settings
+from analyzer.loop.sluggish import faster_settings, rejecting_settings
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import experiments, sentences
@@ -122,8 +122,9 @@ def tune(
         own = typed and replace(controller, kp=typed.kp, ti_s=typed.ti_s, td_s=typed.td_s)
         proposal = _as_decided(proposal, action, own)
     new = proposal.new
-    if new is not None and verdict.cause is Cause.NONE:
-        slow = faster_settings(prepared.record, controller, kind, config)
+    if new is not None and verdict.cause in (Cause.NONE, Cause.LOAD):
+        known = faster_settings if verdict.cause is Cause.NONE else rejecting_settings
+        slow = known(prepared.record, controller, kind, config)
         model, fit, others = (model, fit, others) if slow is None else (slow.loop, slow.fit, slow.others)
     forecast = None if new is None else _forecast(model, new, fit, others, prepared.record, first, config)
     return Tuning(

@@ -20,7 +20,7 @@ from analyzer.config import Config
 from analyzer.history.plant_clock import stamp
 from analyzer.history.series import Series
 from analyzer.lanes.standing import standing
-from analyzer.loop.advice import Advice, advise, advise_if_sluggish, on_recorded, with_controller_told
+from analyzer.loop.advice import Advice, advise, advise_beyond_faults, on_recorded, with_controller_told
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.conclusion import FailedLoop, concluded
 from analyzer.loop.decisions import (
@@ -112,7 +112,7 @@ def assess_loop(
     advice = advise(found, spec, found.shown or stated, prepared.scale.span, config, pair, prepared.record)
     if stated is None:
         advice = on_recorded(advice, found, spec, prepared.scale.span)
-    return found, advice if stated is None else advise_if_sluggish(
+    return found, advice if stated is None else advise_beyond_faults(
         found, advice, prepared, spec, stated, config
     )
 

@@ -67,13 +67,21 @@ CASES: Cases = {
     Action.NEEDS_DATA: _of_lack,
 }
 """The case of an action from a row, if an action has several."""
-RETUNED = {Cause.VALVE: "retune worn", Cause.NONE: "retune sluggish", Cause.TUNING: "retune"}
+RETUNED = {
+    Cause.VALVE: "retune worn",
+    Cause.NONE: "retune sluggish",
+    Cause.TUNING: "retune",
+    Cause.LOAD: "retune against a load",
+    Cause.UNDECIDED: "retune undecided",
+}
 """Kinds of work for new settings, by the cause; for others an experiment identifies the process."""
 
 
 EXPECTED = {
     Cause.VALVE: "the cycle stops, as in simulation; the valve stays as it is",
     Cause.NONE: "PV returns to its set point several times faster, and OP moves more",
+    Cause.LOAD: "the cycle has the same period and is smaller; its source remains",
+    Cause.UNDECIDED: "the cycle is smaller, and the next night shows its cause better",
     Cause.TUNING: "the oscillation is smaller and decays sooner after a disturbance",
 }
 """Effect of new settings on a loop without a predicted cycle, by the cause."""

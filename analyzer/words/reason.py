@@ -81,7 +81,8 @@ def _whole(found: Finding) -> str:
         return f"not assessed: {found.remedy.text or lacking}"
     names = ", ".join(found.moves[:MOST_NAMES]) + (" ..." if len(found.moves) > MOST_NAMES else "")
     moves = f"it also moves {names}: fix this one first" if names else None
-    at_once = found.remedy.action in SAID_AT_ONCE or found.lack is MissingData.OP_RANGE
+    unusual = found.remedy.action is Action.RETUNE and found.cause in (Cause.LOAD, Cause.UNDECIDED)
+    at_once = unusual or found.remedy.action in SAID_AT_ONCE or found.lack is MissingData.OP_RANGE
     more = found.remedy.text if at_once and found.remedy.text != lacking else None
     first, *others = _cause(found).split("; ")
     worn = valve_text(found) if found.cause is not Cause.VALVE and found.fault in sentences("width") else None
