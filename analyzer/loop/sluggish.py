@@ -120,17 +120,13 @@ def _possible(
     factor by which the slope may be beyond its limit [-]."""
     fit, known = precise[0]
     slope = known["slope_pct_per_s"]
-    steep = replace(
-        slope,
-        **{
-            end: biased * x
-            for end, x in (("low", slope.low), ("high", slope.high))
-            if abs(x) > abs(slope.value)
-        },
-    )
+    if abs(slope.high) > abs(slope.low):
+        slope = replace(slope, high=biased * slope.high)
+    else:
+        slope = replace(slope, low=biased * slope.low)
     dead = reaching(known["dead_time_s"], *(other.dead_time_s for other, _ in precise[1:]))
     process = between_samples(tuned(fit, False, config.advice), fit.window, controller)
-    return _allowed(process, {"slope_pct_per_s": steep, "dead_time_s": dead})
+    return _allowed(process, {"slope_pct_per_s": slope, "dead_time_s": dead})
 
 
 def _fits(record: LoopRecord, controller: Pid | None, kind: str, config: Config) -> list[Known]:
