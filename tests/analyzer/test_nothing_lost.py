@@ -18,13 +18,13 @@ from analyzer.night import chunk
 from analyzer.store import table as store_table
 from proofs.plant import write_export
 
-LOOPS = 12
+LOOPS = 6
 NIGHT = "2026-03-02"
 
 
 @pytest.fixture(scope="module")
 def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An export of 12 quiet loops, a quarter of an hour at 1 s."""
+    """An export of quiet loops, a quarter of an hour at 1 s."""
     loops = {f"L{k:02d}": quiet(k, 900) for k in range(LOOPS)}
     return write_export(tmp_path_factory.mktemp("lost") / "night.parquet", loops)
 
@@ -54,7 +54,7 @@ def test_a_table_that_cannot_be_read_now_is_left_alone(export, tmp_path, monkeyp
     """Where the system refuses a table of the night, a second export of it ends with exit 2 and one line that names
     --resume; nothing is renamed, and read again the table has all its loops."""
     store = tmp_path / "store"
-    assert ran(half(export, tmp_path / "a.parquet", range(6)), store).exit_code == 0
+    assert ran(half(export, tmp_path / "a.parquet", range(LOOPS // 2)), store).exit_code == 0
     before = tables(store)
     whole = pq.ParquetFile
 
@@ -63,7 +63,7 @@ def test_a_table_that_cannot_be_read_now_is_left_alone(export, tmp_path, monkeyp
             raise OSError(number, os.strerror(number))
         return whole(path, **how)
 
-    second = half(export, tmp_path / "b.parquet", range(6, LOOPS))
+    second = half(export, tmp_path / "b.parquet", range(LOOPS // 2, LOOPS))
     with monkeypatch.context() as patch:
         patch.setattr(store_table.pq, "ParquetFile", refuses)
         told = ran(second, store)

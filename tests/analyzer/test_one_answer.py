@@ -14,10 +14,12 @@ from analyzer.pages.night import pages_of_night
 from analyzer.store.store import Store
 from proofs.walk import cells, of_page, of_tune
 
-MILL, LOOPS = "sample_data/mill.parquet", "sample_data/loops.csv"
+MILL, STATED = "sample_data/mill.parquet", Path("sample_data/loops.csv")
 NIGHT = ("--since", "2026-03-03", "--until", "2026-03-04")
 FOLLOWER, WORN, CALM = "LIC2103", "TIC2106", "FIC2113"
 WALKED = (FOLLOWER, WORN, CALM)
+OTHERS = ("FIC2110", "LIC2107", "TIC2111", "FIC2122", "TIC2121", "TIC2118", "PIC2116")
+"""A source, a level, a cascade with its worn slave, a loop at its limit and a healthy one."""
 """Loops that `tune` is asked of; tests/proofs/test_walk.py asks it of the whole mill and of two plants."""
 
 
@@ -29,10 +31,20 @@ def said(*words: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A store of one night of the mill."""
+def asked(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, ...]:
+    """Ten loops of a night of the mill, as commands take them."""
+    path = tmp_path_factory.mktemp("stated") / "loops.csv"
+    head, *rows = STATED.read_text("utf-8").splitlines()
+    kept = [row for row in rows if row.split(",")[0] in (*WALKED, *OTHERS)]
+    path.write_text("\n".join((head, *kept)) + "\n", "utf-8")
+    return MILL, "--loops", str(path), *NIGHT
+
+
+@pytest.fixture(scope="module")
+def store(asked: tuple[str, ...], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store of that night."""
     folder = tmp_path_factory.mktemp("one") / "store"
-    said("run", MILL, "--loops", LOOPS, *NIGHT, "--store", str(folder))
+    said("run", *asked, "--store", str(folder))
     return folder
 
 
@@ -43,10 +55,11 @@ def ranked(store: Path) -> dict[str, dict[str, Any]]:
 
 
 @pytest.mark.parametrize("loop", WALKED)
-def test_tune_decides_as_the_night_did(loop: str, store: Path, ranked: dict[str, dict[str, Any]]) -> None:
+def test_tune_decides_as_the_night_did(
+    loop: str, asked: tuple[str, ...], store: Path, ranked: dict[str, dict[str, Any]]
+) -> None:
     """With the night's store and without one `tune` tells the cells of `rank`; it tells nothing of a loop that the
     night could not assess."""
-    asked = (MILL, "--loops", LOOPS, *NIGHT)
     assert list(of_tune(asked, ranked[loop], str(store))) == []
 
 
@@ -57,30 +70,32 @@ def test_every_page_tells_the_row(store: Path, ranked: dict[str, dict[str, Any]]
 
 
 def test_a_forecast_is_of_the_settings_that_were_decided(
-    store: Path, ranked: dict[str, dict[str, Any]]
+    asked: tuple[str, ...], store: Path, ranked: dict[str, dict[str, Any]]
 ) -> None:
     """The settings in the text of `tune` are those of the row, and only a loop that is to be retuned has some."""
-    text = said("tune", MILL, "--loops", LOOPS, *NIGHT, "--loop", WORN, "--store", str(store))
+    text = said("tune", *asked, "--loop", WORN, "--store", str(store))
     row = ranked[WORN]
     assert ("new settings:" in text) == (row["action"] == "retune")
     if row["action"] == "retune":
         assert f"kp {row['kp_new']:.3g}" in text
 
 
-def test_explain_begins_with_what_the_night_found(store: Path, ranked: dict[str, dict[str, Any]]) -> None:
+def test_explain_begins_with_what_the_night_found(
+    asked: tuple[str, ...], store: Path, ranked: dict[str, dict[str, Any]]
+) -> None:
     """`explain` tells the night's decision before what the physics adds, in text and as data."""
-    asked = ("explain", MILL, "--loops", LOOPS, *NIGHT, "--loop", WORN, "--store", str(store))
-    told = json.loads(said(*asked, "--format", "json"))
+    words = ("explain", *asked, "--loop", WORN, "--store", str(store))
+    told = json.loads(said(*words, "--format", "json"))
     assert cells(told["night"]) == cells(ranked[WORN])
     assert f"found: cause {ranked[WORN]['cause']}; valve {ranked[WORN]['valve_fault']}" in " ".join(
-        said(*asked).split()
+        said(*words).split()
     )
 
 
 def test_a_night_that_the_store_lacks_is_one_line(store: Path) -> None:
     """Of a night that the store does not hold, one line names those it does."""
     other = ("--since", "2026-03-04", "--until", "2026-03-05", "--loop", CALM, "--store", str(store))
-    result = CliRunner().invoke(main, ["tune", MILL, "--loops", LOOPS, *other])
+    result = CliRunner().invoke(main, ["tune", MILL, "--loops", str(STATED), *other])
     assert result.exit_code == 2
     assert "holds no night 2026-03-04" in result.stderr
     assert "2026-03-03" in result.stderr

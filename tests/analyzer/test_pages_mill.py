@@ -24,18 +24,15 @@ OTHERS = ("FIC2110", "FIC2113", "PIC2116")
 
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
-    """The mill's fourteen nights, of the retuned loops and some others, without causes: none is compared."""
+    """The mill's fourteen nights, of the retuned loops and some others."""
     from analyzer.night import batch
     from analyzer.night.nights import Plant
-
-    config = Config()
-    quick = replace(config, quality=replace(config.quality, straight_share=0.0))
 
     export = open_export([MILL / "mill.parquet"], ReadOptions())
     specs, _ = match(read_loops(MILL / "loops.csv"), export.tags)
     kept = Store(tmp_path_factory.mktemp("mill"))
     wanted = [s for s in specs if s.loop in (*RETUNED, *OTHERS)]
-    batch.run(Plant(export, wanted, quick), kept)
+    batch.run(Plant(export, wanted, Config()), kept)
     return kept
 
 

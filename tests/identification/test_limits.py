@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from dataclasses import fields, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from tests.identification.hand_made import Plant, recording
 ROOT = Path(__file__).parents[2]
 
 
+@cache
 def read_names() -> set[str]:
     """Names of all attributes that the program reads anywhere."""
     files = [f for part in ("identification", "tuning", "analyzer") for f in (ROOT / part).rglob("*.py")]
