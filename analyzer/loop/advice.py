@@ -158,9 +158,11 @@ def _faster(found: FasterSettings | None, said: str) -> tuple[Pid | None, str]:
 def _calmer(verdict: Verdict, config: Config) -> tuple[Pid | None, str]:
     """A first step from the ringing alone for an undecided cycle at which the loop has little damping, and its
     reason: it is right for a loop that is too tight, and a load at its period is amplified less. None if a faulty
-    valve is as likely as another cause: its cycle is no ringing."""
-    m = verdict.measured
+    valve is as likely as another cause, or the record does not show a cycle's waveform: it may be no ringing."""
+    m, lacks = verdict.measured, verdict.needs
     if m is None or m.ringing is None or m.controller is None or m.observed is None:
+        return None, ""
+    if lacks is None or lacks.lack is not MissingData.MANUAL_TEST:
         return None, ""
     valve, *others = (verdict.confidence[c] for c in (Cause.VALVE, Cause.TUNING, Cause.LOAD))
     if not m.ringing.rings(config.cause) or (valve > min(others) and m.evidence > 0.0):

@@ -168,20 +168,23 @@ def run(
     valve: Valve | None = None,
     alike: bool = False,
     auto: NDArray[np.bool_] | None = None,
+    sp: Floats | None = None,
+    more: Floats | None = None,
 ) -> Trends:
     """One day of a loop, with other settings or another valve on the same load. Other days have other loads, of any
-    character or, `alike`, of that of the first day. auto, shape (n,): False in manual; None: always in automatic."""
+    character or, `alike`, of that of the first day. auto, shape (n,): False in manual; None: always in automatic. sp,
+    another set point [% PV], and more, a further load before the process [% OP], shape (n,)."""
     n = int(hours * 3600 / d.controller.scan_s)
     like = loads(d, n, np.random.default_rng([d.seed, 0]))[2] if alike and day else None
     rng = np.random.default_rng([d.seed, day])
     before, noise, _ = loads(d, n, rng, like)
-    sp = set_point(d, n, rng)
+    own = set_point(d, n, rng)
     return simulate(
         d.process,
         settings or d.controller,
         d.valve if valve is None else valve,
-        sp,
-        before,
+        own if sp is None else sp,
+        before if more is None else before + more,
         np.zeros(n),
         noise,
         auto,

@@ -11,15 +11,25 @@ from typing import Any
 import numpy as np
 
 from benchmarks.world.__main__ import right, told
-from benchmarks.world.draw import HOURS, KINDS, Drawn, drawn, run
+from benchmarks.world.draw import HOURS, KINDS, Drawn, drawn, run, wander
 from benchmarks.world.recorder import WAYS, Recording, recorded
-from benchmarks.world.simulate import Trends, Valve
+from benchmarks.world.simulate import Floats, Trends, Valve
 from proofs.common import command_line, table
 
-DAYS = ("another day", "SP moves", "PV filter", "manual spell", "ten hours of it")
+DAYS = (
+    *("another day", "SP moves", "PV filter", "manual spell", "ten hours of it"),
+    *("SP ramps", "a master's SP", "load ramps", "bent valve curve"),
+)
 """Variations of the day itself: another load; eight set point moves; a filter of 5 s on the PV that the controller
 sees, which loops.csv does not state; three hours in manual, which no mode states; fourteen hours of the same loop in
-good order, then ten hours with the fault."""
+good order, then ten hours with the fault; six set point ramps of 20 minutes; the set point of a master, a random
+walk; three changes of throughput, each a ramp of the load of an hour and a half; a valve whose gain changes with its
+opening."""
+RAMPS, RAMP_S, MASTER_S, MASTER = 6, 1200, 1800.0, 1.0
+"""Ramps of the set point a day, their duration [s], corner time [s] and standard deviation [% PV] of a master's."""
+THROUGHPUT, BEND = 10.0, 1.0
+"""Standard deviation of a change of throughput [% OP], and bend of the valve's curve [-]."""
+DAY_S = HOURS * 3600
 MANUAL = (0.4, 0.525)
 """The spell in manual, as shares of the day."""
 FITTING = 3.5
@@ -44,9 +54,27 @@ def varied(d: Drawn, way: str) -> Recording:
     if way == "manual spell":
         at = np.arange(run(d).pv.size) / run(d).pv.size
         return recorded(run(d, auto=(at < MANUAL[0]) | (at >= MANUAL[1])), "plain", d.seed)
+    if way == "SP ramps":
+        return recorded(run(d, sp=50.0 + ramps(d, RAMPS, RAMP_S, 3.0)), "plain", d.seed)
+    if way == "a master's SP":
+        master = MASTER * wander(np.random.default_rng([d.seed, 5]), DAY_S, MASTER_S, 1.0)
+        return recorded(run(d, sp=50.0 + master), "plain", d.seed)
+    if way == "load ramps":
+        return recorded(run(d, more=ramps(d, 3, 5400, THROUGHPUT)), "plain", d.seed)
+    if way == "bent valve curve":
+        return recorded(run(replace(d, process=replace(d.process, bend=BEND))), "plain", d.seed)
     if way == "ten hours of it":
         return recorded(joined(calm(d), run(d)), "plain", d.seed)
     return recorded(run(d), way, d.seed)
+
+
+def ramps(d: Drawn, count: int, duration_s: int, size: float) -> Floats:
+    """So many ramps a day to drawn levels about 0 of a standard deviation [% of span], a value a second."""
+    rng = np.random.default_rng([d.seed, 6])
+    begins = np.sort(rng.choice(DAY_S // duration_s - 1, count, replace=False)) * duration_s
+    levels = np.concatenate(([0.0], size * rng.standard_normal(count)))
+    at = np.stack((begins, begins + duration_s), axis=1).ravel()
+    return np.interp(np.arange(DAY_S), at, np.repeat(levels, 2)[1:-1])
 
 
 def calm(d: Drawn) -> Trends:

@@ -18,13 +18,14 @@ friction with a spring that follows OP (as Karnopp 1985)."""
 @dataclass(frozen=True)
 class Process:
     """gain [%/%] (slope [%/(% s)] of an integrator), lag (0: integrator) and second lag [s], dead time [s], lead [s]:
-    negative for an inverse response."""
+    negative for an inverse response, bend of the valve's curve [-]: its gain is 1 + bend (stem - 50)/50."""
 
     gain: float
     lag_s: float
     second_s: float
     dead_s: float
     lead_s: float = 0.0
+    bend: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -104,9 +105,9 @@ def _run(
     loop: Floats,
     h: float,
 ) -> tuple[Floats, Floats, Floats]:
-    """PV, OP and stem, one value a scan; loop: gain, lags, dead, lead, kp, ti, filter, valve, band, jump, OP
+    """PV, OP and stem, one value a scan; loop: gain, lags, dead, lead, bend, kp, ti, filter, valve, band, jump, OP
     at rest."""
-    gain, lag, second, dead, lead, kp, ti, smooth, kind, band, jump, rest = loop
+    gain, lag, second, dead, lead, bend, kp, ti, smooth, kind, band, jump, rest = loop
     n = sp.size
     pv, op, stem = np.empty(n), np.empty(n), np.empty(n)
     delay = dead / h
@@ -121,7 +122,8 @@ def _run(
         i = k - 1 - whole
         late = stem[i] if i >= 0 else rest
         later = stem[i - 1] if i >= 1 else rest
-        u = (1.0 - part) * late + part * later - rest + load_in[k]
+        opened = (1.0 - part) * late + part * later
+        u = opened - rest + bend * ((opened - 50.0) ** 2 - (rest - 50.0) ** 2) / 100.0 + load_in[k]
         before = x1
         if lag > 0.0:
             x1 += a1 * (gain * u - x1)
@@ -171,7 +173,7 @@ def simulate(
 ) -> Trends:
     """The loop under loads before [% OP] and behind [% PV] the process; all of shape (n,), a value a scan."""
     p, c = process, controller
-    plant = (p.gain, p.lag_s, p.second_s, p.dead_s, p.lead_s, c.kp, c.ti_s, c.pv_filter_s)
+    plant = (p.gain, p.lag_s, p.second_s, p.dead_s, p.lead_s, p.bend, c.kp, c.ti_s, c.pv_filter_s)
     loop = np.array([*plant, float(valve.kind), valve.band, valve.jump, rest])
     on = np.ones(sp.size, dtype=bool) if auto is None else auto
     return Trends(sp, *_run(sp, load_in, load_out, noise, on, loop, c.scan_s), c.scan_s)

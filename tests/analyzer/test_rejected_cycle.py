@@ -90,19 +90,27 @@ def test_without_moves_of_the_set_point_nothing_is_advised(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    ("seed", "at", "way"), [(631, 1, "every 10 s"), (633, 7, "every 10 s"), (631, 5, "plain")]
+    ("kind", "seed", "at", "way"),
+    [("load", 631, 5, "plain"), ("worn-tight", 643, 4, "every 10 s"), ("backlash", 642, 2, "every 10 s")],
 )
 def test_an_undecided_cycle_that_the_loop_amplifies_is_calmed(
-    seed: int, at: int, way: str, tmp_path: Path
+    kind: str, seed: int, at: int, way: str, tmp_path: Path
 ) -> None:
-    """A load near the loop's own period, not distinguished from ringing: a first step lowers error and travel."""
-    d = drawn(seed, at + 1, ("load",))[at]
+    """Cycles that are not distinguished from ringing: a first step lowers error and travel of each."""
+    d = drawn(seed, at + 1, (kind,))[at]
     found, advice = advised(d, way, tmp_path)
     assert (found.verdict.cause, advice.action) == (Cause.UNDECIDED, Action.RETUNE)
     error, travel = typed(d, advice.kp_new, advice.ti_new)
-    assert error < 1.0
+    assert error < 0.95
     assert travel < 0.6
     assert "independently of its cause" in advice.reason
+
+
+@pytest.mark.parametrize(("kind", "at"), [("stiction", 3), ("backlash", 3)])
+def test_a_cycle_whose_waveform_is_not_recorded_is_left_alone(kind: str, at: int, tmp_path: Path) -> None:
+    """With three to seven rows a cycle a sticking valve looks like ringing; a calmer loop has 60 % more error."""
+    found, advice = advised(drawn(661, at + 1, (kind,))[at], "every 30 s", tmp_path)
+    assert (found.verdict.cause, advice.kp_new) == (Cause.UNDECIDED, None)
 
 
 def test_nights_keep_the_step_of_an_undecided_cycle() -> None:
