@@ -10,7 +10,7 @@ from analyzer.config import CauseLimits
 from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import better_linear, fit_linear, fit_play, fit_stick_slip
 from identification.estimation.between_samples import Scans, settled, with_scans
-from identification.estimation.evidence import evidence, with_load_step
+from identification.estimation.evidence import evidence, with_load_step, with_second_lag
 from identification.estimation.gauss_newton import descend
 from identification.estimation.noise import judged
 from identification.estimation.stem_position import Seen, seen
@@ -131,6 +131,8 @@ def _compared(found: Candidates, q: Question) -> tuple[Fit, float, float]:
         jump = evidence(stick, play) - max(play.log_likelihood - stick.log_likelihood, 0.0)
         best = stick if jump > q.limits.evidence_jump else play
     gained = evidence(best, with_load_step(linear, q.due, best.ar))
+    if gained > q.limits.evidence:
+        gained = min(gained, evidence(best, with_second_lag(linear)))
     return best, gained - (q.limits.evidence_jump if best is stick else 0.0), jump
 
 
