@@ -17,7 +17,7 @@ from analyzer.loop.measure import Measured
 from identification.controller.check import op_step
 from identification.estimation.between_samples import scans_per_row, with_scans, without_noise
 from identification.estimation.descent import NINETY, half_width, reaching
-from identification.estimation.gauss_newton import covariance, disturbance, residual
+from identification.estimation.gauss_newton import covariance, residual
 from identification.estimation.window import Fit, Window
 from identification.limits import INTERVALS
 from identification.models import Estimate, Fopdt, Integrator, Loop, Pid, Process
@@ -94,13 +94,13 @@ def load_of(fit: Fit, controller: Pid) -> Floats:
     Blocks do not contain the noise from scan to scan, rows contain it at their own interval only. OP still contains
     it, times the gain, and it dithers the stem; white noise of that size is added.
     """
-    _, load = _on_scans(disturbance(fit), fit.window, controller)
+    _, load = _on_scans(_load_left(fit), fit.window, controller)
     return _with_noise(load[-LOOP.load_scans :], fit.window, controller)
 
 
 def load_of_night(fit: Fit, controller: Pid, record: LoopRecord, period_s: float) -> Floats:
     """As `load_of`, of the whole record [% PV] instead of the stretch that is fitted, shape (m,); its unusable parts
-    are left out. A working loop has compensated offset and drift, which the model's start does not know."""
+    are left out."""
     window = whole_window(record, fit.window, NIGHT_BLOCKS, period_s)
     dead_s = max(fit.process.dead_time_s - window.half_block_s, 0.0)
     whole = replace(fit, window=window, dead_time_s=dead_s)
@@ -108,12 +108,19 @@ def load_of_night(fit: Fit, controller: Pid, record: LoopRecord, period_s: float
     if scans is not None:
         whole = with_scans(whole, scans, SEARCHED)
     window = whole.window
+    clock, load = _on_scans(across(_load_left(whole), ~window.usable), window, controller)
+    usable = window.usable[np.minimum((clock / window.dt_s).astype(int), window.y.size - 1)]
+    return _with_noise(joined(load, usable)[-NIGHT_SCANS:], window, controller)
+
+
+def _load_left(fit: Fit) -> Floats:
+    """PV less the response to the stem [% PV], shape (n,), less offset, drift and the decay of the model's start on
+    the usable blocks: a working loop has compensated them. With a noise model that is nearly an integrator the fit
+    does not determine its own offset, which can be far beyond what OP can compensate."""
+    window = fit.window
     t = np.linspace(-1.0, 1.0, window.y.size)
     faded = np.exp(-0.5 * (1.0 + t) * window.duration_s / fit.time_constant_s)
-    left = regressed(residual(whole), np.column_stack([np.ones(t.size), t, faded]), window.usable)
-    clock, load = _on_scans(across(left, ~window.usable), window, controller)
-    usable = window.usable[np.minimum((clock / window.dt_s).astype(int), t.size - 1)]
-    return _with_noise(joined(load, usable)[-NIGHT_SCANS:], window, controller)
+    return regressed(residual(fit), np.column_stack([np.ones(t.size), t, faded]), window.usable)
 
 
 def joined(load: Floats, usable: Mask) -> Floats:
