@@ -23,7 +23,7 @@ from identification.limits import INTERVALS
 from identification.models import Estimate, Fopdt, Integrator, Loop, Pid, Process
 from identification.record import Floats, LoopRecord, Mask
 from identification.signals.robust import robust_deviation
-from identification.simulation.pi import kept
+from identification.simulation.pi import from_noise
 from identification.simulation.valve import StemLaw
 from tuning.describing import describe, scaled_valve
 from tuning.forecast import SEED
@@ -43,6 +43,8 @@ decides whether it does."""
 NIGHT_BLOCKS, NIGHT_SCANS = 30_000, 200_000
 """Blocks in which the load of a night is reconstructed, and its latest scans that are simulated, at most; ours: two
 days at one scan a second, a day in blocks of 3 s."""
+HIGHEST = 4
+"""Highest order of the differences of OP from which the noise of PV is measured: ours."""
 COARSE = 2.0
 """Digits of OP within which the median of its jumps is that of whole digits."""
 
@@ -185,24 +187,25 @@ def scan_noise(window: Window, controller: Pid) -> float:
     found = []
     for one in (window, window.of_rows):  # simulated between the rows, and recorded alone
         held = max(round(controller.scan_s / one.step_s), 1)  # OP is constant between two scans
-        op, a = one.op[::held], kept(controller.pv_filter_s, max(controller.scan_s, one.step_s))
+        op, scan_s = one.op[::held], controller.scan_s or one.step_s
+        shared = from_noise(controller, scan_s, HIGHEST + 1, max(round(one.step_s / scan_s), 1))
         free = (op > controller.op_lo) & (op < controller.op_hi)  # at a limit OP does not follow PV
-        found += [_noise_of(op, free, order, a) for order in (2, 4)]
-    least = min((x for x in found if x is not None), default=0.0)
-    return least / abs(controller.kp) if controller.kp else 0.0
+        found += [_noise_of(op, free, order, shared) for order in (2, HIGHEST)]
+    return min((x for x in found if x is not None), default=0.0)
 
 
-def _noise_of(op: Floats, free: Mask, order: int, a: float) -> float | None:
-    """Standard deviation of white noise in OP, shape (n,), before a filter that keeps a share a, from its differences
-    of an even order at free samples.
+def _noise_of(op: Floats, free: Mask, order: int, shared: Floats) -> float | None:
+    """Standard deviation of white noise in PV [% PV] from OP's differences of an even order at free samples; None if
+    OP, shape (n,), does not show it.
 
-    Their variance follows from the autocorrelation a^k of the filtered noise; that of OP's rounding is subtracted.
-    The median ignores steps (Rousseeuw, Croux 1993). If it is within a few digits of OP it is a digit's: the mean
-    square of jumps of that size is used then (Sheppard 1898), and higher orders have only the digit.
+    Their variance follows from OP's autocovariance under such noise of variance 1, `shared`, shape (order + 1 or
+    more,); that of OP's rounding is subtracted. The median ignores steps (Rousseeuw, Croux 1993). If it is within a
+    few digits of OP it is a digit's: the mean square of jumps of that size is used then (Sheppard 1898), and higher
+    orders have only the digit.
     """
     whole = np.convolve(free, np.ones(order + 1), "valid") == order + 1
     jumps, digit = np.abs(np.diff(op, order))[whole], op_step(op)
-    if jumps.size == 0:
+    if jumps.size == 0 or not shared[0] > 0.0:
         return None
     weights = binom(order, np.arange(order + 1)) * (-1.0) ** np.arange(order + 1)
     spread, rounding = robust_deviation(jumps), float(weights @ weights) / 12.0 * digit**2
@@ -211,7 +214,7 @@ def _noise_of(op: Floats, free: Mask, order: int, a: float) -> float | None:
             return None
         spread = math.sqrt(float(np.mean(jumps[jumps <= 2.0 * COARSE * digit] ** 2)))
     apart = np.abs(np.subtract.outer(np.arange(order + 1), np.arange(order + 1)))
-    share = (1.0 - a) / (1.0 + a) * float(weights @ a**apart @ weights)
+    share = float(weights @ shared[apart] @ weights)
     return math.sqrt(max(spread**2 - rounding, 0.0) / share)
 
 

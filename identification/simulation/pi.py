@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from scipy.signal import lfilter
 
 from identification.models import ErrorForm, Pid
 from identification.record import Floats
@@ -41,6 +42,8 @@ class Law(NamedTuple):
     td_sp_weight: float = 0.0
 
 
+MEMORY = 500
+"""Scans that the filters of a law are followed for: ours, five time constants of a filter of 100 scans."""
 Memory = tuple[float, float, float, float]
 """OP, SP, filtered PV, and derivative part of the previous scan [%]."""
 
@@ -67,6 +70,17 @@ def per_scan(c: Pid, scan_s: float) -> Law:
         c.sp_weight,
         c.td_sp_weight,
     )
+
+
+def from_noise(c: Pid, scan_s: float, lags: int, every: int = 1) -> Floats:
+    """Autocovariance of OP [% OP squared] at so many lags of `every` scans, shape (lags,), under white noise in PV of
+    variance 1 [% PV squared]: of gain and derivative, which the integral changes little from scan to scan."""
+    law = per_scan(c, scan_s)
+    pulse = np.zeros(lags * every + MEMORY)
+    pulse[0] = 1.0
+    seen = lfilter([1.0 - law.pv_keep], [1.0, -law.pv_keep], pulse)
+    out = law.kp * seen + law.kd * lfilter([1.0, -1.0], [1.0, -law.slope_keep], seen)
+    return np.array([out[: out.size - k] @ out[k:] for k in range(0, lags * every, every)])
 
 
 @njit(cache=True)
