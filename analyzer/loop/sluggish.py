@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 from scipy.signal import detrend
@@ -131,7 +131,8 @@ def _possible(
 
 def _fits(record: LoopRecord, controller: Pid | None, kind: str, config: Config) -> list[Known]:
     """The fits with an ideal valve on all clocks, the coarsest first, in which the set point moves; none for a loop
-    that is slow on purpose, or whose controller is no PI."""
+    that is slow on purpose, or whose controller is no PI, and none if the clocks contradict each other: one of them
+    has then found another process, however precise it seems."""
     if controller is None or kind.strip().lower() == AVERAGING or record.sp_estimated:
         return []
     if not math.isfinite(controller.ti_s) or controller.kp == 0.0 or controller.td_s > 0.0:
@@ -146,7 +147,9 @@ def _fits(record: LoopRecord, controller: Pid | None, kind: str, config: Config)
             continue
         if window.sp is not None and fit.slope * controller.kp > 0.0:
             found.append((fit, intervals(fit, False, config.advice)))
-    return found
+    slopes = [known["slope_pct_per_s"] for _, known in found]
+    agree = all(a.low <= b.high and b.low <= a.high for a, b in combinations(slopes, 2))
+    return found if agree else []
 
 
 def _is_precise(x: Known, config: Config) -> bool:

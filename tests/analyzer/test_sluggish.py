@@ -10,6 +10,7 @@ import pytest
 from analyzer.config import Config
 from analyzer.loop.sluggish import faster_settings
 from benchmarks.world.draw import Drawn, drawn, run
+from benchmarks.world.pairs import RAMP_S, RAMPS, ramps
 from benchmarks.world.simulate import sensitivity
 from identification.models import Pid
 from identification.record import LoopRecord
@@ -74,6 +75,17 @@ def test_one_clock_alone_is_enough(slow: list[Drawn], monkeypatch: pytest.Monkey
     """Where one clock alone tells the process, its own interval stands: a loop is told as with two, or not."""
     monkeypatch.setattr("analyzer.loop.sluggish.CLOCKS", (4.0,))
     assert sum(faster_settings(recorded(d), stated(d), "", CONFIG) is not None for d in slow) >= 3
+
+
+def test_clocks_that_contradict_each_other_give_no_settings() -> None:
+    """Under ramps of the set point one clock finds a process 29 times as steep as the other, and calls it precise:
+    the settings for it would make the healthy loop unstable."""
+    d = drawn(665, 12, ("healthy",))[11]
+    t = run(d, sp=50.0 + ramps(d, RAMPS, RAMP_S, 3.0))
+    record = LoopRecord(d.name, 0.0, 1.0, t.sp, t.pv, t.op, np.zeros(t.pv.size, bool))
+    assert faster_settings(record, stated(d), "", CONFIG) is None
+    bad = replace(d.controller, kp=0.99, ti_s=7.61)
+    assert sensitivity(d.process, bad)[0] == np.inf
 
 
 def test_a_first_step_doubles_the_gain_where_several_times_as_much_is_likely() -> None:
