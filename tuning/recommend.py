@@ -105,6 +105,7 @@ def recommend(
     halfway: bool = False,
     seen: ObservedRinging | None = None,
     indistinguishable: Sequence[LoadedLoop] = (),
+    unmoved: Floats | None = None,
 ) -> Proposal:
     """The proposal for one loop: identified process and valve with the present controller.
 
@@ -114,7 +115,8 @@ def recommend(
     recorded average absolute error [% PV], because the simulation of a barely stable loop is too inaccurate, None:
     simulated; halfway, whether the dead time of a ringing loop is uncertain, so that a first step is proposed; seen,
     the observed ringing of such a loop, None: that of the model; indistinguishable, as in tuning.search.bench:
-    settings must be no worse on these either.
+    settings must be no worse on these either; unmoved, the load of a loop that is too tight without the moves of its
+    set point, which another day may lack, shape (m,) [% PV], None: there are none.
     """
     _check(cause, load)
     if cause not in (Cause.VALVE, Cause.TUNING):
@@ -123,7 +125,7 @@ def recommend(
     if loop.controller.sign * slope <= 0.0:
         return Proposal(Action.CHECK_SETTINGS, WHY["wrong_sign"].format(kp=kp, slope=slope))
     if cause == Cause.TUNING:
-        cases = None if load is None else _cases(loop, uncertainty, load, error)
+        cases = None if load is None else _cases(loop, uncertainty, load, error, unmoved)
         return _tight(loop, uncertainty, cases, seen or _alone(loop), limits, halfway)
     load = None if load is None or load.size < limits.least_steps else load
     return _valve(loop, uncertainty, load, limits, indistinguishable)
@@ -257,12 +259,14 @@ class _Test(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class _Cases:
     """Test cases of settings: loops consistent with the data, including the cautious one, one rounded load [% PV],
-    and the present error under it [% PV], None: simulated."""
+    and the present error under it [% PV], None: simulated; unmoved, the load without moves of the set point, None if
+    it has none."""
 
     loops: tuple[Loop, ...]
     cautious: Loop
     load: Floats
     error: float | None
+    unmoved: Floats | None = None
 
     @property
     def least_reproduced(self) -> float:
@@ -277,12 +281,26 @@ class _Cases:
         now = [self.error or figures(one, self.load)[1] for one in cases]
         travel, error = np.mean(did[:-1], axis=0)
         worst = max(e / max(before, 1e-9) for (_, e), before in zip(did, now, strict=True))
-        return _Test(float(travel), float(error), worst)
+        return _Test(float(travel), float(error), max(worst, self._worst_unmoved(new)))
+
+    def _worst_unmoved(self, new: Pid) -> float:
+        """The largest error of new settings over the present one on any loop without moves of the set point [-]."""
+        if self.unmoved is None:
+            return 0.0
+        both = (
+            (replace(one, controller=c) for c in (new, one.controller))
+            for one in (*self.loops, self.cautious)
+        )
+        errors = ([figures(one, self.unmoved)[1] for one in pair] for pair in both)
+        return max(after / max(before, 1e-9) for after, before in errors)
 
 
-def _cases(loop: Loop, others: Sequence[Loop], load: Floats, error: float | None) -> _Cases:
+def _cases(
+    loop: Loop, others: Sequence[Loop], load: Floats, error: float | None, unmoved: Floats | None
+) -> _Cases:
     """Test cases for settings of a loop; without others, the cautious loop itself."""
-    return _Cases((*others, loop)[: max(len(others), 1)], loop, in_digits(load), error)
+    rest = None if unmoved is None else in_digits(unmoved)
+    return _Cases((*others, loop)[: max(len(others), 1)], loop, in_digits(load), error, rest)
 
 
 def _simc_settings(

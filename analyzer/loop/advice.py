@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from analyzer.config import AdviceLimits, Config
 from analyzer.loop import action
 from analyzer.loop.agreement import agreement
@@ -346,11 +348,14 @@ def _for_tuning(
     load = tested = load_of(fit, loop.controller)
     error = recorded_error(fit, loop.controller)
     night = load if record is None else load_of_night(fit, loop.controller, record, period_s or 0.0)
+    unmoved = None
     if record is not None and night.size > load.size:
         tested, error = night, error_of_night(record, loop.controller)
+        if float(np.ptp(record.sp)) > 0.0 and not record.sp_estimated:
+            unmoved = load_of_night(fit, loop.controller, record, period_s or 0.0, moved=False)
     thin = too_thin(fit.window.row_s, loop.controller, config) is not None
     seen = verdict.require_measured.observed
-    found = recommend(slow, verdict.cause, others, tested, config.tuning, error, thin, seen)
+    found = recommend(slow, verdict.cause, others, tested, config.tuning, error, thin, seen, unmoved=unmoved)
     return Proposed(found, loop, load, others) if found.ms is not None else Proposed(found)
 
 

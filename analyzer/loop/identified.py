@@ -100,16 +100,18 @@ def load_of(fit: Fit, controller: Pid) -> Floats:
     return _with_noise(load[-LOOP.load_scans :], fit.window, controller)
 
 
-def load_of_night(fit: Fit, controller: Pid, record: LoopRecord, period_s: float) -> Floats:
+def load_of_night(
+    fit: Fit, controller: Pid, record: LoopRecord, period_s: float, moved: bool = True
+) -> Floats:
     """As `load_of`, of the whole record [% PV] instead of the stretch that is fitted, shape (m,); its unusable parts
-    are left out."""
+    are left out. moved, whether moves of the set point are in it."""
     window = whole_window(record, fit.window, NIGHT_BLOCKS, period_s)
     dead_s = max(fit.process.dead_time_s - window.half_block_s, 0.0)
     whole = replace(fit, window=window, dead_time_s=dead_s)
     scans = None if fit.window.steps == 1 else scans_of(record, window, controller)
     if scans is not None:
         whole = with_scans(whole, scans, SEARCHED)
-    window = whole.window
+    window = whole.window if moved else replace(whole.window, sp=None)
     clock, load = _on_scans(across(_load_left(whole), ~window.usable), window, controller)
     usable = window.usable[np.minimum((clock / window.dt_s).astype(int), window.y.size - 1)]
     return _with_noise(joined(load, usable)[-NIGHT_SCANS:], window, controller)
