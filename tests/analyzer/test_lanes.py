@@ -23,11 +23,13 @@ NIGHT = Night("2026-03-02", START_S, START_S + 86400.0)
 HOURS = 6
 
 
-def trends(kp: float = 2.0, seed: int = 0) -> dict[str, np.ndarray]:
-    """Six hours of a PI loop (lag 60 s, dead time 10 s, Ti 60 s) under a load that wanders; OP from its own law."""
+def trends(kp: float = 2.0, seed: int = 0, ramp: float = 0.0) -> dict[str, np.ndarray]:
+    """Six hours of a PI loop (lag 60 s, dead time 10 s, Ti 60 s) under a load that wanders, and that moves by a ramp
+    of some size in the third hour; OP from its own law."""
     rng = np.random.default_rng(seed)
     n = HOURS * 3600
     walk = np.convolve(rng.normal(size=n + 599), np.ones(600) / 120.0, "valid")
+    walk += ramp * np.clip(np.arange(n) / 3600.0 - 2.0, 0.0, 1.0)
     error = hand_loop.error(kp, 60.0, 60.0, 10, walk, 0.1 * rng.normal(size=n))
     op = 50.0 + kp * (error + np.cumsum(error) / 60.0)
     return {"sp": np.full(n, 50.0), "pv": 50.0 - error, "op": op}
@@ -69,6 +71,17 @@ def test_a_small_gain_is_sluggish() -> None:
     assert lanes(row) == {Lane.SLUGGISH}
     assert "sluggish" in str(row["reason"])
     assert row["kp_new"] is None
+
+
+@pytest.mark.parametrize("ramp", [60.0, -120.0])
+def test_a_ramp_of_the_load_is_not_sluggish(ramp: float) -> None:
+    """While the load is on a ramp the error is constant, for any PI loop: a change of throughput makes none
+    sluggish."""
+    row = row_of(trends(ramp=ramp))
+    memory = row["error_memory_ti"]
+    assert isinstance(memory, float)
+    assert memory < CONFIG.lanes.error_memory_ti
+    assert "sluggish" not in lanes(row)
 
 
 def test_a_loop_at_its_set_point_is_not_sluggish() -> None:
