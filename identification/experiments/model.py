@@ -85,7 +85,7 @@ def modelled(record: LoopRecord, x: Experiment, beside: Sequence[Floats] = ()) -
     found, nat = _candidates(part, x, others)
     best, mean = found[0], averaged(found, x.course.closed)
     if nat < EXPERIMENTS.answers or NINETY * mean.spread.log_gain > EXPERIMENTS.most_gain:
-        raise NotAssessedError(f"PV does not respond to OP beyond its noise in this {x.course}")
+        raise NotAssessedError(f"PV does not respond to OP beyond its noise in the {x.course}")
     trial, start_s = best.trial, x.first * record.dt_s
     blocks = trial.op.reshape(-1, trial.factor).mean(axis=1)
     return Modelled(
@@ -111,7 +111,7 @@ def _candidates(part: LoopRecord, x: Experiment, others: tuple[Floats, ...]) -> 
     for _ in range(2):
         found, nat = _in_blocks(part, x, factor, others)
         if not found:
-            raise NotAssessedError(f"no process explains PV in this {x.course}")
+            raise NotAssessedError(f"no process explains PV in the {x.course}")
         fast_s = sum(found[0].lags_s) + found[0].dead_s
         fine = max(int(fast_s / EXPERIMENTS.blocks_a_lag / part.dt_s), 1)
         if fine >= factor:
@@ -126,7 +126,7 @@ def _in_blocks(
     trial = trial_of(part, factor, others)
     if int(trial.usable.sum()) < EXPERIMENTS.samples:
         need = f"needs {EXPERIMENTS.samples} good samples, has {int(trial.usable.sum())}"
-        raise NotAssessedError(f"{need} in this {x.course}")
+        raise NotAssessedError(f"{need} in the {x.course}")
     if x.course.closed:
         found = closed_candidates(trial, shown_sign(trial), x.course is Course.WARM_UP)
         left = math.inf if not found else float(np.var(found[0].trial.pv - found[0].simulated))
