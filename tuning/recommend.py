@@ -121,9 +121,9 @@ def recommend(
     _check(cause, load)
     if cause not in (Cause.VALVE, Cause.TUNING):
         return Proposal(WITHOUT_SETTINGS[Cause(cause)], WHY[cause])
-    kp, slope = loop.controller.kp, loop.process.slope
-    if loop.controller.sign * slope <= 0.0:
-        return Proposal(Action.CHECK_SETTINGS, WHY["wrong_sign"].format(kp=kp, slope=slope))
+    old, slope = loop.controller, loop.process.slope
+    if old.sign * slope <= 0.0:
+        return Proposal(Action.CHECK_SETTINGS, WHY["wrong_sign"].format(old=settings(old), slope=slope))
     if cause == Cause.TUNING:
         cases = None if load is None else _cases(loop, uncertainty, load, error, unmoved)
         return _tight(loop, uncertainty, cases, seen or _alone(loop), limits, halfway)

@@ -19,6 +19,11 @@ from identification.signals.setpoint_response import moves
 
 AVERAGING = "level"
 """Loop type that is slow on purpose: a level buffers flow."""
+PARTS, PART_TI = 8, 20.0
+"""Largest number of parts of a record for the correlation time, and the least length of one in integral times. While
+set point or load are on a ramp, any PI loop has a constant error. Of 24 healthy loops of benchmarks/world (seeds 665
+to 667) eight are sluggish by the whole of a day with three ramps of the load, one by the parts; of 24 sluggish ones
+18 and 12, of a day without ramps 11 and 10."""
 
 
 def _percent(part: np.ndarray, whole: np.ndarray) -> float | None:
@@ -39,13 +44,6 @@ def _lasting_error(record: LoopRecord, limits: LaneLimits) -> float | None:
         if use[a:b].sum() * record.dt_s >= limits.hour_share * HOUR_S
     ]
     return float(np.median(hours)) if hours else None
-
-
-PARTS, PART_TI = 8, 20.0
-"""Largest number of parts of a record for the correlation time, and the least length of one in integral times. While
-set point or load are on a ramp, any PI loop has a constant error. Of 24 healthy loops of benchmarks/world (seeds 665
-to 667) eight are sluggish by the whole of a day with three ramps of the load, one by the parts; of 24 sluggish ones
-18 and 12, of a day without ramps 11 and 10."""
 
 
 def _memory(prepared: Prepared, controller: Pid | None, kind: str, config: Config) -> float | None:

@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
-from scipy.signal import detrend
 
 from analyzer.config import Config
 from analyzer.lanes.standing import AVERAGING
@@ -207,7 +206,7 @@ def _proposed(fit: Fit, allowed: tuple[Process, ...], present: Pid, config: Conf
     if min(abs(pid.ki) for pid in (new, *plain)) < limits.sluggish_times * abs(present.ki):
         return None
     times = new.kp / new.ti_s / present.ki
-    load = in_digits(detrend(load_of(fit, present)))  # a working loop has compensated offset and drift
+    load = in_digits(load_of(fit, present))
     loop = Loop(between_samples(fit.process, fit.window, present), present)  # the loop with this load
     after, before = (figures(replace(loop, controller=c), load) for c in (new, present))
     travel, change = (a / max(b, 1e-9) - 1.0 for a, b in zip(after, before, strict=True))
