@@ -14,7 +14,7 @@ from identification.models import Backlash, Estimate, Integrator, Loop, Pid
 from identification.record import Floats, LoopRecord
 from identification.signals.correlation import lag_sums
 from identification.simulation.closed_loop import closed_loop, scan_step
-from tuning.describing import band, is_play
+from tuning.describing import band
 from tuning.frequency_response import integral_s, maximum_sensitivity, rejects_s, slowest_s
 from tuning.limit_cycle import kick_of
 from tuning.limits import METHOD
@@ -90,9 +90,9 @@ def run(loop: Loop, load: Floats) -> LoopRecord:
     """The loop at a constant set point of 0 under a load on the controller's clock, shape (n,) [% PV].
 
     OP rests in the middle of the controller's range. Without integral action the bias of OP compensates the mean of
-    the load, as an operator sets it. A loop with backlash gets one kick before the record begins: from rest a small
-    load would not leave the backlash, unlike in a cycling plant. Stick-slip needs no kick, because integral action
-    moves it.
+    the load, as an operator sets it. A loop with a faulty valve gets one kick before the record begins: a plant that
+    cycles is in its large cycle. From rest a small load would not leave the backlash, and a sticking stem may remain
+    in a smaller cycle that it reaches from rest alone.
     """
     c, off = loop.controller, math.isinf(integral_s(loop.controller))
     if off and load.size:
@@ -104,9 +104,9 @@ def run(loop: Loop, load: Floats) -> LoopRecord:
 
 
 def _prelude(loop: Loop, load: Floats) -> Floats:
-    """The load's first value, a kick for a while, and the first value again [% PV]; empty without backlash."""
+    """The load's first value, a kick for a while, and the first value again [% PV]; empty without a faulty valve."""
     width = band(loop.valve)
-    if not is_play(loop.valve) or width <= 0.0 or load.size == 0:
+    if width <= 0.0 or load.size == 0:
         return np.empty(0)
     hold = int(min(max(METHOD.prelude * slowest_s(loop) / scan_step(loop), METHOD.least_prelude), load.size))
     return load[0] + kick_of(loop, width) * np.repeat([0.0, 1.0, 0.0], [1, hold // 2, hold])

@@ -363,9 +363,6 @@ def _valve(
     if band(loop.valve) <= 0.0:
         return Proposal(Action.UNDECIDED, WHY["no_size"])
     before, fault = confirm(loop), fault_told(loop)
-    if _is_short_and_sticks(loop, limits):
-        known = {"fault": fault, "cycle": swings(before.cycle), "ratio": limits.stick_ratio}
-        return Proposal(Action.REPAIR_VALVE, WHY["sticks_on_short_lag"].format(**known), before=before)
     if load is None:
         load = standard_load(loop, limits.most_steps)
     table = bench(loop, others, load, limits, indistinguishable)
@@ -392,13 +389,6 @@ def _valve(
         ms=best.ms,
         candidates=candidates,
     )
-
-
-def _is_short_and_sticks(loop: Loop, limits: TuningLimits) -> bool:
-    """Whether the valve sticks and the lag is at most a few dead times long."""
-    if is_play(loop.valve) or not isinstance(loop.process, Fopdt):
-        return False
-    return loop.process.time_constant_s < limits.stick_ratio * effective_delay(loop.process, scan_step(loop))
 
 
 def _worth(candidate: Candidate, now: Pid, limits: TuningLimits) -> bool:

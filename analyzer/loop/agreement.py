@@ -7,15 +7,16 @@ settings: a derivative, a filter or a limit missing in the model has turned prom
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from analyzer.config import AdviceLimits
-from analyzer.loop.identified import recorded_error
+from analyzer.loop.identified import load_of, recorded_error, tuned
 from identification.controller.check import op_step
 from identification.estimation.window import Fit, Stems, stem_of
-from identification.models import Loop
+from identification.models import Loop, Pid
 from identification.record import Floats
 from identification.simulation.closed_loop import scan_step
 from identification.simulation.valve import play
@@ -37,6 +38,12 @@ class Agreement:
     op_travel: float
     stem_travel: float
     counted: tuple[int, int]
+
+    @property
+    def distance(self) -> float:
+        """Distance of simulation and record [-]: the root of the sum of the squared logarithms of the ratios."""
+        ratios = self.reversals, self.error, self.op_travel, self.stem_travel
+        return math.hypot(*(math.log(max(x, 1e-9)) for x in ratios))
 
     def worst(self, limits: AdviceLimits) -> tuple[str, float] | None:
         """The figure farthest beyond its limit, and its ratio; None if all agree.
@@ -76,10 +83,22 @@ def agreement(loop: Loop, fit: Fit, load: Floats) -> Agreement:
     simulated = [_travel(x, every * scan_s) for x in (play(rounded, digit), sim.stem[::every])]
     op, moved = (s / max(r, 1e-9) for s, r in zip(simulated, recorded, strict=True))
     error = recorded_error(fit, loop.controller, math.ceil(len(sim) * scan_s / window.dt_s))
-    counted = reversals(modelled[-last:]), reversals(sim.stem[::every])
+    moved_on = stem if window.decoded else modelled  # a recorded stem has the noise of its transmitter
+    counted = reversals(moved_on[-last:]), reversals(sim.stem[::every])
     rate = counted[1] / max(counted[0], LEAST) * last * dt_s / (len(sim) * scan_s)
     ratio = float(np.mean(np.abs(sim.error))) / max(error, 1e-9) if math.isfinite(error) else 0.0
     return Agreement(rate, ratio, op, moved, counted)
+
+
+def closest(fits: Sequence[Fit], controller: Pid, limits: AdviceLimits) -> Fit:
+    """The fit behind a faulty valve whose simulation at the present settings is closest to the record."""
+
+    def distance(fit: Fit) -> float:
+        process = tuned(fit, True, limits) if controller.kp else fit.process
+        loop = Loop(process, controller, fit.valve.valve)
+        return agreement(loop, fit, load_of(fit, controller)).distance
+
+    return min(fits, key=distance)
 
 
 def reversals(stem: Floats) -> int:

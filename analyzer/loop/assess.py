@@ -133,7 +133,7 @@ def cause_of(
         verdict = verdict_by_measures(measured, prepared, oscillation, config, worn)
         if oscillation is not None:
             others_s = [o.period_s for o in found.found if o is not oscillation]
-            verdict = with_worn_valve(refine_stick_slip(verdict, period_s, config.cause), worn, others_s)
+            verdict = with_worn_valve(refine_stick_slip(verdict, period_s, config), worn, others_s)
     dead = dead_valve(record, config.cause) if prepared.op_known else None
     return with_dead_valve(verdict, dead) if dead and verdict.cause is not Cause.VALVE else verdict
 

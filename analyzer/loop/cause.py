@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.config import CauseLimits, Config
+from analyzer.loop.agreement import closest
 from analyzer.loop.decisions import (
     CAUSES,
     Cause,
@@ -49,6 +50,7 @@ from identification.estimation.window import Fit
 from identification.limits import FIT
 from identification.models import Backlash, Loop
 from identification.record import LoopRecord
+from identification.simulation.valve import HALTS, RESTS
 from tuning.describing import describe
 from tuning.frequency_response import loop_response
 
@@ -406,16 +408,16 @@ def _beside_another_cycle(
     return verdict
 
 
-def refine_stick_slip(verdict: Verdict, period_s: float, limits: CauseLimits) -> Verdict:
+def refine_stick_slip(verdict: Verdict, period_s: float, config: Config) -> Verdict:
     """The verdict on a loop that cycles, its valve's fault replaced if slips at variable distances explain PV better.
 
     The cause is unchanged: the test is for the kind of fault of a valve already identified by PV and OP. If the stem
     is identified slip by slip, the window contains it as if recorded. Settings are searched with one friction for all
-    slips, found from the path's: searched on this verdict, whose stem includes a part of the load, they left 7 of 24
-    sticking loops of proofs/retuning.py (seeds 21, 22, 81, 82) with no smaller error, one with a larger by 47 %. The
-    cycle has a period of period_s [s].
+    slips: that of the likeliest fit with regular slips, or the mean one of the slips, with a stem that rests after
+    each slip or follows OP until it stops. The simulation at the present settings that is closest to the record
+    decides. The cycle has a period of period_s [s].
     """
-    m = verdict.measured
+    m, limits = verdict.measured, config.cause
     if (
         verdict.cause is not Cause.VALVE
         or m is None
@@ -439,6 +441,11 @@ def refine_stick_slip(verdict: Verdict, period_s: float, limits: CauseLimits) ->
     fault = fault_of(told, limits)
     law = _finely(refined(near_path(play, path)), m)
     best = max((x for x in (m.stick_slip, law) if x is not None), key=lambda fit: fit.log_likelihood)
+    slips = told.stick_slip
+    if m.controller is not None and slips is not None:
+        laws = (slips.valve._replace(tolerance=motion) for motion in (RESTS, HALTS))
+        fits = (best, *(replace(slips, valve=law) for law in laws))
+        best = closest(fits, m.controller, config.advice)
     steady = replace(verdict, measured=replace(m, stick_slip=best), fault=fault)
     return replace(verdict, measured=told, fault=fault, steady=steady)
 

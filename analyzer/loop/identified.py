@@ -243,13 +243,16 @@ def indistinguishable(
     A limit cycle determines the product of the process and the valve's describing function at its own frequency alone
     (Astrom, Hagglund 1984). OP between two rows of a record, or within a digit, is unknown and biases the rest: the
     fitted time constant and width are too small, and with them the error under a slow load. These loops have the same
-    product, an integrating process, and the valve as fitted or WIDER. A dead time that would be negative is 0; the
+    product, an integrating process, and the valve as fitted or WIDER. A narrow stick-slip before a long dead time may
+    also be the widest one that OP's cycle allows before a short one. A dead time that would be negative is 0; the
     product then differs in phase.
     """
     omega, lag_s = 2.0 * math.pi / period_s, fit.time_constant_s
     slow_s, swing = INTEGRATING * max(lag_s, period_s), 0.5 * fit.window.cycle_range
     found = []
-    for wider in (1.0, min(WIDER, MOST_OF_SWING * fit.window.cycle_range / max(fit.valve.stickband, 1e-9))):
+    widest = MOST_OF_SWING * fit.window.cycle_range / max(fit.valve.stickband, 1e-9)
+    widths = (1.0, min(WIDER, widest), widest if fit.valve.slip_jump > 0.0 else 1.0)
+    for wider in dict.fromkeys(widths):
         valve = scaled_valve(loop.valve, wider)
         response, wide = describe(loop.valve, swing), describe(valve, swing)
         if wider < 1.0 or 0.0 in (response, wide):

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.models import Backlash, Fopdt, Loop, Pid
+from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
 from identification.record import LoopRecord
+from identification.simulation.closed_loop import closed_loop
 from proofs.valve_loops import backlash_case, corners, stick_case
-from tuning.forecast import NAMES, assess, autocorrelation_peak, predict
+from tuning.forecast import NAMES, assess, autocorrelation_peak, predict, run, settled
 from tuning.rules import backlash_rule
 
 
@@ -120,3 +121,44 @@ def test_digits_that_nobody_knows_change_no_forecast(seed):
     for other in others:
         again = predict(other, new, case.load + 1e-13)
         assert (again.before, again.after) == (once.before, once.after)
+
+
+def changed_while_it_cycles(loop, new, load):
+    """Stem travel [%] under new settings of a loop that cycles under the present ones first, with the same load.
+
+    In plain Python: a PI in position form, a stem that rests after each slip, a lag behind a pipe.
+    """
+    p, valve = loop.process, loop.valve
+    away, rest = 0.5 * (valve.stickband + valve.slip_jump), 0.5 * (valve.stickband - valve.slip_jump)
+    pipe, pole = [0.0] * round(p.dead_time_s), np.exp(-1.0 / p.time_constant_s)
+    x, stem, total, travel, before = 0.0, 0.0, 0.0, 0.0, 0.0
+    for k, moved in enumerate(np.concatenate((load, load))):
+        c = loop.controller if k < load.size else new
+        if k == load.size:
+            total += (loop.controller.kp - new.kp) * before
+        before = -(x + moved + (3.0 if k < 300 else 0.0))
+        total += c.kp / c.ti_s * before
+        op = total + c.kp * before
+        if abs(op - stem) > away:
+            place = op - np.copysign(rest, op - stem)
+            travel += abs(place - stem) if k >= load.size + load.size // 4 else 0.0
+            stem = place
+        pipe.append(stem)
+        x = pole * x + (1.0 - pole) * p.gain * pipe.pop(0)
+    return travel
+
+
+def test_a_sticking_stem_that_cycles_goes_on():
+    """A loop that sticks rests if it begins at rest, and cycles on if it cycled. New settings are forecast for the
+    cycling loop, within 40 %: the period depends on where the stem's jumps are relative to the load."""
+    loop = Loop(Fopdt(1.23, 65.0, 11.0), Pid(2.3, 70.6), Stiction(1.29, 0.56))
+    new = replace(loop, controller=Pid(1.97, 138.0))
+    came, forecast = [], []
+    for seed in range(3):
+        noise = 0.015 * np.random.default_rng(seed).standard_normal(12_000)
+        came.append(changed_while_it_cycles(loop, new.controller, noise))
+        forecast.append(float(np.abs(np.diff(settled(run(new, noise)).stem)).sum()))
+        rested = closed_loop(new, np.zeros(noise.size), noise, op_start=50.0).stem
+        assert float(np.ptp(rested)) == 0.0
+    assert min(came) > 20.0
+    assert np.mean(forecast) == pytest.approx(np.mean(came), rel=0.4)

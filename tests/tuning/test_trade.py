@@ -11,7 +11,7 @@ from analyzer.pages import compared as page
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
 from identification.simulation.closed_loop import closed_loop
 from proofs.valve_loops import backlash_case, corners, level_case, stick_case
-from tuning.forecast import CALMER, DERIVATIVE, SMALLER, assess, run, settled, tried
+from tuning.forecast import CALMER, DERIVATIVE, SMALLER, assess, loop_in_digits, run, settled, tried
 from tuning.frequency_response import maximum_sensitivity
 from tuning.limits import LIMITS
 from tuning.recommend import recommend
@@ -51,7 +51,7 @@ def test_what_is_chosen_keeps_its_price_on_every_loop(found):
             chosen += 1
             for one, load in zip(table.loops, table.loads, strict=True):
                 old, new = (
-                    assess(settled(run(replace(one, controller=pid), load)))
+                    assess(settled(run(loop_in_digits(replace(one, controller=pid)), load)))
                     for pid in (one.controller, c.controller)
                 )
                 travel = new.stem_travel / old.stem_travel
