@@ -49,14 +49,16 @@ class Agreement:
         """The figure farthest beyond its limit, and its ratio; None if all agree.
 
         The cycle of a worn valve under a load is irregular: a number of n reversals scatters by sqrt(n) at most, and
-        two such standard errors are allowed beside the limit.
+        two such standard errors are allowed beside the limit. Stem travel, a sum over as many moves, is allowed as
+        much. The error is a mean over them, which scatter by half of their mean.
         """
         scatter = 2.0 * math.sqrt(sum(1.0 / max(n, LEAST) for n in self.counted))
+        irregular = math.log(limits.agree_reversals) + scatter
         allowed = {
-            "number of valve reversals": (self.reversals, math.log(limits.agree_reversals) + scatter),
-            "average absolute error": (self.error, math.log(limits.agree_error)),
+            "number of valve reversals": (self.reversals, irregular),
+            "average absolute error": (self.error, max(math.log(limits.agree_error), 0.5 * scatter)),
             "OP travel": (self.op_travel, math.log(limits.agree_travel)),
-            "stem travel": (self.stem_travel, math.log(limits.agree_travel)),
+            "stem travel": (self.stem_travel, max(math.log(limits.agree_travel), irregular)),
         }
         beyond = {n: abs(math.log(max(x, 1e-9))) / most for n, (x, most) in allowed.items()}
         name = max(beyond, key=lambda n: beyond[n])
