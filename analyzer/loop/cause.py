@@ -50,6 +50,7 @@ from identification.estimation.window import Fit
 from identification.limits import FIT
 from identification.models import Backlash, Loop
 from identification.record import LoopRecord
+from identification.signals.phase import PERIODS
 from identification.simulation.valve import HALTS, RESTS
 from tuning.describing import describe
 from tuning.frequency_response import loop_response
@@ -206,6 +207,8 @@ def judge(
         return _quiet(m, limits, beside)
     if m.ringing is None or any(math.isnan(x) for x in (m.evidence, m.jump, m.size, m.kurtosis)):
         return replace(not_assessed(None), measured=m)
+    if m.has_clock(limits) and m.evidence < limits.beside_evidence:
+        return _has_clock(m, oscillation, limits)
     seen_as = Regularity(oscillation.rhythm.first, m.kurtosis, m.saturated >= limits.held, oscillation.cycles)
     worn = _may_be_cause(m, m.ringing, limits, beside)
     if m.ringing.is_tight(seen_as, m.evidence if worn else 0.0, limits):
@@ -221,6 +224,14 @@ def judge(
     why = Sign(first, confidence[first] / 100.0, SignKind.LIKELIER, (str(first), lead))
     fault = fault_of(m, limits) if first is Cause.VALVE else Fault.NONE
     return Verdict(first, confidence, fault, (why, *signs), measured=m)
+
+
+def _has_clock(m: Measured, oscillation: Oscillation, limits: CauseLimits) -> Verdict:
+    """The verdict on a cycle with a clock outside the loop."""
+    pct, rest = limits.most_pct, 0.5 * (100.0 - limits.most_pct)
+    confidence = {Cause.VALVE: rest, Cause.TUNING: rest, Cause.LOAD: pct}
+    why = Sign(Cause.LOAD, pct / 100.0, SignKind.KEPT_PHASE, (m.kept.share, PERIODS * m.kept.blocks))
+    return Verdict(Cause.LOAD, confidence, Fault.NONE, (why, *signs_of(m, oscillation, limits)), measured=m)
 
 
 def _chances(gains: dict[Cause, float], limits: CauseLimits) -> dict[Cause, float]:
@@ -360,7 +371,8 @@ def _hides(
     """Missing data to distinguish the named cause from others; None if there are none."""
     limits = config.cause
     if verdict.cause is Cause.LOAD:
-        return _too_coarse(prepared, oscillation, limits)
+        clocked = any(sign.kind is SignKind.KEPT_PHASE for sign in verdict.signs)
+        return None if clocked else _too_coarse(prepared, oscillation, limits)
     unsure = verdict.cause is Cause.VALVE and verdict.confidence[Cause.VALVE] < limits.compressed_pct
     return compressed(prepared, None, config.quality) if unsure else None
 

@@ -33,6 +33,7 @@ class SignKind(StrEnum):
     RINGING = "ringing"
     SMOOTH_LOAD = "smooth load"
     PERIODIC_LOAD = "periodic load"
+    KEPT_PHASE = "kept phase"
     LIKELIER = "likelier model"
     CALM_EVIDENCE = "evidence of a calm loop"
     CALM_WIDTH = "size in a calm loop"

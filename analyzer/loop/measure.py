@@ -24,6 +24,7 @@ from identification.estimation.evidence import (
 from identification.estimation.window import Fit, Window
 from identification.models import Fopdt, Loop, Pid
 from identification.record import LoopRecord, Mask
+from identification.signals.phase import PERIODS, UNKNOWN, KeptPhase, kept_phase
 from identification.signals.setpoint_response import at_rest
 from identification.signals.spectrum import Spectrum, size_kurtosis
 from tuning.frequency_response import is_stable, loop_response
@@ -42,8 +43,8 @@ class Measured:
     3 for noise, 1.5 for a constant size; steady [-], of a calm loop, agreement of the stretches between moves of the
     stem on the better valve: their mean gain over its standard error, and asked, its gain while a response of PV to
     set point moves is expected [nat]; ringing, the models of a cycle under a smooth load, None without a cycle;
-    observed, the ringing seen in the error, None without a cycle; scale_s, the period or another time scale of the
-    loop [s].
+    observed, the ringing seen in the error, None without a cycle; kept, how well the cycle keeps its phase; scale_s,
+    the period or another time scale of the loop [s].
     """
 
     linear: Fit
@@ -64,12 +65,19 @@ class Measured:
     asked: float = 0.0
     ringing: Ringing | None = None
     observed: ObservedRinging | None = None
+    kept: KeptPhase = UNKNOWN
     scale_s: float = 60.0
 
     @property
     def window(self) -> Window:
         """The data of all the fits."""
         return self.linear.window
+
+    def has_clock(self, limits: CauseLimits) -> bool:
+        """Whether a clock outside the loop times the cycle: it keeps its phase over many periods, while OP does not
+        reach a limit in each, which would fix the period of a loop's own cycle."""
+        known = PERIODS * self.kept.blocks >= limits.kept_periods and self.saturated < limits.held
+        return known and self.kept.share >= limits.kept_phase
 
 
 def measure(
@@ -114,6 +122,7 @@ def measure(
         alone = not record.mask("idle").any()  # else another loop moves PV too
         return _without_a_cycle(seen_alone, best, linear, due if alone else None)
     found = _of_a_cycle(seen_alone, best, linear, law, error)
+    found = replace(found, kept=kept_phase(record.error, record.usable, scale / record.dt_s))
     return found if error is None else replace(found, kurtosis=_kurtosis(record, error, scale))
 
 

@@ -97,7 +97,8 @@ def _cause(found: Finding) -> str:
     if found.cause is Cause.TUNING:
         return f"{cycle}: tuned too tight; {_strongest(found, 1, SignKind.RINGING, SignKind.AMPLIFICATION)}"
     if found.cause is Cause.LOAD:
-        return f"{cycle}: external disturbance; {_strongest(found, 1, SignKind.PERIODIC_LOAD, SignKind.REGULARITY)}"
+        first = SignKind.KEPT_PHASE, SignKind.PERIODIC_LOAD, SignKind.REGULARITY
+        return f"{cycle}: external disturbance; {_strongest(found, 1, *first)}"
     if found.cause is Cause.UNDECIDED:
         return f"{cycle}; cause undecided: {found.lacking or 'no cause explains the cycle better than the others'}"
     return cycle
@@ -220,6 +221,7 @@ SAYS: Mapping[SignKind, Callable[..., Chosen]] = {
     ),
     SignKind.SMOOTH_LOAD: lambda nat: ("smooth_load", nat),
     SignKind.PERIODIC_LOAD: lambda nat, kept: ("periodic_load", nat, kept),
+    SignKind.KEPT_PHASE: lambda share, periods: ("kept_phase", share, periods),
     SignKind.LIKELIER: lambda cause, nat: (f"likelier_{cause}", nat),
     SignKind.CALM_EVIDENCE: _evidence,
     SignKind.CALM_WIDTH: lambda size: ("calm_width", 100 * size),

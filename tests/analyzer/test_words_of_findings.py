@@ -77,6 +77,7 @@ BOTH_WAYS = {
     SignKind.RINGING: ((math.inf, 90.0), (5.0, 90.0)),
     SignKind.SMOOTH_LOAD: ((2.0,),),
     SignKind.PERIODIC_LOAD: ((40.0, 12.0),),
+    SignKind.KEPT_PHASE: ((0.99, 700.0),),
     SignKind.LIKELIER: (("valve", 40.0), ("load", 40.0)),
     SignKind.CALM_EVIDENCE: ((9.0,),),
     SignKind.CALM_WIDTH: ((0.4,),),
