@@ -211,13 +211,13 @@ def field(c: Comparison) -> parts.Field | None:
 
 
 def _kick(c: Comparison) -> dict[str, float]:
-    """The start of motion of a loop with backlash, as in tuning.forecast.run.
+    """The start of motion of a loop with a faulty valve, as in tuning.forecast.run.
 
     Kick [% PV times gain], the slowest time besides Ti [s], multiples of it without a kick, minimum scans.
     """
     width = band(c.loop.valve)
     free = replace(c.loop, controller=replace(c.loop.controller, ti_s=math.inf))
-    kick = KICK * width if is_play(c.loop.valve) and width > 0.0 else 0.0
+    kick = KICK * max(width, 0.0)
     return {
         "kick": kick,
         "slowest_s": slowest_s(free),

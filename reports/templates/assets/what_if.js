@@ -41,7 +41,7 @@
     };
   }
 
-  /* The load, after a kick that sets a loop with play going. */
+  /* The load, after a kick that sets a loop with a faulty valve going. */
   function kicked(model, load, kp, tiS) {
     const p = model.prelude, slowest = Math.max(p.slowest_s, isFinite(tiS) ? tiS : 0);
     if (!(p.kick > 0)) return { load, skipped: 0 };
