@@ -50,7 +50,6 @@ from identification.estimation.window import Fit
 from identification.limits import FIT
 from identification.models import Backlash, Loop
 from identification.record import LoopRecord
-from identification.signals.phase import PERIODS
 from identification.simulation.valve import HALTS, RESTS
 from tuning.describing import describe
 from tuning.frequency_response import loop_response
@@ -230,7 +229,7 @@ def _has_clock(m: Measured, oscillation: Oscillation, limits: CauseLimits) -> Ve
     """The verdict on a cycle with a clock outside the loop."""
     pct, rest = limits.most_pct, 0.5 * (100.0 - limits.most_pct)
     confidence = {Cause.VALVE: rest, Cause.TUNING: rest, Cause.LOAD: pct}
-    why = Sign(Cause.LOAD, pct / 100.0, SignKind.KEPT_PHASE, (m.kept.share, PERIODS * m.kept.blocks))
+    why = Sign(Cause.LOAD, pct / 100.0, SignKind.KEPT_PHASE, tuple(m.kept))
     return Verdict(Cause.LOAD, confidence, Fault.NONE, (why, *signs_of(m, oscillation, limits)), measured=m)
 
 

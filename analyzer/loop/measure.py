@@ -24,7 +24,7 @@ from identification.estimation.evidence import (
 from identification.estimation.window import Fit, Window
 from identification.models import Fopdt, Loop, Pid
 from identification.record import LoopRecord, Mask
-from identification.signals.phase import PERIODS, UNKNOWN, KeptPhase, kept_phase
+from identification.signals.phase import UNKNOWN, KeptPhase, kept_phase
 from identification.signals.setpoint_response import at_rest
 from identification.signals.spectrum import Spectrum, size_kurtosis
 from tuning.frequency_response import is_stable, loop_response
@@ -76,7 +76,7 @@ class Measured:
     def has_clock(self, limits: CauseLimits) -> bool:
         """Whether a clock outside the loop times the cycle: it keeps its phase over many periods, while OP does not
         reach a limit in each, which would fix the period of a loop's own cycle."""
-        known = PERIODS * self.kept.blocks >= limits.kept_periods and self.saturated < limits.held
+        known = self.kept.periods >= limits.kept_periods and self.saturated < limits.held
         return known and self.kept.share >= limits.kept_phase
 
 

@@ -1,7 +1,7 @@
 """Does a cycle keep its phase over a record? A clock does; a cycle that a loop makes by itself does not.
 
-A limit cycle has no reference for its phase: noise shifts each reversal, and the shifts add up to a random walk. The
-frequency of a machine has one. Over some hundred cycles the two are far apart.
+A limit cycle has no reference for its phase: noise shifts it, and the shifts add up to a random walk (Demir,
+Mehrotra, Roychowdhury 2000). The frequency of a machine has one. Over some hundred cycles the two are far apart.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ FINER = 16
 
 
 class KeptPhase(NamedTuple):
-    """Share of a cycle's amplitude that keeps one phase [-], and the number of blocks from which it is known."""
+    """Share of a cycle's amplitude that keeps one phase [-], and the number of periods from which it is known."""
 
     share: float
-    blocks: int
+    periods: int
 
 
 UNKNOWN = KeptPhase(0.0, 0)
@@ -40,16 +40,16 @@ def kept_phase(x: Floats, usable: Mask, period: float) -> KeptPhase:
     size = max(round(PERIODS * period), PERIODS)
     count = x.size // size
     if count < 2:
-        return KeptPhase(0.0, count)
+        return KeptPhase(0.0, PERIODS * count)
     at = np.arange(count * size)
     wave = np.exp(-2j * np.pi * at / period)
     good = usable[at].reshape(count, size)
     turned = (np.where(usable[at], x[at], 0.0) * wave).reshape(count, size)
     kept = good.mean(axis=1) >= 0.5
     blocks = np.where(kept, turned.sum(axis=1) / np.maximum(good.sum(axis=1), 1), 0.0)
-    height = np.abs(blocks)
+    height, periods = np.abs(blocks), PERIODS * int(kept.sum())
     if not kept.any() or not height.max() > 0.0:
-        return KeptPhase(0.0, int(kept.sum()))
+        return KeptPhase(0.0, periods)
     blocks *= np.minimum(1.0, OUTLIER * np.median(height[kept]) / np.maximum(height, 1e-300))
     together = np.abs(np.fft.fft(blocks, FINER * count)).max()
-    return KeptPhase(float(together / np.abs(blocks).sum()), int(kept.sum()))
+    return KeptPhase(float(together / np.abs(blocks).sum()), periods)

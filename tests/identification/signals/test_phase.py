@@ -35,7 +35,7 @@ def test_a_sine_keeps_its_phase() -> None:
         (moved, GOOD, 100.0),
     ):
         found = kept_phase(x, usable, period)
-        assert found.blocks == N // round(PERIODS * period)
+        assert found.periods == PERIODS * (N // round(PERIODS * period))
         assert found.share > 0.97
 
 
