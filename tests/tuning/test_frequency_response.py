@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from identification.models import Fopdt, Integrator, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
-from tests.identification.responses import pv_of
+from tests.identification.slow_responses import pv_of
 from tuning.frequency_response import (
     frequencies,
     is_stable,

@@ -15,7 +15,7 @@ from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
 from identification.simulation.lag import respond, unit_lag
 from identification.simulation.valve import HALTS, RESTS, SLIDES, StemLaw, first_slip, sticking, walk
-from tests.identification.responses import pv_of
+from tests.identification.slow_responses import pv_of
 
 N = 3000
 

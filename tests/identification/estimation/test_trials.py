@@ -18,7 +18,7 @@ from identification.estimation.window import Window
 from identification.models import Backlash, Fopdt
 from identification.signals.turns import turning_points, turns_of
 from identification.simulation.valve import RESTS, StemLaw
-from tests.identification.responses import pv_of
+from tests.identification.slow_responses import pv_of
 
 N = 4000
 PERIOD = 200.0

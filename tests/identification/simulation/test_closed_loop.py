@@ -8,7 +8,7 @@ from scipy.signal import lsim
 
 from identification.models import Backlash, Fopdt, Integrator, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
-from tests.identification.responses import pv_of
+from tests.identification.slow_responses import pv_of
 
 
 def cycle(pv: np.ndarray, dt: float) -> tuple[float, float]:

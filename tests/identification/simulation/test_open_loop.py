@@ -11,7 +11,7 @@ from identification.models import Backlash, Fopdt, Integrator, Motion, Process, 
 from identification.simulation.open_loop import ModelInputs, as_parameters, begun_at_rest, simulate
 from identification.simulation.parameters import Slot, neutral
 from identification.simulation.valve import play
-from tests.identification.responses import pv_of
+from tests.identification.slow_responses import pv_of
 
 
 def inputs(seed: int = 1, n: int = 600) -> ModelInputs:
