@@ -25,7 +25,7 @@ def filled(ctx: ClassDefContext) -> None:
     stated = tomllib.loads((ROOT / package / "limits.toml").read_text("utf-8"))[section.value]
     given = []
     for name, said in stated.items():
-        held = tuple if isinstance(said["value"], list) else type(said["value"])
+        held = tuple if isinstance(said[0], list) else type(said[0])
         kind = ctx.api.named_type(f"builtins.{held.__name__}")
         add_attribute_to_class(ctx.api, ctx.cls, name, kind)
         given.append(Argument(Var(name, kind), kind, None, ARG_NAMED_OPT))

@@ -19,9 +19,7 @@ from identification.limits import (
     ExplainLimits,
     Limit,
     Limits,
-    ProofLimits,
     RecorderLimits,
-    SearchLimits,
 )
 from tuning.limits import TuningLimits
 
@@ -130,16 +128,13 @@ class Config:
     changes: ChangeLimits = field(default_factory=ChangeLimits)
     explain_recorder: RecorderLimits = field(default_factory=RecorderLimits)
     explain_controller: ControllerLimits = field(default_factory=ControllerLimits)
-    explain_search: SearchLimits = field(default_factory=SearchLimits)
-    explain_proof: ProofLimits = field(default_factory=ProofLimits)
     workers: WorkerLimits = field(default_factory=WorkerLimits)
     opening: OpeningLimits = field(default_factory=OpeningLimits)
 
     @property
     def explain(self) -> ExplainLimits:
         """Limits for the explanation of one recording."""
-        recorder, controller = self.explain_recorder, self.explain_controller
-        return ExplainLimits(recorder, controller, self.explain_search, self.explain_proof)
+        return ExplainLimits(self.explain_recorder, self.explain_controller)
 
 
 def read_config(path: Path | None) -> Config:

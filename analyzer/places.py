@@ -19,8 +19,11 @@ from pathlib import Path, PurePosixPath
 from typing import Any, TypeVar, cast
 from urllib.parse import unquote, urlsplit
 
-from analyzer.limits import STORAGE
 from identification.errors import InputError, NotNowError
+
+TRIES = 16
+"""Number of attempts of a failing request to shared storage, with growing waits: two minutes where it
+refuses, six where it accepts and never answers."""
 
 URL = re.compile(r"[a-z][a-z0-9+.-]+://", re.IGNORECASE)
 """Beginning of a URL; a drive letter is no scheme."""
@@ -76,7 +79,7 @@ def be_patient(path: Path) -> None:
         return
     import s3fs.core
 
-    s3fs.core.S3FileSystem.retries = STORAGE.tries
+    s3fs.core.S3FileSystem.retries = TRIES
     if hasattr(s3fs.core, "set_custom_error_handler"):
         s3fs.core.set_custom_error_handler(is_outage)
     logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # of unfinished requests when a run ends

@@ -19,10 +19,9 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from analyzer.config import PlantLimits
-from analyzer.limits import WAVES
 from analyzer.loop.decisions import Cause, Finding, Status
 from analyzer.plantwide.night import trace
-from analyzer.plantwide.wave import BESIDE, Wave, waves_in, waves_table
+from analyzer.plantwide.wave import BESIDE, REACH, Wave, waves_in, waves_table
 from proofs.common import command, parser_of, publish, table
 
 DAY_S = 86_400.0
@@ -36,8 +35,8 @@ GROUPED = 0.1
 def shape(rng: np.random.Generator, period: float) -> tuple[int, np.ndarray, np.ndarray]:
     """First line, noise and a wave of its own about a period, shape (m,) each."""
     line = DAY_S / period
-    first = max(int(line / WAVES.reach) - BESIDE, 0)
-    at = np.arange(first, int(line * WAVES.reach) + BESIDE)
+    first = max(int(line / REACH) - BESIDE, 0)
+    at = np.arange(first, int(line * REACH) + BESIDE)
     noise = 0.05 * (rng.standard_normal(at.size) + 1j * rng.standard_normal(at.size))
     width = max(0.01 * line, 1.0)
     own = rng.standard_normal(at.size) + 1j * rng.standard_normal(at.size)

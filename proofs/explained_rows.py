@@ -36,7 +36,7 @@ LOADS = {"load-step", "load-oscillation", "coupling"}
 WORN = ("backlash", "stiction", "backlash-quiet")
 """True causes that are worn valves."""
 WORSE = 1.005
-"""Ratio of rms misfits from which a model is worse: a hundredth of the mean square (proof.most_worse_in_band)."""
+"""Ratio of rms misfits from which a model is worse: a hundredth of the mean square, as in the proof."""
 EACH = 8
 """Loops of each kind of one draw of the world."""
 PARTS = ("loops", "valve by run", "valve by explain", "invented effect", "worse held out")

@@ -20,9 +20,8 @@ import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 
-from analyzer.finder.pair import FoundPair
+from analyzer.finder.pair import LAW_TOLD, SURE_PCT, FoundPair
 from analyzer.finder.pairs import found_pairs
-from analyzer.limits import FINDER
 from analyzer.loops.spec import LoopSpec, read_loops
 from analyzer.loops.tags import controller
 from benchmarks.world.__main__ import spec_of
@@ -105,7 +104,7 @@ def counted(names: list[str], values: np.ndarray, dt_s: float, stated: dict[str,
     """What is right and wrong of a bag."""
     found: Counter[str] = Counter(loops=sum(name.endswith(".OP") for name in names))
     for pair in found_pairs(values):
-        if pair.sure_pct < FINDER.sure_pct:
+        if pair.sure_pct < SURE_PCT:
             continue
         loop, same = names[pair.pv].rpartition(".")[0], _names(names, values, pair.op)
         right = names[pair.pv] == f"{loop}.PV" and f"{loop}.OP" in same
@@ -126,7 +125,7 @@ def _settings(pair: FoundPair, spec: LoopSpec, dt_s: float) -> Counter[str]:
     """Whether gain and integral time are those that are stated."""
     span = (spec.pv_hi or 100.0) - (spec.pv_lo or 0.0)
     pid = controller(spec, span)
-    if pid is None or pair.told < FINDER.law_told:
+    if pid is None or pair.told < LAW_TOLD:
         return Counter()
     kp, ti = pair.kp * span / (spec.op_hi - spec.op_lo), (pair.ti_samples or 0.0) * dt_s
     near_ti = ti == pid.ti_s or abs(ti / pid.ti_s - 1) < NEAR
@@ -144,14 +143,14 @@ def without_controllers(held: pd.DataFrame, seed: int) -> int:
     """Pairs that are told of the measurements of a plant alone, with the set points that never move."""
     still = [c for c in held if c.endswith(".SP") and held[c].nunique() == 1]
     _, values = in_disorder(held[[*still, *(c for c in held if c.endswith(".PV"))]], seed)
-    return sum(p.sure_pct >= FINDER.sure_pct for p in found_pairs(values))
+    return sum(p.sure_pct >= SURE_PCT for p in found_pairs(values))
 
 
 def of_nothing(seed: int) -> int:
     """Pairs that are told of forty tags of noise, drift and waves."""
     rng = np.random.default_rng(seed)
     values = strangers(np.cumsum(rng.normal(size=(3000, 8)), axis=0), 40, rng)[:, np.arange(40) % 5 != 3]
-    return sum(p.sure_pct >= FINDER.sure_pct for p in found_pairs(values))
+    return sum(p.sure_pct >= SURE_PCT for p in found_pairs(values))
 
 
 def main() -> None:

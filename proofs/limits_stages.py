@@ -45,7 +45,7 @@ from proofs.limits_samples import (
     weeks,
     wound,
 )
-from proofs.limits_sealed import of_controller, of_effects, of_recorder
+from proofs.limits_sealed import of_controller, of_recorder
 from proofs.plant import prepared, series, simulate, spec
 from proofs.valve_loops import corners
 from tuning.recommend import recommend
@@ -204,7 +204,5 @@ STAGES: dict[str, Callable[[Config], list[Any]]] = {
     "changes": of_changes,
     "explain_recorder": of_recorder,
     "explain_controller": of_controller,
-    "explain_search": of_effects,
-    "explain_proof": of_effects,
 }
 """Sections of the limits, and what asks the stage that each belongs to."""

@@ -14,7 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from identification.models import Backlash, Motion, Stiction, Valve
 from identification.record import Floats
 from identification.simulation.valve import thresholds
-from tuning.limits import METHOD
+
+PLAY_JUMP_SHARE = 0.02
+"""Slip jump over the stickband below which it counts as backlash: fifty jumps a stickband look like it."""
+JUMPS_MOST = 60  # Jumps per half cycle up to which stick-slip has branches of its own: far beyond what is met
 
 Complexes = NDArray[np.complex128]
 
@@ -89,7 +92,7 @@ def sliding(amplitude: ArrayLike, stickband: float, slip_jump: float) -> Complex
 def is_play(valve: Valve) -> bool:
     """Whether the valve has backlash, or stick-slip with a negligible jump."""
     return isinstance(valve, Backlash) or (
-        isinstance(valve, Stiction) and valve.slip_jump <= METHOD.play_jump_share * valve.stickband
+        isinstance(valve, Stiction) and valve.slip_jump <= PLAY_JUMP_SHARE * valve.stickband
     )
 
 
@@ -195,5 +198,5 @@ def branches(valve: Valve) -> tuple[Branch, ...]:
     if valve.motion is not Motion.RESTS:
         amplitude = width / (1.0 + np.cos(np.linspace(0.0, np.pi, TABLE_SIZE + 1)[:-1]))
         return (_branch(1, amplitude, sliding(amplitude * (1 + 1e-12), width, valve.slip_jump)),)
-    most = min(METHOD.jumps_most, int(np.ceil(6 * valve.stickband / valve.slip_jump)))
+    most = min(JUMPS_MOST, int(np.ceil(6 * valve.stickband / valve.slip_jump)))
     return tuple(_jump_branch(valve, jumps) for jumps in range(1, most + 1))

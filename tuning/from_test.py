@@ -10,8 +10,14 @@ from itertools import product
 
 from identification.models import Estimate, Fopdt, Integrator, Loop, Pid, Process
 from tuning.frequency_response import maximum_sensitivity
-from tuning.limits import METHOD
 from tuning.rules import effective_delay, simc
+
+TEST_TI = (0.6, 0.8, 1.0, 1.3)
+"""Integral times that are tried for settings from a test [of SIMC's Ti]: the error of a load step is Ti/Kp,
+which is flat about its least."""
+TEST_MS = 1.7
+"""Largest maximum sensitivity of settings from a test, wherever the process lies in its intervals. Source:
+Grimholt, Skogestad 2012: SIMC with tau_c = L has 1.6 to 1.7."""
 
 HALVINGS = 14
 """Halvings of the search for a gain; the last step is .01 %."""
@@ -49,7 +55,7 @@ def settings_from(process: Process, among: Sequence[Process], scan_s: float) -> 
     plain = simc(process, max(effective_delay(process, scan_s), 1e-9), scan_s)
     slow = simc(process, max(fastest, 1e-9), scan_s)
     found = []
-    for share in METHOD.test_ti:
+    for share in TEST_TI:
         ti_s = slow.ti_s * share
         pid = _strongest(replace(slow, ti_s=ti_s), among)
         if pid is not None:
@@ -64,7 +70,7 @@ def _strongest(pid: Pid, among: Sequence[Process]) -> Pid | None:
 
     def holds(kp: float) -> bool:
         trial = replace(pid, kp=kp)
-        return all(float(maximum_sensitivity(Loop(p, trial))) <= METHOD.test_ms for p in among)
+        return all(float(maximum_sensitivity(Loop(p, trial))) <= TEST_MS for p in among)
 
     low, high = 0.02 * pid.kp, 4.0 * pid.kp
     if not holds(low):

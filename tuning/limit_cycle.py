@@ -16,7 +16,16 @@ from identification.simulation.closed_loop import closed_loop, scan_step
 from tuning.describing import band
 from tuning.frequency_response import rejects_s, slowest_s
 from tuning.harmonic_balance import Balance, predicted_cycle
-from tuning.limits import METHOD
+
+CYCLE_PERIODS = 30
+"""Predicted periods that the confirmation of a limit cycle simulates at first: the study's loops settle
+within ten."""
+CYCLE_STEPS = 600000  # Steps that a confirmation may take in all: some 20 ms
+REST_SHARE = 0.45
+"""Amplitude of OP over the width of the backlash below which a loop does not cycle. Source: no cycle has less
+than half of it."""
+STEADY = 0.02
+"""Relative change of amplitude from one quarter of the record to the next below which a cycle is steady."""
 
 KICK = 1.0 + math.sqrt(5.0)
 """Kick in backlash widths at OP; irrational, so that the stem's travel never matches it exactly."""
@@ -91,11 +100,11 @@ def _verdict(op: Floats, width: float) -> str:
     """decays, steady, grows or moves: the amplitude of OP in the last two quarters."""
     n = op.size // 4
     before, now = 0.5 * np.ptp(op[-2 * n : -n]), 0.5 * np.ptp(op[-n:])
-    if now < METHOD.rest_share * width:
+    if now < REST_SHARE * width:
         return "decays"
     if now > 1e4 * width:
         return "grows"
-    return "steady" if abs(now / before - 1.0) < METHOD.steady else "moves"
+    return "steady" if abs(now / before - 1.0) < STEADY else "moves"
 
 
 def confirm(loop: Loop) -> Confirmed:
@@ -109,7 +118,7 @@ def confirm(loop: Loop) -> Confirmed:
     scale = max(4.0 * slowest_s(loop), _ramp_s(loop))
     if predicted is not None:
         kick, scale = max(kick, 3.0 * predicted.pv_amplitude), predicted.period_s
-    steps = int(min(max(METHOD.cycle_periods * scale / h, 2000), METHOD.cycle_steps))
+    steps = int(min(max(CYCLE_PERIODS * scale / h, 2000), CYCLE_STEPS))
     valve = loop.valve
     jumps = isinstance(valve, Stiction) and valve.motion is Motion.RESTS and valve.slip_jump > 0.0
     for factor in KICKS if jumps else KICKS[:1]:
@@ -144,6 +153,6 @@ def _settle(loop: Loop, steps: int, kick: float, width: float, predicted: Balanc
         cycle = _measured(last)
         if verdict == "steady" and cycle is not None and cycle.period_s * 4 < last.duration_s:
             return Confirmed(cycle, True, predicted)
-        if verdict == "grows" or 3 * steps > METHOD.cycle_steps:
+        if verdict == "grows" or 3 * steps > CYCLE_STEPS:
             return Confirmed(cycle, False, predicted)
         steps *= 3

@@ -15,11 +15,5 @@ class TuningLimits(Limits, section="tuning"):
     """
 
 
-class MethodLimits(Limits, section="method"):
-    """Numbers of rules, describing functions, limit cycles and forecasts; no plant changes them."""
-
-
 LIMITS = TuningLimits()
 """The default limits."""
-METHOD = MethodLimits()
-"""The default limits of the method."""

@@ -22,9 +22,9 @@ from tuning.describing import band, is_play
 from tuning.forecast import in_digits
 from tuning.frequency_response import integral_s, maximum_sensitivity, rejects_s, resonance_s
 from tuning.limit_cycle import Confirmed, Cycle, confirm
-from tuning.limits import LIMITS, METHOD, TuningLimits
+from tuning.limits import LIMITS, TuningLimits
 from tuning.ringing import ObservedRinging, error_ratio, from_ringing, process_of, sensitivity_at
-from tuning.rules import effective_delay, simc
+from tuning.rules import LAMBDA_PER_DELAY, TAU_C_PER_DELAY, effective_delay, simc
 from tuning.search import (
     Bench,
     Candidate,
@@ -315,12 +315,12 @@ def _simc_settings(
     """
     h, off = scan_step(loop), math.isinf(integral_s(loop.controller))
     delay = effective_delay(loop.process, h)
-    tau_c = METHOD.tau_c_per_delay * delay
+    tau_c = TAU_C_PER_DELAY * delay
     most = (limits.ms_most, *(limits.ms_most_sample for _ in others))
     lags = [one.process.time_constant_s for one in others if isinstance(one.process, Fopdt)]
     found: list[tuple[Pid, float]] = []
     for k in range(first, limits.slower_most):
-        if found and tau_c * limits.slower**k > METHOD.lambda_per_delay * delay:
+        if found and tau_c * limits.slower**k > LAMBDA_PER_DELAY * delay:
             break
         nominal = simc(loop.process, tau_c * limits.slower**k, h)
         times = np.geomspace(nominal.ti_s, min([nominal.ti_s, *lags]), INTEGRAL_TIMES)
@@ -340,7 +340,7 @@ def _integral_times(loop: Loop, others: Sequence[Loop], limits: TuningLimits) ->
     if not isinstance(process, Fopdt):
         return []  # two integrators in series are not stable
     delay = effective_delay(process, scan_step(loop)) + process.time_constant_s
-    slowest = (METHOD.lambda_per_delay + 1.0) * delay * abs(process.gain)
+    slowest = (LAMBDA_PER_DELAY + 1.0) * delay * abs(process.gain)
     most = (limits.ms_most, *(limits.ms_most_sample for _ in others))
     found: list[tuple[Pid, float]] = []
     for k in range(1, STEPS_ALONE):

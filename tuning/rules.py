@@ -7,14 +7,22 @@ from dataclasses import replace
 
 from identification.models import Fopdt, Integrator, Pid, Process
 from tuning.frequency_response import integral_s
-from tuning.limits import METHOD
+
+TAU_C_PER_DELAY = 1.5
+"""Closed-loop time constant over dead time of the nominal tuning. Source: the source study, section 5."""
+LEAST_DELAY_SHARE = 0.0005
+"""Least effective dead time over the time constant: without it a process without dead time gets infinite
+gain: a quarter of the study's least (T/L = 500)."""
+LAMBDA_PER_DELAY = 3.0
+"""Closed-loop time constant of the lambda rule over the dead time at least. Source: Olsen, Bialkowski 2002:
+three dead times keep the loop robust, as mills use the rule of Dahlin 1968."""
 
 
 def effective_delay(process: Process, scan_s: float = 0.0) -> float:
     """Dead time plus half a scan [s], the hold's share of it (Grimholt, Skogestad 2012, rule of the half)."""
     delay = process.dead_time_s + 0.5 * scan_s
     if isinstance(process, Fopdt):
-        return max(delay, METHOD.least_delay_share * process.time_constant_s)
+        return max(delay, LEAST_DELAY_SHARE * process.time_constant_s)
     return delay
 
 
@@ -27,7 +35,7 @@ def simc(process: Process, tau_c: float | None = None, scan_s: float = 0.0) -> P
     dead time, scan and tau_c.
     """
     delay = effective_delay(process, scan_s)
-    sum_s = delay + (METHOD.tau_c_per_delay * delay if tau_c is None else tau_c)
+    sum_s = delay + (TAU_C_PER_DELAY * delay if tau_c is None else tau_c)
     slope = process.slope
     if slope == 0.0 or sum_s <= 0.0:
         raise ValueError(
@@ -48,11 +56,11 @@ def lambda_settings(process: Process, scan_s: float = 0.0) -> Pid:
     if slope == 0.0 or delay <= 0.0:
         raise ValueError(f"the lambda rule needs gain and delay, has slope {slope:g} and L {delay:g} s")
     if isinstance(process, Integrator):
-        aim = METHOD.lambda_per_delay * delay
+        aim = LAMBDA_PER_DELAY * delay
         ti = 2.0 * aim + delay
         return Pid(ti / (slope * (aim + delay) ** 2), ti, scan_s=scan_s)
     lag = process.time_constant_s
-    aim = max(lag, METHOD.lambda_per_delay * delay)
+    aim = max(lag, LAMBDA_PER_DELAY * delay)
     return Pid(1.0 / (slope * (aim + delay)), lag, scan_s=scan_s)
 
 

@@ -28,6 +28,16 @@ from analyzer.loop import action
 from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, Status, counts
 from identification.estimation.backlash_stiction import WIDTHS
 
+REMEMBERED = 120  # Number of nights whose widths are stored [nights]: four months
+MOST_DEVIATION = 2.0
+"""Standard deviation of a logarithm beyond which a constant is unknown in a night: a factor of seven."""
+REPETITIONS = 60
+"""Number of stored repetitions of a programme's phase: some weeks of daily batches, a few days of hourly
+ones."""
+LEAST_DEVIATION = 0.01
+"""Least standard deviation of the logarithm of a constant from one night: a process is no better known than
+that."""
+
 NEEDED, EARLIER = 10.0, 0.1
 """Required evidence [nat], and standard deviation of a width's logarithm, of nights stored by earlier versions."""
 CONSTANTS = ("slope", "time_constant_s", "gain", "dead_time_s", "width", "slip_jump")
@@ -161,7 +171,7 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], config: C
     size, share_pct = float(row["oscillation_significance"] or 0.0), float(row["oscillating_pct"])
     sizes = row["period_s"], row["pv_amplitude_pct"], row["average_absolute_error_pct"]
     seen = Calm(row["night"], size, share_pct, *sizes)
-    phases = with_repetitions(now.phases, row, limits.repetitions)
+    phases = with_repetitions(now.phases, row, REPETITIONS)
     now = replace(now, night=row["night"], end_s=_span(row)[1], remedy=done, last=seen, phases=phases)
     return replace(now, kp=row["kp"], ti=row["ti"], told=tell(now, row, limits))
 
@@ -174,7 +184,7 @@ def _with_constants(now: Belief, row: Row, limits: BeliefLimits) -> Belief:
     for name in set(CONSTANTS) & said.keys():
         value, deviation = said[name]
         pool = constants.get(name, Pool())
-        constants[name] = pool.plus(value, deviation, limits.least_deviation, limits.most_deviation)
+        constants[name] = pool.plus(value, deviation, LEAST_DEVIATION, MOST_DEVIATION)
     return replace(now, constants=constants)
 
 
@@ -229,11 +239,11 @@ def _with_witness(now: Belief, share: float, row: Row, repaired_s: Sequence[floa
         constants = {k: pool for k, pool in constants.items() if k not in OF_VALVE}
     widths = () if another and found.width < now.valve.width else now.widths
     if "width" in said:
-        widths = (*widths, (row["night"], *said["width"]))[-limits.remembered :]
+        widths = (*widths, (row["night"], *said["width"]))[-REMEMBERED:]
     for name in CONSTANTS:
         if name in said:
             pool, (value, deviation) = constants.get(name, Pool()), said[name]
-            constants[name] = pool.plus(value, deviation, limits.least_deviation, limits.most_deviation)
+            constants[name] = pool.plus(value, deviation, LEAST_DEVIATION, MOST_DEVIATION)
     certain = ("" if another else now.valve.certain) or row["night"] if found.is_worn(limits) else ""
     return replace(now, valve=replace(found, certain=certain), constants=constants, widths=widths)
 

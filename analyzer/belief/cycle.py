@@ -21,6 +21,15 @@ from analyzer.columns import Row
 from analyzer.config import BeliefLimits
 from analyzer.loop.decisions import CAUSES, Action, Cause, counts
 
+PAIRS = 15  # Number of pairs of settings that are stored: two weeks
+LEAST_PCT = 0.5  # Confidence below which a cause is as good as excluded [%]
+SETTLE_NIGHTS = 3
+"""Nights with advised settings from which on the median pair is kept [nights]: a median needs three."""
+SETTLE_RATIO = 1.2
+"""Ratio by which the middle of the pairs must differ from the pair that is kept: what an engineer would not
+retype a setting for."""
+RECENT = 8  # Nights in which a change is searched for: a week
+
 WITH_PAIR = ("kp_new", "ti_new", "advice", "expected_period_s", "expected_pv_amplitude_pct")
 """Columns of a night for an advised pair of settings."""
 CHOICES = (Action.RETUNE, Action.REPAIR_VALVE, Action.CHECK_SETTINGS)
@@ -110,14 +119,14 @@ def _usual_size(before: CycleBelief, significance: float, limits: BeliefLimits) 
     off = way if way * before.off <= 0 else before.off + way
     if abs(off) >= limits.confirmed:
         return replace(before, usual=now, off=0, shift=math.exp(beyond))
-    usual = before.usual if way else before.usual + beyond / min(before.nights + 1, limits.recent)
+    usual = before.usual if way else before.usual + beyond / min(before.nights + 1, RECENT)
     return replace(before, usual=usual, off=off, shift=0.0)
 
 
 def _log_confidence(row: Row, limits: BeliefLimits) -> tuple[float, ...]:
     """Log confidence of the causes by one night. If its record lacks data, no cause is preferred, because the next
     record lacks the same."""
-    found = [max(row[f"osc_{c}_pct"] or 0.0, limits.least_pct) for c in CAUSES]
+    found = [max(row[f"osc_{c}_pct"] or 0.0, LEAST_PCT) for c in CAUSES]
     if row["lack"] and row["cause"] not in CAUSES:
         second = sorted(found)[-2]
         found = [min(x, second) for x in found]
@@ -180,7 +189,7 @@ def remedy_with_night(before: RemedyBelief, share: float, row: Row, limits: Beli
         votes[Action(action)] = votes.get(Action(action), 0.0) + 1.0
     pairs, advised, pair = before.pairs, before.advised, advised_pair(row)
     if pair is not None:
-        pairs, advised = (*pairs, pair)[-limits.pairs :], advised + 1
+        pairs, advised = (*pairs, pair)[-PAIRS:], advised + 1
     now = _settled_pair(replace(before, votes=votes, pairs=pairs, advised=advised), limits)
     return replace(now, action=_voted(now, limits))
 
@@ -205,12 +214,12 @@ def _settled_pair(now: RemedyBelief, limits: BeliefLimits) -> RemedyBelief:
     median. It is replaced if twice as many have and their median differs by a ratio and twice its standard error."""
     if now.held is None:
         return replace(now, held=now.pairs[-1] if now.pairs else None)
-    if now.advised < max(limits.settle_nights, 2 * now.settled):
+    if now.advised < max(SETTLE_NIGHTS, 2 * now.settled):
         return now
     places = np.array([p.at for p in now.pairs])
     middle = np.median(places, axis=0)
     scatter = TWO_SIGMA * np.median(np.abs(places - middle), axis=0) / math.sqrt(len(places))
-    near = np.maximum(math.log(limits.settle_ratio), scatter)
+    near = np.maximum(math.log(SETTLE_RATIO), scatter)
     if now.settled and (np.abs(np.array(now.held.at) - middle) <= near).all():
         return now
     held = now.pairs[int(np.argmin(np.abs(places - middle).max(axis=1)))]

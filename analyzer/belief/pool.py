@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from identification.estimation.descent import NINETY
-from identification.limits import INTERVALS
+from identification.estimation.descent import INTERVALS_WIDER, NINETY
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +48,7 @@ class Pool:
         the night is ignored."""
         if value == 0.0 or not math.isfinite(value) or not deviation <= most:
             return self
-        x, w = math.log(abs(value)), 1.0 / max(INTERVALS.wider * deviation, least) ** 2
+        x, w = math.log(abs(value)), 1.0 / max(INTERVALS_WIDER * deviation, least) ** 2
         sums = self.count + 1.0, self.total + x, self.weight + w, self.first + w * x, self.second + w * x * x
         return Pool(*sums, self.squares + w * w, math.copysign(1.0, value))
 

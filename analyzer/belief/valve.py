@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from analyzer.belief.cycle import RECENT
 from analyzer.config import BeliefLimits, Config
 from analyzer.loop.decisions import Cause, Fault
 from identification.estimation.backlash_stiction import WIDTHS
@@ -139,7 +140,7 @@ def valve_with_night(
     *each, against = wrong
     own, alone = (weighed(said, x, against, limits) for x in each)
     faded = [(n, share * np.asarray(p)) for n, p in before.recent]
-    recent = [*faded, (night, own)][-limits.recent :]
+    recent = [*faded, (night, own)][-RECENT:]
     summed = share * np.asarray(before.summed) + own if before.summed else own
     at = changed_at(summed, [p for _, p in recent], limits.change, limits.confirmed)
     if at is not None:

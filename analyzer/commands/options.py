@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from analyzer.night.nights import Plant, PlantLoop
     from analyzer.store.store import Store
 
+OLD_D = 7.0
+"""Age of the newest night beyond which run and summary report its age [d]: a week without an export is an
+accident."""
+
 Command = Callable[..., Any]
 SOME_LOST, NOTHING_DONE, AGAIN = 1, 2, 75
 """Exit status if some loops failed, if nothing could be done, and if shared storage failed for so long that a run
@@ -251,10 +255,9 @@ def age_told(night: str, zone: str) -> str:
     from datetime import date
 
     from analyzer.history.plant_clock import date_of
-    from analyzer.limits import PAGES
 
     days = (date.fromisoformat(date_of(time.time(), zone)) - date.fromisoformat(night)).days
-    if days <= PAGES.old_d:
+    if days <= OLD_D:
         return ""
     return f"Night {night} is {days} days old: check that the newest export was read."
 

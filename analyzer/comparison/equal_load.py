@@ -23,9 +23,9 @@ from analyzer.loop.decisions import Cause, Fault, counts
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller
 from identification.errors import InputError
-from identification.limits import SIGNALS
 from identification.models import Backlash, ErrorForm, Fopdt, Form, Loop, Pid, Stiction, Valve
 from identification.signals.robust import robust_deviation
+from identification.signals.spectrum import PEAK_BAND
 from tuning.forecast import in_digits, loop_in_digits, run, settled
 from tuning.frequency_response import loop_response, maximum_sensitivity
 
@@ -91,7 +91,7 @@ class LoopNight:
     @property
     def dt_s(self) -> float:
         """Interval of the record's samples [s], within a sixth."""
-        return float(1.0 / (2.0 * SIGNALS.peak_band * self.frequency[-1]))
+        return float(1.0 / (2.0 * PEAK_BAND * self.frequency[-1]))
 
 
 def pid_of(row: Mapping[str, Any], kp: float | None = None, ti: float | None = None) -> Pid | None:

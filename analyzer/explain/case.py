@@ -19,7 +19,6 @@ import numpy as np
 from analyzer.config import AdviceLimits, Config
 from analyzer.history.plant_clock import stamp
 from analyzer.history.series import Series
-from analyzer.limits import EXPLAIN
 from analyzer.loop.assess import judged_where
 from analyzer.loop.cause import NO_CAUSE, Verdict
 from analyzer.loop.cycling_span import detect_where_it_cycles
@@ -32,6 +31,7 @@ from analyzer.loop.measure import time_scale
 from analyzer.loop.oscillation import counting
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loop.sample_clock import onto_clock, snapped
+from analyzer.loop.tune import NEIGHBOURS
 from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import controller
@@ -41,8 +41,23 @@ from analyzer.night.opened import guarded
 from identification.controller.check import StatedSettings
 from identification.errors import InputError, NotAssessedError
 from identification.estimation.evidence import trials_between_moves
-from identification.mismatch.recording import Recording, SeenInCycles, coarser_by, is_experiment
+from identification.mismatch.recording import (
+    EXPERIMENT_SAMPLES,
+    SAMPLES_A_LAG,
+    Recording,
+    SeenInCycles,
+    coarser_by,
+    is_experiment,
+)
 from identification.record import Floats
+
+WHOLE_SAMPLES = 40000  # Samples up to which a recording is explained whole: 20 s of processor time
+STRETCH_SAMPLES = 15000
+"""Samples of the most informative stretch of a longer one: as much time, because a long recording contains
+more that requires an effect."""
+PART_SAMPLES = 300
+"""Samples of PV from which a part under other settings is judged: a noise model that looks 25 back needs
+twelve times that."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +76,7 @@ def tags_of(spec: LoopSpec, specs: Sequence[LoopSpec]) -> list[str]:
     """Tags for the explanation of a loop: its own, its measured load, and the OPs of some other loops."""
     others = [s.op for s in specs if s.loop != spec.loop and s.op]
     load = [] if spec.load is None else [spec.load]
-    return list(dict.fromkeys([*spec.tags, *load, *others[: EXPLAIN.neighbours]]))
+    return list(dict.fromkeys([*spec.tags, *load, *others[:NEIGHBOURS]]))
 
 
 def stated_law(spec: LoopSpec, prepared: Prepared, period_s: float, config: Config) -> StatedSettings | None:
@@ -156,7 +171,7 @@ def telling_stretch(prepared: Prepared, most: int | None) -> tuple[Prepared, str
     r = prepared.record
     if most is None or len(r) <= most:
         return prepared, ""
-    most = min(most, EXPLAIN.stretch_samples)
+    most = min(most, STRETCH_SAMPLES)
     travel = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(r.op)))))
     first = int(np.argmax(travel[most - 1 :] - travel[: len(r) - most + 1]))
     days = f"{most * r.dt_s / 86400:.1f} of {len(r) * r.dt_s / 86400:.1f} days"
@@ -169,7 +184,7 @@ def case(
     specs: tuple[LoopSpec, ...],
     series: dict[str, Series],
     config: Config,
-    most: int | None = EXPLAIN.whole_samples,
+    most: int | None = WHOLE_SAMPLES,
     fault: Fault | None = None,
 ) -> Case:
     """Prepare one loop; of a recording of more than `most` samples the most informative stretch, None for all;
@@ -225,9 +240,8 @@ def coarser(whole: Prepared, taught: Learned | None, config: Config, known: bool
         return whole
     e, record = taught.model.estimates, whole.record
     answer_s = e["dead_time_s"].value + (e["lags_s"].value if "lags_s" in e else 0.0)
-    limits = config.explain.search
-    factor = int(answer_s / (limits.samples_a_lag * record.dt_s))
-    factor = min(factor, len(record) // limits.experiment_samples)
+    factor = int(answer_s / (SAMPLES_A_LAG * record.dt_s))
+    factor = min(factor, len(record) // EXPERIMENT_SAMPLES)
     return whole if factor < 2 else replace(whole, record=record.thinned(factor))
 
 
@@ -292,7 +306,7 @@ def parts(
             name = f"{stamp(float(pv[0]), zone)} to {stamp(float(pv[-1]), zone)}"
             out.append(Part(in_force(spec, changes, float(pv[-1])), held, name, pv.size))
     out.sort(key=lambda p: -p.samples)
-    return [out[0], *(p for p in out[1:] if p.samples >= EXPLAIN.part_samples)]
+    return [out[0], *(p for p in out[1:] if p.samples >= PART_SAMPLES)]
 
 
 def parts_said(judged: Sequence[Part]) -> str:
@@ -342,7 +356,7 @@ def asked_cases(
     kept: list[tuple[Part, Case]] = []
     for part in judged:
         with nullcontext() if len(judged) == 1 else suppress(NotAssessedError):  # OP is constant in it
-            most = None if kept else EXPLAIN.whole_samples
+            most = None if kept else WHOLE_SAMPLES
             kept.append((part, case(part.spec, specs, part.series, asked.config, most, fault)))
     if not kept:
         raise NotAssessedError(f"{tag}: needs OP and PV that move in one part of its settings, has none")

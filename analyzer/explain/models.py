@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from analyzer.explain.case import Case
-from analyzer.limits import EXPLAIN
 from analyzer.loop.quality import Scale
 from identification.errors import InputError
 from identification.mismatch.answer import restored, unanswered
@@ -19,8 +18,17 @@ from identification.mismatch.explanation import Explanation
 from identification.mismatch.model_file import VERSION, carried, carried_closed, constants
 from identification.mismatch.proof import Misfit, misfit
 from identification.mismatch.recording import Recording
+from identification.mismatch.starts import HELD_OUT
 from identification.record import Floats
 from identification.simulation.parameters import Slot, neutral
+
+AS_GOOD = 1.05
+"""Ratio of two misfits up to which two models simulate alike: misfits of one baseline model from different
+starts agree within a hundredth."""
+
+LARGEST = 1000000000.0  # Size of a model's numbers at most, in percent and seconds
+RUNAWAY_PCT = 100000.0  # Size of simulated PV and OP at most [%]: a thousand ranges are no plant
+SPAN_DIFFERS = 0.01  # Relative difference of two PV spans from which a model's percent are not the record's
 
 HUNDRED = (60.0, 160.0)
 """Ratios of two gains that indicate percent against fractions; ours: a refit moves a gain by less."""
@@ -58,7 +66,7 @@ def checked(data: Mapping[str, Any], path: Path) -> None:
         return InputError(f"{path}: {seen}", expected, todo)
 
     held, scale = (data[k] if isinstance(data.get(k), dict) else {} for k in ("constants", "scale"))
-    placed, most = {k: data.get(k, 0.0) for k in ("middle_op_pct", "level_pv_pct", "late_s")}, EXPLAIN.largest
+    placed, most = {k: data.get(k, 0.0) for k in ("middle_op_pct", "level_pv_pct", "late_s")}, LARGEST
     for name, value in {**held, **placed, **scale}.items():
         number = not isinstance(value, bool) and isinstance(value, int | float)
         if not number or not abs(value) <= most:  # false of NaN
@@ -99,14 +107,14 @@ def judged(data: Mapping[str, Any], found: Explanation, s: Recording, more: str 
     more : further text about it.
     """
     out = carried(dict(data), s.op, s.pv, s.dt_s)
-    cut = int((1.0 - s.limits.proof.held_out) * s.pv.size)
+    cut = int((1.0 - HELD_OUT) * s.pv.size)
     window, (plain, better) = found.proven.window, found.proven.overall
     own = misfit(s.pv, out, window).rmse
     said = f"Your model leaves {own:.3g} % of span rms, the baseline model fitted again {plain.rmse:.3g} %"
     if found.accepted:
         said += f", the improved model {better.rmse:.3g} %"
     units = "" if unanswered(found) else wrong_units(constants(dict(data)), restored(found.plain.model.c))
-    verdict = "" if units else against_plain(own, plain.rmse, s.limits.proof.as_good)
+    verdict = "" if units else against_plain(own, plain.rmse, AS_GOOD)
     note = "; ".join(x for x in (said, verdict, units, more) if x) + "."
     fitted, held = misfit(s.pv[:cut], out[:cut], window), misfit(s.pv[cut:], out[cut:], window)
     return UserModel(out, fitted, held, note)
@@ -151,7 +159,7 @@ def span_note(now: Scale, brought: Mapping[str, Any]) -> str:
     """Note for a model made with another PV span than that of the record; otherwise empty."""
     scale = brought.get("scale")
     then = scale.get("pv_span") if isinstance(scale, dict) else None
-    if not isinstance(then, int | float) or abs(then / now.span - 1.0) < EXPLAIN.span_differs:
+    if not isinstance(then, int | float) or abs(then / now.span - 1.0) < SPAN_DIFFERS:
         return ""
     spans = f"it was made with a PV span of {then:.4g}, this record has {now.span:.4g}"
     return f"{spans}: its gain is off by their ratio"
@@ -196,7 +204,7 @@ def simulated(c: Case, data: dict[str, Any], stamps: Floats, closed: bool) -> tu
             pv = carried(data, op, pv, r.dt_s)
     except (ZeroDivisionError, OverflowError, FloatingPointError) as error:
         raise InputError(f"{c.spec.loop}: {error}", RUNS, "save the model again") from error
-    most = EXPLAIN.runaway_pct
+    most = RUNAWAY_PCT
     if not (np.abs(pv).max() <= most and np.abs(op).max() <= most):  # false of NaN
         raise InputError(f"{c.spec.loop}: PV or OP runs away", RUNS, "save the model again")
     at = r.start_s + r.time_s

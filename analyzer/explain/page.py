@@ -10,6 +10,7 @@ from analyzer.explain.words import NOTES, Data, number_text, places, rms, share,
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.pages.words import duration, number, stamp
 from analyzer.words.decision import decided
+from identification.mismatch.starts import HELD_OUT
 from identification.mismatch.words import check, located_sentence, remarks
 from reports.pages import Block, Facts, Page, Section, Table, Text, Tiles
 from reports.texts import slug
@@ -109,7 +110,7 @@ def _where_blocks(data: Data) -> tuple[Block, ...]:
 
 
 def _fit_note(e: Explained) -> str:
-    fit, share_held = e.data["fit"], 100 * e.found.p.limits.proof.held_out
+    fit, share_held = e.data["fit"], 100 * HELD_OUT
     held = NOTES["other_recordings" if e.found.others else "last_part"].format(share=share_held)
     horizon = fit["horizon_s"] and duration(fit["horizon_s"])
     anew = NOTES["anew"].format(horizon=horizon) if horizon else ""

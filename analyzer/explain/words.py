@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from analyzer.lanes.lanes import lanes_in
-from analyzer.limits import EXPLAIN
 from analyzer.loop.decisions import Action, Cause, Fault, Lane
 from analyzer.pages.words import duration, number, page_columns, plain_cell, texts
 from identification.mismatch import effect
@@ -17,6 +16,12 @@ from identification.mismatch.outside import about
 from identification.mismatch.selection import Candidate
 from identification.mismatch.words import discriminating_test, is_along, place
 from reports.pages import Cell, Table
+
+RATIO_ALONE = 10.0
+"""Factor by which a constant of the baseline model may move before gain and time constant are reported only
+by their ratio: an integrating level moved its gain from 0.114 to 2099, of which the record knows the slope
+alone."""
+HARDLY = 0.05  # Relative change of the baseline model's constants under which they count as kept
 
 Data = Mapping[str, Any]
 
@@ -129,7 +134,7 @@ def no_better(data: Data) -> str:
 def _constants(data: Data) -> dict[str, tuple[float, float]]:
     """The changed constants; gain over time constant if these changed so far that only their ratio is known."""
     known = dict(data["moved"])
-    if any(a and abs(b / a) > EXPLAIN.ratio_alone for a, b in (known["gain"], known["time_constant_s"])):
+    if any(a and abs(b / a) > RATIO_ALONE for a, b in (known["gain"], known["time_constant_s"])):
         gain, lag = (known.pop(k) for k in ("gain", "time_constant_s"))
         slope = tuple(k / t if t else math.nan for k, t in zip(gain, lag, strict=True))
         known = {"slope_pct_per_s": slope, **known}
@@ -144,7 +149,7 @@ def moved(data: Data) -> Table:
         for k, (a, b) in known.items()
     )
     most = max((abs(b / a - 1) if a else 0.0 for a, b in known.values()), default=0.0)
-    note = NOTES["kept" if most < EXPLAIN.hardly else "bent"]
+    note = NOTES["kept" if most < HARDLY else "bent"]
     return Table(
         "moved", "Changed constants of the baseline model", page_columns("constants_moved"), rows, note
     )

@@ -8,9 +8,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analyzer.finder.held import answers, nearness, tracked
+from analyzer.finder.beside import LIVE_SHARE
+from analyzer.finder.held import LEAST_MOVES, SLOW_BLOCKS, answers, nearness, tracked
 from analyzer.finder.law import Matrix, blocks
-from analyzer.limits import FINDER
+
+FOLLOWS = 0.3
+"""Correlation of these averages from which one may be the set point of the other: proofs/finder.md."""
+ABOUT = 0.7  # Distance of their means over the larger spread of both, at most: proofs/finder.md
+SET_POINTS = 2  # Tags that are tried as a set point of each [tags]: proofs/finder.md
+HELD = 2.0
+"""Nearness (natural log) of a set point that moves from which a tag is held at it: proofs/finder.md."""
+HELD_ALONE = 1.0  # How much nearer it must be than to any other tag: proofs/finder.md
+ANSWERS = 8.0
+"""Standard errors from which a tag moves at once with a set point [standard errors]: proofs/finder.md."""
+ANSWERS_ALONE = 2.5
+"""How much surer it must be than any other tag, and than with any other set point: proofs/finder.md."""
+UNLIKE = -0.05
+"""Log of a tag's slow moves over those of its error below which it is not held at a set point that moves:
+proofs/finder.md."""
+MANY = 500  # Tags from which one set point is tried of each [tags]: proofs/finder.md
 
 Cause = tuple[int, ...]
 """A tag that may be PV, or PV and SP with the difference as error."""
@@ -37,7 +53,7 @@ class Bag:
         first: dict[bytes, int] = {}
         same = np.array([first.setdefault(values[:, k].tobytes(), k) for k in range(values.shape[1])])
         own = same == np.arange(len(same))
-        least = max(FINDER.least_moves, FINDER.live_share * len(values))
+        least = max(LEAST_MOVES, LIVE_SHARE * len(values))
         live, moving = np.flatnonzero(own & (moved >= least)), np.flatnonzero(own & (moved > 0))
         return cls(values, tuple(live), tuple(np.flatnonzero(moved == 0)), tuple(moving), same)
 
@@ -50,7 +66,7 @@ def errors(bag: Bag) -> set[Cause]:
     """Pairs of tags that may be PV and SP, because one follows the other about its level."""
     if not bag.live or not bag.moving:
         return set()
-    width = max(len(bag.values) // FINDER.slow_blocks, 1)
+    width = max(len(bag.values) // SLOW_BLOCKS, 1)
     moving = np.array(bag.moving)
     slow = blocks(bag.values[:, moving], width)
     mean, spread = slow.mean(axis=0), np.maximum(slow.std(axis=0), 1e-9)
@@ -59,9 +75,9 @@ def errors(bag: Bag) -> set[Cause]:
     for i in np.flatnonzero(np.isin(moving, bag.live)):
         alike = unit.T @ unit[:, i] / len(unit)
         away = np.abs(mean - mean[i]) / np.maximum(spread, spread[i])
-        may = (alike > FINDER.follows) | twice
-        near = np.flatnonzero(may & (away < FINDER.about) & (np.arange(len(mean)) != i))
-        for k in near[np.argsort(-alike[near])][: FINDER.set_points if len(bag.live) < FINDER.many else 1]:
+        may = (alike > FOLLOWS) | twice
+        near = np.flatnonzero(may & (away < ABOUT) & (np.arange(len(mean)) != i))
+        for k in near[np.argsort(-alike[near])][: SET_POINTS if len(bag.live) < MANY else 1]:
             pair = int(moving[i]), int(moving[k])
             found.add(pair if pair[1] not in bag.live else (min(pair), max(pair)))
     return found
@@ -73,11 +89,11 @@ def held_at(bag: Bag) -> set[Cause]:
     moving = [k for k in bag.moving if k not in bag.live or bag.twice(k)]
     if len(bag.live) < 2 or not moving:
         return set()
-    unlike = tracked(bag.values[:, bag.live], bag.values[:, moving]) < FINDER.unlike
+    unlike = tracked(bag.values[:, bag.live], bag.values[:, moving]) < UNLIKE
     never = np.equal.outer(bag.live, moving) | (unlike & ~np.array([bag.twice(k) for k in moving]))
     near = np.where(never, 0.0, nearness(bag.values, bag.live, moving))
     best, (second, first) = np.argmax(near, axis=0), np.sort(near, axis=0)[-2:]
-    plain = (first >= FINDER.held) & (first - second >= FINDER.held_alone)
+    plain = (first >= HELD) & (first - second >= HELD_ALONE)
     return {(bag.live[best[k]], moving[k]) for k in np.flatnonzero(plain)}
 
 
@@ -89,10 +105,10 @@ def answering(bag: Bag, held: set[Cause]) -> dict[Cause, int]:
         return {}
     size = answers(bag.values, others, [sp for _, sp in pairs])
     found = {}
-    while size.max() >= FINDER.answers:
+    while size.max() >= ANSWERS:
         i, k = np.unravel_index(np.argmax(size), size.shape)
         most, size[i, k] = size[i, k], 0.0
-        if FINDER.answers_alone * max(size[i].max(), size[:, k].max()) <= most:
+        if ANSWERS_ALONE * max(size[i].max(), size[:, k].max()) <= most:
             found[pairs[k]] = others[i]
         size[i] = size[:, k] = 0.0
     return found

@@ -8,7 +8,11 @@ from numpy.typing import NDArray
 from analyzer.finder.bag import Bag, Cause, answering
 from analyzer.finder.scores import Scores
 from analyzer.finder.way import pv_and_sp
-from analyzer.limits import FINDER
+
+BETTER = 0.7  # Share of PV's unexplained part that may remain with a set point: proofs/finder.md
+LIKELY = 0.5  # Weight of a pair from which its set point is no PV and no OP: proofs/finder.md
+LINKED = 0.95  # Weight of a pair whose OP moves at once with the set point of its PV: proofs/finder.md
+LEAST_WEIGHT = 0.02  # Weight below which no pair is tested: proofs/finder.md
 
 
 def preferred(bag: Bag, scores: Scores) -> tuple[NDArray[np.float32], set[int], dict[Cause, int]]:
@@ -25,13 +29,13 @@ def preferred(bag: Bag, scores: Scores) -> tuple[NDArray[np.float32], set[int], 
         elif len(cause) > 1:
             each = np.max([scores.law[:, alone[k]] for k in cause], axis=0)
             own = scores.weight(slice(None), c)
-            near = own >= FINDER.likely * own.max(axis=0)
-            better = ((1 - scores.law[:, c] < FINDER.better * (1 - each)) & near).any(axis=0)
+            near = own >= LIKELY * own.max(axis=0)
+            better = ((1 - scores.law[:, c] < BETTER * (1 - each)) & near).any(axis=0)
             either = weight[[alone[k] for k in cause]].max(axis=0)
             weight[c] = np.where(better, np.maximum(weight[c], either), 0.0)
             j = int(np.argmax(weight[c]))
             sp = pv_and_sp(bag, scores, cause, bag.live[j])[1]
-            if not bag.twice(sp) and weight[c, j] > FINDER.likely:
+            if not bag.twice(sp) and weight[c, j] > LIKELY:
                 set_points.add(sp)
     single = [c for c, cause in enumerate(scores.causes) if len(cause) == 1]
     weight[[c for c in single if scores.causes[c][0] in set_points or c >= len(bag.live)]] = 0.0
@@ -49,7 +53,7 @@ def _keep(
     weight[alone[pv]] = weight[:, bag.live.index(pv)] = 0.0
     if op is not None:
         j = bag.live.index(op)
-        linked = max(float(weight[c, j]), FINDER.linked)
+        linked = max(float(weight[c, j]), LINKED)
         weight[c] = weight[:, j] = weight[alone[op]] = 0.0
         weight[c, j] = linked
 
@@ -62,14 +66,14 @@ def _by_law(scores: Scores, most: NDArray[np.float32]) -> set[Cause]:
         rivals = (cause for cause in own if len(cause) > 1 and held[1] in cause and held[0] not in cause)
         return max((float(own[cause]) for cause in rivals), default=0.0)
 
-    return {cause for cause in scores.held if other(cause) < max(FINDER.likely, float(own[cause]))}
+    return {cause for cause in scores.held if other(cause) < max(LIKELY, float(own[cause]))}
 
 
 def one_to_one(bag: Bag, scores: Scores, weight: NDArray[np.float32]) -> list[tuple[int, int]]:
     """Causes and tags in order of weight, each tag in at most one pair. A set point is then no cause of its own."""
     taken: set[int] = set()
     chosen = []
-    likely = np.flatnonzero(weight >= FINDER.least_weight)
+    likely = np.flatnonzero(weight >= LEAST_WEIGHT)
     for at in likely[np.argsort(-weight.ravel()[likely])]:
         c, j = divmod(int(at), weight.shape[1])
         cause, tag = scores.causes[c], bag.live[j]

@@ -10,7 +10,12 @@ from numpy.typing import NDArray
 
 from analyzer.history.export import Export
 from analyzer.history.series import Series
-from analyzer.limits import FINDER
+
+MOST_CELLS = 12000000  # Samples of all tags that are used; more are thinned: a minute and 2 GB for 3,000 tags
+LONGEST_S = 86400.0
+"""Time that is used, the last of the export [s]: a day has the set point moves of all shifts."""
+AT_ONCE = 100  # Tags that are read at a time [tags]: a day of samples a second of them is 150 MB
+GOOD_SHARE = 0.5  # Good samples of a tag, of all, below which it is left out
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,13 +49,13 @@ def sampled(
     """
     first, last = export.span()
     last = min(last, span[1])
-    first = max(first, span[0], last - FINDER.longest_s)
+    first = max(first, span[0], last - LONGEST_S)
     clock: NDArray[np.float64] | None = None
     texts: dict[str, NDArray[np.float64]] = {}
     names: list[str] = []
     columns: list[NDArray[np.float64]] = []
-    for k in range(0, len(tags), FINDER.at_once):
-        read = export.read(tags[k : k + FINDER.at_once])
+    for k in range(0, len(tags), AT_ONCE):
+        read = export.read(tags[k : k + AT_ONCE])
         if clock is None:
             clock = _clock(list(read.values()), first, last, len(tags))
         for tag, series in read.items():
@@ -60,7 +65,7 @@ def sampled(
             elif held is not None:
                 names.append(tag)
                 columns.append(held)
-        told(min(k + FINDER.at_once, len(tags)), len(tags))
+        told(min(k + AT_ONCE, len(tags)), len(tags))
     if clock is None or not columns:
         return Sampled((), np.empty((0, 0)), 1.0)
     return Sampled(tuple(names), np.column_stack(columns), float(clock[1] - clock[0]), texts)
@@ -70,7 +75,7 @@ def _clock(read: Sequence[Series], first: float, last: float, tags: int) -> NDAr
     """A clock with the most frequent interval of some tags, coarser if all tags would have too many samples."""
     steps = [float(np.median(np.diff(s.stamp_s))) for s in read if len(s.stamp_s) > 1]
     step = max(float(np.median(steps)) if steps else 1.0, 1e-3)
-    thinned = int(np.ceil((last - first) / step * tags / FINDER.most_cells))
+    thinned = int(np.ceil((last - first) / step * tags / MOST_CELLS))
     return (
         np.arange(first, last + step / 2, step * max(thinned, 1))
         if last > first
@@ -84,7 +89,7 @@ def _held(series: Series, clock: NDArray[np.float64]) -> NDArray[np.float64] | N
     if series.text is not None:
         value = np.unique(series.text.astype(str), return_inverse=True)[1].astype(float)
     good = ~series.bad & np.isfinite(value)
-    if good.sum() < 2 or good.sum() < FINDER.good_share * len(value):
+    if good.sum() < 2 or good.sum() < GOOD_SHARE * len(value):
         return None
     at = np.searchsorted(series.stamp_s[good], clock + 1e-6, side="right") - 1
     return np.asarray(value[good][np.maximum(at, 0)])

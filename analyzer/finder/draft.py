@@ -14,15 +14,20 @@ import numpy as np
 
 from analyzer.finder.beside import may_be_mode, modes, positions
 from analyzer.finder.clock import Sampled, sampled
-from analyzer.finder.pair import FoundPair, known_pair
+from analyzer.finder.held import LIMITED_SHARE
+from analyzer.finder.law import LEAST_BLOCKS
+from analyzer.finder.pair import LAW_TOLD, SURE_PCT, SUREST_PCT, FoundPair, known_pair
 from analyzer.finder.pairs import found_pairs
 from analyzer.finder.relations import at_rest, equal_at_times, halves, masters_of, ratios_to, scan_of
 from analyzer.finder.terms import terms_of
 from analyzer.history.export import Export
-from analyzer.limits import FINDER, HISTORY
 from analyzer.loops.spec import COLUMNS as STATED_COLUMNS
 from analyzer.loops.spec import RECORDED, ROLES, STATED, LoopSpec
 from analyzer.loops.tags import find_loops, match
+
+MA_LOW = 3.8
+"""Least value of a signal of 4 to 20 mA [mA]. Source: NAMUR NE 43: 3.8 to 20.5 mA are measured values."""
+MA_HIGH = 20.5  # Largest value of it [mA]. Source: NAMUR NE 43
 
 COLUMNS = (
     *(
@@ -46,7 +51,7 @@ SETTINGS = ("kp", "ti", "td", "td_filter", "pv_filter_s", "gain_unit")
 """Columns of the settings found by data."""
 HEAD = (
     "# A draft. Check first: rows found by data, then ranges that are only recorded (column ranges), then settings.",
-    f"# Rows behind # are less sure than {FINDER.sure_pct:g} %: remove the mark where they are right.",
+    f"# Rows behind # are less sure than {SURE_PCT:g} %: remove the mark where they are right.",
 )
 
 
@@ -76,7 +81,7 @@ class Row:
     @property
     def sure(self) -> bool:
         """Whether the row is confident enough; otherwise it is written commented out."""
-        return self.sure_pct >= FINDER.sure_pct
+        return self.sure_pct >= SURE_PCT
 
     @property
     def as_run(self) -> LoopSpec:
@@ -118,7 +123,7 @@ def _with_relations(held: Sampled, rows: Sequence[Row]) -> list[Row]:
     candidates for a valve that it shares."""
     own = [k for k, row in enumerate(rows) if row.found_by in ("names", "data") and row.sure]
     own = [k for k in own if rows[k].spec.pv in held.tags and rows[k].spec.op in held.tags]
-    if not own or len(held.values) < FINDER.least_blocks:
+    if not own or len(held.values) < LEAST_BLOCKS:
         return list(rows)
     specs = [rows[k].spec for k in own]
     pvs, ops = (held.of([str(getattr(s, role)) for s in specs]).values for role in ("pv", "op"))
@@ -136,7 +141,7 @@ def _with_relations(held: Sampled, rows: Sequence[Row]) -> list[Row]:
         if halves_of.get(i):
             said.append(f"{', '.join(others.tags[j] for j in halves_of[i])}: a half of its split range?")
         rests = at_rest(ops[:, i])
-        if rests >= FINDER.limited_share:
+        if rests >= LIMITED_SHARE:
             said.append(f"OP rests {100 * rests:.0f} % of the time: in manual, or at a limit")
         scan = scan_of(ops[:, i])
         if scan is not None:
@@ -170,7 +175,7 @@ def _without_ranges_of_currents(held: Sampled, rows: Sequence[Row]) -> list[Row]
     if len(found) < 2 or not len(held.values):
         return list(rows)
     outputs = held.of([str(row.spec.op) for row in found]).values
-    if not (outputs.min() >= HISTORY.ma_low and outputs.max() <= HISTORY.ma_high):
+    if not (outputs.min() >= MA_LOW and outputs.max() <= MA_HIGH):
         return list(rows)
     said = "its values lie between 4 and 20, like mA: state op_lo and op_hi"
     return [
@@ -185,21 +190,21 @@ def _named(held: Sampled, spec: LoopSpec) -> Row:
     """A loop by names, with type, ranges and settings from its data."""
     said = f"tags of one name: {', '.join(spec.tags)}"
     known = [tag for tag in (spec.pv, spec.op, spec.sp) if tag in held.tags]
-    if known[:2] != [spec.pv, spec.op] or len(held.values) < FINDER.least_blocks:
-        return Row(spec, "names", FINDER.surest_pct, said)
+    if known[:2] != [spec.pv, spec.op] or len(held.values) < LEAST_BLOCKS:
+        return Row(spec, "names", SUREST_PCT, said)
     own = held.of(known)
     pair = known_pair(own.values)
     shown = _shown(own, pair)
-    law = f"; {_law(own, pair)}" if pair.told >= FINDER.law_told and pair.kp else ""
+    law = f"; {_law(own, pair)}" if pair.told >= LAW_TOLD and pair.kp else ""
     found = replace(spec, type=type_of(spec.loop), pv_unit=unit_of(str(spec.pv)), **shown)
-    return Row(found, "names", FINDER.surest_pct, said + law + _beyond(shown, found.type))
+    return Row(found, "names", SUREST_PCT, said + law + _beyond(shown, found.type))
 
 
 def _stated(held: Sampled, spec: LoopSpec, with_tags: LoopSpec | None) -> Row:
     """A stated loop; if it has tags but no settings, with the settings from its data."""
     own_tags = () if with_tags is None else (with_tags.pv, with_tags.op, with_tags.sp)
     known = [tag for tag in own_tags if tag is not None and tag in held.tags]
-    if len(known) < 2 or len(held.values) < FINDER.least_blocks:
+    if len(known) < 2 or len(held.values) < LEAST_BLOCKS:
         return Row(spec, "stated", 100.0, "stated")
     own = held.of(known)
     pair = known_pair(own.values)
@@ -208,7 +213,7 @@ def _stated(held: Sampled, spec: LoopSpec, with_tags: LoopSpec | None) -> Row:
         return Row(spec, "stated", 100.0, f"stated; no settings: {_law(own, pair)}")
     settings = {name: shown[name] for name in SETTINGS if name in shown}
     found = replace(spec, **settings, ti_unit="s", stated=spec.stated | {*settings, "ti_unit"})
-    return Row(found, RECORDED, FINDER.sure_pct, f"stated but for its settings; {_law(own, pair)}")
+    return Row(found, RECORDED, SURE_PCT, f"stated but for its settings; {_law(own, pair)}")
 
 
 def found_told(rows: Sequence[Row]) -> tuple[str, ...]:
@@ -228,7 +233,7 @@ def found_told(rows: Sequence[Row]) -> tuple[str, ...]:
 def by_data(held: Sampled) -> list[Row]:
     """Loops found in the data of tags, with the position and the mode of the confident ones."""
     pairs = found_pairs(held.values)
-    sure = [p for p in pairs if p.sure_pct >= FINDER.sure_pct]
+    sure = [p for p in pairs if p.sure_pct >= SURE_PCT]
     outputs = {held.values[:, p.op].tobytes(): _name(held.tags[p.pv], held.tags[p.op]) for p in sure}
     beside = _beside(held, sure)
     return [_row(held, pair, outputs, beside.get(pair.op, {}) if pair in sure else {}) for pair in pairs]
@@ -269,7 +274,7 @@ def _row(held: Sampled, pair: FoundPair, outputs: dict[bytes, str], beside: dict
     says += f"; {spec.op} moves at once when {spec.sp} does" if pair.answers else ""
     says += f"; {spec.position} has the value of {spec.op}" if spec.position else ""
     says += f"; {spec.op} is constant only in one value of {spec.mode}" if spec.mode else ""
-    shown = _shown(held, pair, pair.sure_pct >= FINDER.sure_pct)
+    shown = _shown(held, pair, pair.sure_pct >= SURE_PCT)
     return Row(replace(spec, **shown), "data", pair.sure_pct, says + _beyond(shown, spec.type))
 
 
@@ -284,7 +289,7 @@ def _shown(held: Sampled, pair: FoundPair, certain: bool = True) -> dict[str, An
     terms = _terms(held, pair, (pv_lo, pv_hi), (op_lo, op_hi)) if certain else {}
     if terms:
         return {**shown, **terms}
-    if pair.told < FINDER.law_told or not pair.kp or pair.ti_samples is None:
+    if pair.told < LAW_TOLD or not pair.kp or pair.ti_samples is None:
         return shown
     ti = 0.0 if math.isinf(pair.ti_samples) else pair.ti_samples * held.dt_s
     return {**shown, "kp": pair.kp, "ti": ti, "gain_unit": "engineering"}
@@ -335,7 +340,7 @@ def _joined(found: Sequence[Row], open_loops: Sequence[LoopSpec]) -> list[Row]:
     for spec in open_loops:
         seen = by_pv.pop(spec.pv, None)
         if seen is None:
-            rows.append(Row(spec, "names", FINDER.surest_pct, "a PV by its name; no OP is seen"))
+            rows.append(Row(spec, "names", SUREST_PCT, "a PV by its name; no OP is seen"))
             continue
         known = {role: getattr(spec, role) or getattr(seen.spec, role) for role in ROLES}
         rows.append(replace(seen, spec=replace(seen.spec, loop=spec.loop, **known)))

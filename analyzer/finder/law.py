@@ -14,7 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analyzer.limits import FINDER
+WIDTHS = (1, 4, 16, 64)
+"""Lengths of the blocks of samples between whose averages moves are compared [samples]: proofs/finder.md;
+noise of a recorder shrinks in blocks, and a law does not."""
+LEAST_BLOCKS = 150  # Blocks that a length must leave [blocks]: proofs/finder.md
+PAST = 4  # Moves of a tag's own past that are removed from its innovations [blocks]: proofs/finder.md
 
 Matrix = NDArray[np.float64]
 TINY = 1e-12
@@ -49,8 +53,8 @@ class Moves:
 
     def at(self, rows: NDArray[np.int64]) -> Moves:
         """Some of the moves, with innovations for those that are late enough."""
-        late = rows[rows >= FINDER.past]
-        return Moves(self.value[late], self.integral[late], self.innovation[late - FINDER.past])
+        late = rows[rows >= PAST]
+        return Moves(self.value[late], self.integral[late], self.innovation[late - PAST])
 
     def of_tags(self, count: int) -> Moves:
         """The first tags alone."""
@@ -59,7 +63,7 @@ class Moves:
 
 def widths(samples: int) -> tuple[int, ...]:
     """Lengths of blocks [samples] for which there are enough blocks."""
-    return tuple(w for w in FINDER.widths if samples // w >= FINDER.least_blocks) or (1,)
+    return tuple(w for w in WIDTHS if samples // w >= LEAST_BLOCKS) or (1,)
 
 
 def explained_share(causes: Moves, effects: Moves) -> Matrix:
@@ -150,7 +154,7 @@ def _unit(columns: Matrix) -> Matrix:
 
 def innovations(value: Matrix) -> Matrix:
     """Residual of moves, shape (n, tags), not explained by each tag's own past; shape (n - past, tags)."""
-    past = FINDER.past
+    past = PAST
     out = np.empty((len(value) - past, value.shape[1]))
     for k in range(value.shape[1]):
         lagged = np.column_stack([value[past - 1 - i : len(value) - 1 - i, k] for i in range(past)])

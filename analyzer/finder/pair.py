@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.finder.bag import Bag
-from analyzer.finder.held import free_moves
+from analyzer.finder.held import LEAST_MOVES, free_moves
 from analyzer.finder.law import (
     TINY,
     Matrix,
@@ -18,7 +18,28 @@ from analyzer.finder.law import (
     shared_noise,
     widths,
 )
-from analyzer.limits import FINDER
+
+LEAST_NOISE = 0.2  # Share of the innovations that PV and OP have in common at least: proofs/finder.md
+SECOND = 0.7  # Weight of the next best tag over that of the pair, at most: proofs/finder.md
+TURNED = 2.0  # Signs that show which of two tags is OP: law and set point together: proofs/finder.md
+SURE_PCT = 90.0
+"""Probability below which a loop is written commented out; that of a pair whose weakest sign is just enough
+[%]: proofs/finder.md."""
+SUREST_PCT = 99.0  # Largest probability reported [%]: proofs/finder.md
+OTHER = 0.9
+"""Share that PV explains of OP with SP, of that of the best other tag, from which a pair is sure: of
+benchmarks/world, bags of the seeds 49 to 56, a sensor that follows PV had .83, no right pair less than .94
+(proofs/finder.md)."""
+ACTS = 5.0  # Standard errors of the integral from which it acts [standard errors]: proofs/finder.md
+LAW_TOLD = 0.9
+"""Share of the moves that the law must explain before its settings are written: proofs/finder.md."""
+AGREED = 0.15  # Share by which two estimates of an integral time may differ for a report: proofs/finder.md
+ALONE = 0.1  # Integral time over the length of the record from which P acts alone: proofs/finder.md
+ACTING = 0.5
+"""Share of the weight and of the noise that is enough if a set point supports a pair: proofs/finder.md."""
+DIRECT = 0.5
+"""Evidence for a pair whose OP rises with PV if the law does not show which is OP: a follower looks so:
+proofs/finder.md."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,20 +86,20 @@ class FoundPair:
     def sure_pct(self) -> float:
         """Confidence of the pair [%], by its weakest criterion: the weight, the runners-up, and which tag is OP. An
         OP that rises with PV may be the PV of a follower if no other criterion distinguishes them."""
-        less = FINDER.acting if self.acts else 1.0
+        less = ACTING if self.acts else 1.0
         law = (
             self.weight / (self.asked * less),
-            self.noise / (FINDER.least_noise * (less if self.resolved else FINDER.acting)),
-            FINDER.second * np.log1p(-min(self.weight, 1.0 - TINY)) / np.log1p(-max(self.runner_up, TINY)),
-            np.inf if self.kp >= 0.0 or self.towards >= 1.0 else FINDER.direct,
+            self.noise / (LEAST_NOISE * (less if self.resolved else ACTING)),
+            SECOND * np.log1p(-min(self.weight, 1.0 - TINY)) / np.log1p(-max(self.runner_up, TINY)),
+            np.inf if self.kp >= 0.0 or self.towards >= 1.0 else DIRECT,
         )
         signs = (
             *(() if self.answers else law),
-            self.law / max(FINDER.other * self.other, TINY),
-            (self.towards + self.freer + self.nearer) / FINDER.turned,
+            self.law / max(OTHER * self.other, TINY),
+            (self.towards + self.freer + self.nearer) / TURNED,
         )
-        odds = FINDER.sure_pct / (100.0 - FINDER.sure_pct) * max(min(signs), 0.0) ** 2
-        return float(min(100.0 * odds / (1.0 + odds), FINDER.surest_pct))
+        odds = SURE_PCT / (100.0 - SURE_PCT) * max(min(signs), 0.0) ** 2
+        return float(min(100.0 * odds / (1.0 + odds), SUREST_PCT))
 
 
 def known_pair(values: Matrix) -> FoundPair:
@@ -88,7 +109,7 @@ def known_pair(values: Matrix) -> FoundPair:
     columns, each = np.column_stack([error, values[:, 1]]), widths(len(values))
     moves = [Moves.of(columns, width) for width in each]
     law = np.array([explained_share(m, m)[0, 1] for m in moves])
-    told = int(np.argmax(law >= min(FINDER.law_told, law.max())))
+    told = int(np.argmax(law >= min(LAW_TOLD, law.max())))
     noise = float(shared_noise(moves[told], moves[told])[0, 1])
     found = FoundPair(0, 1, sp, float(law[told]), noise, each[told], 1.0, 0.0)
     return with_settings(Bag.of(values), replace(found, told=float(law[told]), told_width=each[told]))
@@ -101,7 +122,7 @@ def with_settings(bag: Bag, pair: FoundPair) -> FoundPair:
     moves, rows = Moves.of(np.column_stack([error, op]), pair.told_width), free_moves(op, pair.told_width)
     rows = rows[(rows > 0) & (rows < len(moves.value) - 1)]
     moved, wanted, summed = moves.value[rows, 0], moves.value[rows, 1], moves.integral[rows, 0]
-    if len(rows) < FINDER.least_moves:
+    if len(rows) < LEAST_MOVES:
         return replace(pair, kp=0.0, ti_samples=None)
     slope, deviation = fitted(wanted, moved, summed)
     kp, repeats = -float(slope[0]), float(slope[1] / (slope[0] or TINY))
@@ -109,8 +130,8 @@ def with_settings(bag: Bag, pair: FoundPair) -> FoundPair:
     beside = level[rows - 1] + level[rows + 2]
     beside = beside - beside.mean()
     other = float(beside @ (wanted - slope[0] * moved) / ((beside @ summed) or TINY) / (slope[0] or TINY))
-    surely = abs(slope[0]) / (abs(slope[1]) + FINDER.acts * deviation[1])
-    if surely > FINDER.alone * len(bag.values):
+    surely = abs(slope[0]) / (abs(slope[1]) + ACTS * deviation[1])
+    if surely > ALONE * len(bag.values):
         return replace(pair, kp=kp, ti_samples=np.inf)
-    agreed = min(repeats, other) > 0.0 and abs(repeats / other - 1.0) < FINDER.agreed
+    agreed = min(repeats, other) > 0.0 and abs(repeats / other - 1.0) < AGREED
     return replace(pair, kp=kp, ti_samples=1.0 / other if agreed else None)

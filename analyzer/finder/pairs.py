@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from analyzer.finder.bag import Bag
 from analyzer.finder.choice import one_to_one, preferred
 from analyzer.finder.held import (
+    CERTAIN,
     alike,
     apart,
     by_chance,
@@ -22,11 +23,15 @@ from analyzer.finder.held import (
     nearness,
     resting_level,
 )
-from analyzer.finder.law import Matrix, explained_by_errors, widths
-from analyzer.finder.pair import FoundPair, with_settings
+from analyzer.finder.law import LEAST_BLOCKS, WIDTHS, Matrix, explained_by_errors, widths
+from analyzer.finder.pair import LAW_TOLD, LEAST_NOISE, SECOND, FoundPair, with_settings
 from analyzer.finder.scores import Scores, scored
 from analyzer.finder.way import acts, freer, pv_and_sp, resolved, towards
-from analyzer.limits import FINDER
+
+WEIGHTS = (0.04, 0.5, 0.7, 0.9)
+"""Weight of a pair from which it counts, by the lengths of blocks: many tags share slow moves:
+proofs/finder.md."""
+LONGEST = 64  # Length of blocks from which a PV alone is believed again [samples]: proofs/finder.md
 
 
 def found_pairs(values: Matrix) -> list[FoundPair]:
@@ -38,7 +43,7 @@ def found_pairs(values: Matrix) -> list[FoundPair]:
         On one clock, without gaps, each in its own unit.
     """
     bag = Bag.of(values)
-    if len(bag.live) < 2 or len(values) < FINDER.least_blocks:
+    if len(bag.live) < 2 or len(values) < LEAST_BLOCKS:
         return []
     scores = scored(bag)
     weight, set_points, answer = preferred(bag, scores)
@@ -92,13 +97,13 @@ def _pair(
     law, noise = (np.asarray(x[:, c, j], dtype=float) for x in (scores.law, scores.noise))
     if any(map(limited, held.T)):
         law, noise = law_of(held, scores.widths)
-    may = [True, *(len(cause) > 1 or width >= FINDER.longest for width in scores.widths[1:])]
+    may = [True, *(len(cause) > 1 or width >= LONGEST for width in scores.widths[1:])]
     asked = asked_of(scores.widths)
     w = int(np.argmax(np.where(may, _enough(law * np.sqrt(noise), noise, asked), 0.0)))
     one = np.array(bag.live)[scores.alike[[j, bag.live.index(pv)]].any(axis=0)]
     others = np.flatnonzero(~np.isin(bag.live, [k for k in (pv, sp, tag, *slaves, *one) if k is not None]))
     rivals = scores.weight(w, others, j)
-    told = int(np.argmax(law >= min(FINDER.law_told, law.max())))
+    told = int(np.argmax(law >= min(LAW_TOLD, law.max())))
     return FoundPair(
         int(pv),
         int(tag),
@@ -107,10 +112,10 @@ def _pair(
         noise=float(noise[w]),
         width=scores.widths[w],
         asked=float(asked[w]),
-        runner_up=float(np.max(rivals, where=rivals > FINDER.second * taken[others], initial=0.0)),
+        runner_up=float(np.max(rivals, where=rivals > SECOND * taken[others], initial=0.0)),
         towards=towards(held, scores, c, j),
         freer=freer(bag.values[:, pv], bag.values[:, tag], sp is None)
-        + FINDER.certain * (float(bag.twice(tag)) - float(bag.twice(pv))),
+        + CERTAIN * (float(bag.twice(tag)) - float(bag.twice(pv))),
         resolved=resolved(held, scores.widths[w]),
         told=float(law[told]) if sp is not None or w == 0 else 0.0,  # SP may have moved both
         told_width=scores.widths[told],
@@ -119,12 +124,12 @@ def _pair(
 
 def asked_of(each: Sequence[int]) -> Matrix:
     """Required weight of a pair at each width."""
-    return np.array([FINDER.weights[FINDER.widths.index(width)] for width in each])
+    return np.array([WEIGHTS[WIDTHS.index(width)] for width in each])
 
 
 def _enough(weight: NDArray[Any], noise: NDArray[Any], asked: Matrix) -> Matrix:
     """Ratio of weight and of shared noise to the required values: the smaller one, by width."""
-    return np.asarray(np.minimum(weight / asked, noise / FINDER.least_noise))
+    return np.asarray(np.minimum(weight / asked, noise / LEAST_NOISE))
 
 
 def _with_set_points(bag: Bag, scores: Scores, pairs: Sequence[FoundPair]) -> list[FoundPair]:
@@ -211,7 +216,7 @@ def _with_set_point(bag: Bag, pair: FoundPair, near: Matrix, k: int | None, free
         pv, op = nearness(bag.values, (pair.pv, pair.op), [pair.sp])[:, 0]
     else:
         pv, op = (0.0, 0.0) if k is None else near[:, k]
-    most = FINDER.certain * (1 if pair.sp is None and (k is None or free[k] in bag.still) else 2)
+    most = CERTAIN * (1 if pair.sp is None and (k is None or free[k] in bag.still) else 2)
     pv, op = max(pv, 0.0), max(op, 0.0)  # a distance from one tag is no evidence for the other
     turned = _turned(replace(pair, nearer=float(np.clip(pv - op, -most, most))))
     if pair.sp is None and k is not None and near[int(turned.pv != pair.pv), k] > 0.0:
@@ -227,7 +232,7 @@ def _of_error(bag: Bag, pair: FoundPair, sp: int) -> FoundPair:
     held, each = np.column_stack([tags[:, 0] - tags[:, 1], tags[:, 2]]), widths(len(tags))
     law, noise = law_of(held, each)
     w = int(np.argmax(_enough(law * np.sqrt(noise), noise, asked_of(each))))
-    told = int(np.argmax(law >= min(FINDER.law_told, law.max())))
+    told = int(np.argmax(law >= min(LAW_TOLD, law.max())))
     found = replace(
         pair,
         law=float(law[w]),
@@ -238,7 +243,7 @@ def _of_error(bag: Bag, pair: FoundPair, sp: int) -> FoundPair:
         told=float(law[told]),
         told_width=each[told],
     )
-    best = max(found, pair, key=lambda p: min(p.weight / p.asked, p.noise / FINDER.least_noise))
+    best = max(found, pair, key=lambda p: min(p.weight / p.asked, p.noise / LEAST_NOISE))
     return replace(best, acts=acts(tags, each[told]))
 
 

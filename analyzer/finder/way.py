@@ -5,16 +5,33 @@ from __future__ import annotations
 import numpy as np
 
 from analyzer.finder.bag import Bag, Cause
-from analyzer.finder.held import at_no_limit, limited, slower
+from analyzer.finder.held import CERTAIN, LEAST_MOVES, at_no_limit, limited, slower
 from analyzer.finder.law import TINY, Matrix, Moves, blocks, direction, fitted, innovations
 from analyzer.finder.scores import Scores
-from analyzer.limits import FINDER
+
+RESOLVED = 0.7
+"""Correlation of neighbouring averages from which their order shows cause and effect: proofs/finder.md."""
+ERRORS = 25.0
+"""Standard errors of the law one way round over the other that count as one [standard errors]: of
+benchmarks/world, bags of the seeds 49 to 56, and plants the direction is right in 243 of 244 loops from 30
+standard errors on, and wrong in 7 of 14 below (proofs/finder.md)."""
+SELDOM = 0.7  # Moves of a set point over those of its PV, at most: proofs/finder.md
+LATER = 6  # Samples within which PV follows OP, and a set point does not [samples]: proofs/finder.md
+DRIFT = 4.0  # Weight of a factor e between the slow shares of OP and PV: proofs/finder.md
+DRIFT_CERTAIN = 1.5  # Largest weight of drift as a sign of which of two tags is OP: proofs/finder.md
+AT_LIMITS = 2.0  # Weight of the sign that only one of two tags is at an extreme: proofs/finder.md
+TELLING = 0.5  # Share explained by the law, from which it shows which of two tags is OP: proofs/finder.md
+AS_PV = 5.0  # Largest ratio of the effects of SP and PV on OP, and of the inverse: proofs/finder.md
+COPIED = 0.85  # Share of innovations from which one tag is another in its own scale: proofs/finder.md
+STEPS = 0.1
+"""Moves of a tag over those of another from which it moves in steps and is the set point of both:
+proofs/finder.md."""
 
 
 def freer(pv: Matrix, op: Matrix, still: bool) -> float:
     """How much more OP moves like an output than PV: it rests at its limits and, with constant SP, drifts."""
-    drift = np.clip(slower(pv, op) * FINDER.drift, -FINDER.drift_certain, FINDER.drift_certain) * still
-    return float(drift + FINDER.at_limits * (float(limited(op)) - float(limited(pv))))
+    drift = np.clip(slower(pv, op) * DRIFT, -DRIFT_CERTAIN, DRIFT_CERTAIN) * still
+    return float(drift + AT_LIMITS * (float(limited(op)) - float(limited(pv))))
 
 
 def towards(held: Matrix, scores: Scores, c: int, j: int) -> float:
@@ -22,11 +39,11 @@ def towards(held: Matrix, scores: Scores, c: int, j: int) -> float:
     evidence among those with similar neighbouring averages, because an undersampled cycle is no evidence."""
     found = [0.0]
     for width, moves, law in zip(scores.widths, scores.moves, scores.law[:, c, j], strict=True):
-        if law >= FINDER.telling and resolved(held, width):
+        if law >= TELLING and resolved(held, width):
             rows = at_no_limit(held, width)
-            if len(rows) >= FINDER.least_moves:
+            if len(rows) >= LEAST_MOVES:
                 found.append(direction(moves, c, j, rows))
-    return float(np.clip(max(found, key=abs) / FINDER.errors, -FINDER.certain, FINDER.certain))
+    return float(np.clip(max(found, key=abs) / ERRORS, -CERTAIN, CERTAIN))
 
 
 def acts(tags: Matrix, width: int) -> bool:
@@ -34,14 +51,14 @@ def acts(tags: Matrix, width: int) -> bool:
     moves = Moves.of(tags, width)
     error = moves.integral[:, 0] - moves.integral[:, 1]
     slope, _ = fitted(moves.value[:, 2], moves.value[:, 0], moves.value[:, 1], error)
-    return bool(1.0 / FINDER.as_pv < -slope[1] / (slope[0] or TINY) < FINDER.as_pv)
+    return bool(1.0 / AS_PV < -slope[1] / (slope[0] or TINY) < AS_PV)
 
 
 def resolved(held: Matrix, width: int) -> bool:
     """Whether neighbouring averages of all tags are similar, shape (n, tags)."""
     x = blocks(held, width)
     x = x - x.mean(axis=0)
-    return bool(((x[1:] * x[:-1]).sum(axis=0) >= FINDER.resolved * (x**2).sum(axis=0)).all())
+    return bool(((x[1:] * x[:-1]).sum(axis=0) >= RESOLVED * (x**2).sum(axis=0)).all())
 
 
 def pv_and_sp(bag: Bag, scores: Scores, cause: Cause, op: int) -> tuple[int, int]:
@@ -50,14 +67,14 @@ def pv_and_sp(bag: Bag, scores: Scores, cause: Cause, op: int) -> tuple[int, int
     pv, sp = cause
     moved = [int((np.diff(bag.values[:, k]) != 0).sum()) for k in cause]
     held = [_held_elsewhere(bag, scores, k, (*cause, op)) for k in cause]
-    seldom = min(moved) < FINDER.seldom * max(moved)
-    if held[0] != held[1] and min(moved) > FINDER.steps * max(moved):
+    seldom = min(moved) < SELDOM * max(moved)
+    if held[0] != held[1] and min(moved) > STEPS * max(moved):
         swap = held[0]
     elif seldom:
         swap = moved[0] < moved[1]
     else:
         left = innovations(np.diff(bag.values[:, [*cause, op]], axis=0))
-        after = [[np.dot(left[:-k, 2], left[k:, i]) ** 2 for k in range(1, FINDER.later)] for i in (0, 1)]
+        after = [[np.dot(left[:-k, 2], left[k:, i]) ** 2 for k in range(1, LATER)] for i in (0, 1)]
         swap = sum(after[0]) / np.dot(left[:, 0], left[:, 0]) < sum(after[1]) / np.dot(left[:, 1], left[:, 1])
     return (sp, pv) if swap else (pv, sp)
 
@@ -67,4 +84,4 @@ def _held_elsewhere(bag: Bag, scores: Scores, tag: int, own: Cause) -> bool:
     if bag.twice(tag) or tag not in bag.live:
         return bag.twice(tag)
     others = np.flatnonzero(~np.isin(bag.live, own))
-    return bool(scores.noise[0, bag.live.index(tag), others].max(initial=0.0) > FINDER.copied)
+    return bool(scores.noise[0, bag.live.index(tag), others].max(initial=0.0) > COPIED)

@@ -18,7 +18,28 @@ from numpy.typing import NDArray
 from analyzer.history.plant_clock import DAY_S, HOUR_S
 from analyzer.history.stamps import Fields, fields, midnights_told, stamp_seconds
 from analyzer.history.table import WORDS, as_text, is_text, numbers
-from analyzer.limits import HISTORY
+
+EARLIEST_S = -11676096000.0
+"""Stamps before it are invalid, counted from 1970 [s]: the year 1600; later ones that stray are reported."""
+LATEST_S = 10413792000.0  # Stamps from it on are invalid [s]: the year 2300
+EXCEL_DAYS = 4000.0  # Span that stamps in Excel days may have [d]: numbers that rise further count seconds
+LEAST_MS_STEP = 100.0
+"""Steps of a clock without a unit from which it counts milliseconds where they are no whole minutes."""
+AUTUMN_SAMPLES = 12
+"""Samples in the hours about an autumn change from which their number shows whether an hour came twice: one
+in five minutes."""
+IN_SPRING = 0.25
+"""Samples in the hour that spring leaves out, over those of its neighbours, beyond which a clock stays in
+winter time: 0 where it is changed, 1 where not."""
+IN_AUTUMN = 1.5
+"""The same in the hour that autumn repeats, below which it does: 2 where it is changed, 1 where not."""
+TYPICAL_STEPS = 3.0
+"""Typical steps that a step over the change may take where the clock does not run backwards."""
+LEAST_STEP_S = 1e-5
+"""Interval of samples below which a unit in the name of a time column is not used [s]: drives are sampled at
+100 kHz at most."""
+MOST_STEP_S = 1e5
+"""Interval of samples above which it is not used [s]: more than a sample a day is no trend of a loop."""
 
 TICKS_PER_S = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 
@@ -126,7 +147,7 @@ class Clock:
         """Seconds since 1970-01-01 on the file's clock, NaN where unreadable; True where that is local."""
         second, local = self._seconds(arrays)
         with np.errstate(invalid="ignore"):
-            known = (second >= HISTORY.earliest_s) & (second < HISTORY.latest_s)
+            known = (second >= EARLIEST_S) & (second < LATEST_S)
         second = np.where(known, second, np.nan)
         if self.every_s and known.any():
             second = second[known][0] + self.every_s * np.arange(len(second))
@@ -210,8 +231,8 @@ def time_scale_of(column: pa.Array, unit: str = "") -> TimeScale | None:
             if in_days
             else of_unix and unit != "" and since.unit_s != found.unit_s
         )
-        plausible = counted and HISTORY.least_step_s <= _step(number) * since.unit_s <= HISTORY.most_step_s
-        if not ((other and (in_days or plausible)) or (in_days and reach > HISTORY.excel_days)):
+        plausible = counted and LEAST_STEP_S <= _step(number) * since.unit_s <= MOST_STEP_S
+        if not ((other and (in_days or plausible)) or (in_days and reach > EXCEL_DAYS)):
             return found
     return since if counted else None
 
@@ -227,7 +248,7 @@ def _unit_by_step(number: NDArray[np.float64]) -> str:
     seconds or every few minutes."""
     step = _step(number)
     whole = bool((number % 1 == 0).all())
-    return "ms" if whole and step >= HISTORY.least_ms_step and (step % 60 != 0 or step % 1000 == 0) else "s"
+    return "ms" if whole and step >= LEAST_MS_STEP and (step % 60 != 0 or step % 1000 == 0) else "s"
 
 
 def counted_s(texts: pa.Array) -> NDArray[np.float64]:
@@ -305,8 +326,8 @@ def winter_offset_s(local_s: NDArray[np.float64], zone: str) -> float | None:
     summer, winter = _offset_readings(around * HOUR_S + HOUR_S / 2, zone)
     held = dict(zip(hour.tolist(), count.tolist(), strict=True))
     spring = _shares(around[np.isnan(summer)], held, 1)
-    autumn = _shares(around[np.isfinite(summer) & (summer != winter)], held, HISTORY.autumn_samples)
-    keeps = max(spring) > HISTORY.in_spring if spring else bool(autumn) and max(autumn) < HISTORY.in_autumn
+    autumn = _shares(around[np.isfinite(summer) & (summer != winter)], held, AUTUMN_SAMPLES)
+    keeps = max(spring) > IN_SPRING if spring else bool(autumn) and max(autumn) < IN_AUTUMN
     if not keeps:
         return None
     year = 1970 + int(np.median(hour) * HOUR_S / (365.2425 * DAY_S))
@@ -367,6 +388,6 @@ def _set_back(local_s: NDArray[np.float64], rows: NDArray[np.intp], typical_s: f
     at_end = local_s[rows[-1] + 1] - local_s[rows[-1]] if rows[-1] + 1 < len(local_s) else -np.inf
     inner = int(np.argmin(before[1:])) + 1 if rows.size > 1 else 0
     step = before[inner] if inner else np.inf
-    if step < 0 or (step + HOUR_S <= HISTORY.typical_steps * typical_s and step < min(at_start, at_end)):
+    if step < 0 or (step + HOUR_S <= TYPICAL_STEPS * typical_s and step < min(at_start, at_end)):
         return inner
     return 0 if at_start < at_end else len(rows)

@@ -25,12 +25,15 @@ from analyzer.history.layouts import Source, source_of, tag_column
 from analyzer.history.parquet import converted, open_parquet
 from analyzer.history.plant_clock import zone_of
 from analyzer.history.series import MainSpan, NoStampError, Series, joined_pieces
-from analyzer.history.sheet import Sheet
+from analyzer.history.sheet import WHOLE_BYTES, Sheet
 from analyzer.history.sniff import open_sheet
 from analyzer.history.table import ReadOptions
-from analyzer.limits import HISTORY
 from analyzer.places import at_hand, bring, is_remote
 from identification.errors import InputError
+
+WHOLE_ROWS = 2000000
+"""Rows from which a long Parquet file is split by loop once, instead of being searched again for each loop
+[rows]."""
 
 DOUBT = "; state "
 """Text in notes between a reading and the option for another possible reading."""
@@ -234,10 +237,7 @@ def _opened_tables(path: Path, options: ReadOptions) -> tuple[list[Source], list
 def _table_source(plain: Path, options: ReadOptions) -> Source:
     table = open_parquet(plain) if is_parquet(plain) else open_sheet(plain, options)
     tag = tag_column(table)
-    if isinstance(table, Sheet):
-        whole = table.bytes < HISTORY.whole_bytes
-    else:
-        whole = tag < 0 or table.rows < HISTORY.whole_rows
+    whole = table.bytes < WHOLE_BYTES if isinstance(table, Sheet) else tag < 0 or table.rows < WHOLE_ROWS
     return source_of(table if whole else converted(table, tag, options.place), options)
 
 

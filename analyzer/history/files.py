@@ -25,8 +25,16 @@ from pathlib import Path
 from typing import IO, Any
 
 from analyzer.history.spans import require_dense
-from analyzer.limits import HISTORY
 from identification.errors import InputError
+
+ENDS_BYTES = 65536
+"""Part at both ends of a file that identifies it together with its size [bytes]: headers, footers and the
+newest samples are there, and a folder of thousands of files is known in a second."""
+UNPACKED_TIMES = 200.0
+"""Times that a file may be larger unpacked than packed, beyond unpacked_bytes: exports of a plant at rest
+shrink to a hundredth, and what shrinks further is made to fill a disk."""
+UNPACKED_BYTES = 100000000.0  # Size up to which anything is unpacked [bytes]
+DISK_SHARE = 0.8  # Share of the disk's room that an unpacked file may take: the night needs the rest
 
 TEXT_ENDINGS = frozenset({".csv", ".txt", ".tsv"})
 PARQUET_ENDINGS = frozenset({".parquet", ".pq"})
@@ -94,8 +102,8 @@ def ends_of(path: Path) -> bytes:
     with path.open("rb") as file:
         size = file.seek(0, 2)
         file.seek(0)
-        head = file.read(HISTORY.ends_bytes)
-        file.seek(max(size - HISTORY.ends_bytes, 0))
+        head = file.read(ENDS_BYTES)
+        file.seek(max(size - ENDS_BYTES, 0))
         return str(size).encode() + head + file.read()
 
 
@@ -262,12 +270,12 @@ def _check_size(path: Path, size: int, written: int, folder: Path) -> None:
     """Raise InputError if a file of `size` bytes, some of them `written` to a folder, exceeds the size limit or the
     free space of the disk."""
     packed = path.stat().st_size
-    if size > max(HISTORY.unpacked_times * packed, HISTORY.unpacked_bytes):
+    if size > max(UNPACKED_TIMES * packed, UNPACKED_BYTES):
         seen = f"{path}: {packed} bytes that unpack to more than {size / 1e6:.0f} MB"
         remedy = "unpack it where there is space, and name the result"
-        raise InputError(seen, f"at most {HISTORY.unpacked_times:g} times as much", remedy)
+        raise InputError(seen, f"at most {UNPACKED_TIMES:g} times as much", remedy)
     room = shutil.disk_usage(folder).free + written
-    if size > HISTORY.unpacked_bytes and size > HISTORY.disk_share * room:
+    if size > UNPACKED_BYTES and size > DISK_SHARE * room:
         remedy = "unpack it elsewhere and name the result"
         raise InputError(f"{path}: no room to unpack it", "free disk", remedy)
 

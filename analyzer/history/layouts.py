@@ -21,6 +21,7 @@ from analyzer.history.quality import Scheme, not_good, ones_prevail, quality_col
 from analyzer.history.series import MainSpan, NoStampError, Series, main_span
 from analyzer.history.table import (
     COLUMNS,
+    NAME_LENGTH,
     ReadOptions,
     Table,
     any_of,
@@ -34,7 +35,6 @@ from analyzer.history.table import (
 )
 from analyzer.history.time_columns import find_clock, holds_stamps, stamps_clock
 from analyzer.history.values import parsed, values
-from analyzer.limits import HISTORY
 from identification.errors import InputError
 
 TIME_WORDS = re.compile(rf"[ ._:/-]*\(?(?:{any_of('time')})\)?(?:[ ._]\d+)?$", re.IGNORECASE)
@@ -294,7 +294,7 @@ def _groups(table: Table, stated: Collection[str]) -> list[tuple[int, list[int]]
 
 def _is_time(name: str) -> bool:
     """Whether a column's own name is a name for stamps."""
-    bare = NUMBERED.sub("", name[: HISTORY.name_length])
+    bare = NUMBERED.sub("", name[:NAME_LENGTH])
     return plain(bare) in COLUMNS["stamp"] or any((TIME_WORDS.search(bare), TIME_FIRST.match(bare)))
 
 
@@ -313,8 +313,8 @@ def _tag(table: Table, column: TagColumn) -> str:
     """The tag's name: above its values, or above its stamps if that is unspecific."""
     own, other = table.names[column.value], table.names[column.clock.columns[0]]
     if plain(NUMBERED.sub("", own)) in COLUMNS["value"] or own == "":
-        return TIME_WORDS.sub("", other[: HISTORY.name_length]) or other
-    return VALUE_WORDS.sub("", own[: HISTORY.name_length]) or own
+        return TIME_WORDS.sub("", other[:NAME_LENGTH]) or other
+    return VALUE_WORDS.sub("", own[:NAME_LENGTH]) or own
 
 
 def tag_column(table: Table) -> int:

@@ -34,8 +34,23 @@ from pyarrow import csv
 from analyzer.history.files import ends_of
 from analyzer.history.sheet import Sheet, read_through, reading
 from analyzer.history.table import HEAD_ROWS, Table, check_once, is_text, one_array, trimmed
-from analyzer.limits import HISTORY
 from identification.errors import InputError
+
+MANY_ROWS = 5000000.0  # Rows of a Parquet file beyond which ROWS_A_BYTE applies [rows]
+ROWS_A_BYTE = 20.0
+"""Files of more are not read [rows/byte]: if any value changes there are 3 at most, in any encoding; a file
+of nothing but constants may have 90."""
+PROBED_BYTES = 4000000
+"""Size below which a Parquet file is read through when it is opened [bytes]: it takes 50 ms, and of larger
+files the limits of a run's workers hold."""
+PROBE_S = 10.0  # Time that this may take by the clock [s]
+LONGEST_TEXT = 1000.0
+"""Mean length of the texts of a column in a row group, and MUCH_TEXT, beyond which together a Parquet file is
+not read [bytes]: names, stamps and states are short, and a few texts of megabytes unpack from nothing to
+gigabytes."""
+MUCH_TEXT = 10000000
+"""See LONGEST_TEXT [bytes]: a list of ten thousand tags, which is complete before a group of few rows, has a
+twentieth of it."""
 
 OPEN_FILES = 4
 PIECES = 64
@@ -132,15 +147,15 @@ def open_parquet(path: Path) -> ParquetTable:
         raise InputError(seen, "a whole Parquet file", remedy) from error
     check_once(path, schema.names)
     size = path.stat().st_size
-    if rows > HISTORY.many_rows and rows > HISTORY.rows_a_byte * min(encoded, size):
+    if rows > MANY_ROWS and rows > ROWS_A_BYTE * min(encoded, size):
         remedy = "export it again; a file that unpacks to so much more is not read"
-        expected = f"at most {HISTORY.rows_a_byte:g} rows a byte"
+        expected = f"at most {ROWS_A_BYTE:g} rows a byte"
         raise InputError(f"{path}: {rows} rows in {min(encoded, size)} bytes", expected, remedy)
-    if long_text > HISTORY.longest_text:
-        expected = f"at most {HISTORY.longest_text:g} bytes for a tag, a stamp or a state"
+    if long_text > LONGEST_TEXT:
+        expected = f"at most {LONGEST_TEXT:g} bytes for a tag, a stamp or a state"
         seen = f"{path}: texts of {long_text:.0f} bytes on average"
         raise InputError(seen, expected, "export numbers, tags and stamps alone")
-    if size < HISTORY.probed_bytes:
+    if size < PROBED_BYTES:
         _check_pages(path)
     _require_short_texts(path, schema)
     if rows == 0:
@@ -166,8 +181,8 @@ def _require_short_texts(path: Path, schema: pa.Schema) -> None:
             for column in batch.columns if batch is not None else ():
                 held = column.dictionary if pa.types.is_dictionary(column.type) else column
                 longest = pc.max(pc.binary_length(held.cast(pa.large_string()))).as_py() or 0
-                if longest > HISTORY.longest_text and longest * rows > HISTORY.much_text:
-                    expected = f"at most {HISTORY.longest_text:g} bytes for a tag, a stamp or a state"
+                if longest > LONGEST_TEXT and longest * rows > MUCH_TEXT:
+                    expected = f"at most {LONGEST_TEXT:g} bytes for a tag, a stamp or a state"
                     seen = f"{path}: texts of {longest} bytes in a column of {rows} rows"
                     raise InputError(seen, expected, "export numbers, tags and stamps alone")
 
@@ -179,9 +194,9 @@ def _check_pages(path: Path) -> None:
     """
     reading = threading.Thread(target=_read_through, args=(path,), daemon=True)
     reading.start()
-    reading.join(HISTORY.probe_s)
+    reading.join(PROBE_S)
     if reading.is_alive():
-        seen = f"{path}: its pages take longer than {HISTORY.probe_s:g} s to read"
+        seen = f"{path}: its pages take longer than {PROBE_S:g} s to read"
         raise InputError(seen, "a whole Parquet file", "export it again")
 
 
@@ -197,7 +212,7 @@ def _longest_text(footer: pq.FileMetaData) -> float:
     texts = [j for j in range(footer.num_columns) if footer.schema.column(j).physical_type == "BYTE_ARRAY"]
     groups = [footer.row_group(k) for k in range(footer.num_row_groups)]
     sizes = [(g.column(j).total_uncompressed_size, g.num_rows) for g in groups for j in texts]
-    return max((size / max(rows, 1) for size, rows in sizes if size > HISTORY.much_text), default=0.0)
+    return max((size / max(rows, 1) for size, rows in sizes if size > MUCH_TEXT), default=0.0)
 
 
 @lru_cache(maxsize=OPEN_FILES)

@@ -17,8 +17,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from analyzer.history.table import COLUMNS, WORDS, Table, any_of, distinct, plain
-from analyzer.limits import HISTORY
+from analyzer.history.table import COLUMNS, NAME_LENGTH, WORDS, Table, any_of, distinct, plain
+
+FLAGS = 10  # Quality codes below this number are a plant's own, of which 0 or 1 is good
 
 QUALITY_OF = (
     re.compile(rf"^(?P<tag>.+?)[ ._:/|#-]?\(?(?:{any_of('quality')})\)?$", re.IGNORECASE),
@@ -92,7 +93,7 @@ def scheme_of(name: str, codes: pa.Array, ones: bool | None = None) -> Scheme:
         return Scheme.DA
     if (known == PCS7_GOOD).any() and known.max() < 0x100:
         return Scheme.PCS7
-    if len(known) and known.max() < HISTORY.flags and (ones_prevail([codes]) if ones is None else ones):
+    if len(known) and known.max() < FLAGS and (ones_prevail([codes]) if ones is None else ones):
         return Scheme.ONE_GOOD
     return Scheme.CONFIDENCE if len(known) and known.max() == CONFIDENCE_FULL else Scheme.UA
 
@@ -156,7 +157,7 @@ def quality_columns(
 
 def _tag_of(name: str, others: Mapping[str, int]) -> str | None:
     """The other column after which a quality column is named."""
-    if len(name) > HISTORY.name_length:
+    if len(name) > NAME_LENGTH:
         return None
     tags = (match["tag"] for pattern in QUALITY_OF if (match := pattern.match(name)) is not None)
     return next((tag for tag in tags if tag in others and tag != name), None)

@@ -10,8 +10,9 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from analyzer.history.table import COLUMNS, any_of, first_named, plain
-from analyzer.limits import HISTORY
+from analyzer.history.table import COLUMNS, NAME_LENGTH, any_of, first_named, plain
+
+LAYOUT_LINES = 12  # Lines within which a layout that is not a table is detected [lines]
 
 DELIMITERS = (";", "\t", "|", ",")
 TITLE = re.compile(rf"^\W*(?:{any_of('title')})\s*[:=]\s*(?P<tag>\S.*)$", re.IGNORECASE)
@@ -32,7 +33,7 @@ def rewritten(path: Path, encoding: str, lines: Sequence[str], place: Path) -> P
     `lines` are the file's first ones; the copy is written under `place`.
     """
     filled = [line for line in lines if line.strip()]
-    rewrite = _blocks(filled) or _in_parts(filled) or _columns(filled[: 4 * HISTORY.layout_lines])
+    rewrite = _blocks(filled) or _in_parts(filled) or _columns(filled[: 4 * LAYOUT_LINES])
     if rewrite is None:
         return None
     out = Path(tempfile.mkdtemp(prefix="rewritten-", dir=place)) / path.name
@@ -47,7 +48,7 @@ def rewritten(path: Path, encoding: str, lines: Sequence[str], place: Path) -> P
 
 def _title(line: str) -> str:
     """The tag, if a line is the title above its samples; otherwise ''."""
-    if len(line) > HISTORY.name_length:
+    if len(line) > NAME_LENGTH:
         return ""
     found = TITLE.match(line) or BARE_TITLE.match(line.strip())
     if found is None or STAMPED.match(line):
@@ -58,7 +59,7 @@ def _title(line: str) -> str:
 
 def _blocks(filled: Sequence[str]) -> Rewrite | None:
     """Reader for blocks of one tag after another, if the first lines are such a block."""
-    at = next((k for k, line in enumerate(filled[: HISTORY.layout_lines]) if _title(line)), None)
+    at = next((k for k, line in enumerate(filled[:LAYOUT_LINES]) if _title(line)), None)
     if at is None:
         return None
     below = filled[at + 1 : at + 4]
@@ -112,7 +113,7 @@ def _columns(filled: Sequence[str]) -> Rewrite | None:
     line by its strokes, by two blanks or more, or by one."""
     if len(filled) < 4 or any(d in line for d in DELIMITERS for line in filled[:4]):
         return None
-    rule = next((line for line in filled[: HISTORY.layout_lines] if RULE.match(line)), "")
+    rule = next((line for line in filled[:LAYOUT_LINES] if RULE.match(line)), "")
     edges = [m.start() for m in re.finditer(r"(?<!\S)-", rule)]
 
     def cells(line: str) -> list[str]:

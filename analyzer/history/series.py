@@ -14,7 +14,11 @@ from datetime import datetime, timedelta
 import numpy as np
 from numpy.typing import NDArray
 
-from analyzer.limits import HISTORY
+APART_S = 86400.0
+"""Samples further apart than this are separate clusters [s]: a day without a sample is no night's gap."""
+STRAY_SHARE = 0.01
+"""A first or last cluster with less than this share of the largest one's samples is stray: a quarter of an
+hour next to a day, or four hours next to two weeks."""
 
 NEWEST_FIRST = "series run newest first and are reversed"
 REPEATED = "samples repeat a stamp; the last one counts"
@@ -155,12 +159,12 @@ def main_span(stamp_s: NDArray[np.float64]) -> MainSpan:
     if known.size == 0:
         raise NoStampError
     first, last = float(known.min()), float(known.max())
-    if last - first <= HISTORY.apart_s:
+    if last - first <= APART_S:
         return MainSpan(first, last, 0)
     ordered = known if bool((np.diff(known) >= 0).all()) else np.sort(known)
-    cuts = np.flatnonzero(np.diff(ordered) > HISTORY.apart_s) + 1
+    cuts = np.flatnonzero(np.diff(ordered) > APART_S) + 1
     starts, ends = np.r_[0, cuts], np.r_[cuts, ordered.size]
-    whole = np.flatnonzero((ends - starts) >= HISTORY.stray_share * (ends - starts).max())
+    whole = np.flatnonzero((ends - starts) >= STRAY_SHARE * (ends - starts).max())
     a, b = int(starts[whole[0]]), int(ends[whole[-1]])
     return MainSpan(float(ordered[a]), float(ordered[b - 1]), int(ordered.size - (b - a)))
 

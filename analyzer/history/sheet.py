@@ -14,8 +14,16 @@ import pyarrow.compute as pc
 from pyarrow import csv
 
 from analyzer.history.table import HEAD_ROWS, Table, as_text, trimmed
-from analyzer.limits import HISTORY
 from identification.errors import InputError
+
+WHOLE_SHARE = 0.95
+"""Share of a file's lines that must come back as rows: where fewer do, an open quote has swallowed the
+rest."""
+LATE_COLUMNS = 3
+"""Columns with late texts for which a pass begins again, one by one; then all columns are read as texts."""
+WHOLE_BYTES = 64000000
+"""Size from which delimited text is streamed into Parquet once, instead of being read whole and kept for the
+next loop [bytes]."""
 
 KEPT_READS = 2
 BLOCK_BYTES = 1 << 24
@@ -78,7 +86,7 @@ def read_through(
     try:
         rows, left_out, found = _as_far_as_numbers_go(sheet, read)
         lines = _count_lines(sheet.path, sheet.changed_ns) - sheet.first_row + 1
-        if rows + left_out < HISTORY.whole_share * lines - 1:
+        if rows + left_out < WHOLE_SHARE * lines - 1:
             more, others_left_out, found = _as_far_as_numbers_go(replace(sheet, unquoted=True), read)
             if more > rows + left_out:
                 left_out, notes = others_left_out, ["a quote is not closed: quotes are read as characters"]
@@ -104,7 +112,7 @@ def _as_far_as_numbers_go(sheet: Sheet, read: Callable[[Sheet, Collection[int]],
             if "UTF8" in str(error) and sheet.encoding != "cp1252":
                 sheet = replace(sheet, encoding="cp1252")
             elif late is not None and int(late["column"]) not in texts:
-                few = len(texts) < HISTORY.late_columns
+                few = len(texts) < LATE_COLUMNS
                 texts.update([int(late["column"])] if few else range(len(sheet.names)))
             else:
                 raise
@@ -129,7 +137,7 @@ def _parsed_sheet(sheet: Sheet, texts: Collection[int]) -> tuple[int, int, list[
 
 def types_of(sheet: Sheet) -> tuple[pa.DataType, ...]:
     """Types of all columns; for a big file those of its first rows only."""
-    if sheet.bytes < HISTORY.whole_bytes:
+    if sheet.bytes < WHOLE_BYTES:
         return tuple(array.type for array in _loaded(sheet)[0])
     with csv.open_csv(sheet.path, **reading(sheet, [], ())) as reader:
         return tuple(reader.schema.types)

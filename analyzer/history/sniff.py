@@ -22,8 +22,13 @@ from analyzer.history.rewritten import rewritten
 from analyzer.history.sheet import Sheet, types_of
 from analyzer.history.table import WORDS, ReadOptions
 from analyzer.history.time_columns import is_stamp, without_unit
-from analyzer.limits import HISTORY
 from identification.errors import InputError
+
+NUMBERS_SHARE = 0.8
+"""Share of a column's cells that are numbers where it holds numbers: the rest is a historian's words."""
+HEAD_BYTES = 1000000  # Part of a text from which its format is detected [bytes]
+HEAD_LINES = 200  # The same in lines [lines]
+PREAMBLE_LINES = 30  # Lines of a preamble at most under which a header is looked for [lines]
 
 DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar"}
 NO_DATA_LINE = re.compile(r"^(?:#.*|\[\w+\]|sep=.?|)$", re.IGNORECASE)
@@ -50,7 +55,7 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
     """
     encoding, first = _lines_of_head(path, options.encoding)
     if options.delimiter is None:
-        plain = rewritten(path, encoding, first[: HISTORY.head_lines], options.place)
+        plain = rewritten(path, encoding, first[:HEAD_LINES], options.place)
         if plain is not None:
             return open_sheet(plain, replace(options, delimiter="\t", encoding="utf-8"))
     lines, above = _after_data_mark(first)
@@ -109,7 +114,7 @@ def detect_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> tuple[str, 
 def _lines_of_head(path: Path, stated: str | None) -> tuple[str, list[str]]:
     """Encoding of a text, and its first lines."""
     with path.open("rb") as file:
-        head = file.read(HISTORY.head_bytes)
+        head = file.read(HEAD_BYTES)
     if not head.strip(b"\r\n\t \x00\xef\xbb\xbf\xff\xfe"):
         raise InputError(f"{path}: empty file", "a table with a header and samples", "export it again")
     encoding = stated or detect_encoding(head)
@@ -122,14 +127,14 @@ def _lines_of_head(path: Path, stated: str | None) -> tuple[str, list[str]]:
     if other:
         raise InputError(f"{path}: {other}", "delimited text or Parquet", "export as CSV or Parquet")
     lines = re.split(r"\r\n|\n|\r", text)
-    return encoding, lines if len(head) < HISTORY.head_bytes else lines[:-1]
+    return encoding, lines if len(head) < HEAD_BYTES else lines[:-1]
 
 
 def _after_data_mark(lines: list[str]) -> tuple[list[str], int]:
     """The first lines after a mark such as [Data], if there is one, and the number of lines above them."""
     marks = [k for k, line in enumerate(lines) if DATA_MARK.match(line)]
     above = marks[-1] + 1 if marks else 0
-    return lines[above : above + HISTORY.head_lines], above
+    return lines[above : above + HEAD_LINES], above
 
 
 def _split(lines: Sequence[str], delimiter: str) -> list[list[str]]:
@@ -170,7 +175,7 @@ def _header(path: Path, lines: Sequence[str], delimiter: str) -> tuple[int, list
     split = ((k, _cells(line, delimiter)) for k, line in enumerate(lines) if _data_lines([line]))
     rows = [(k, cells) for k, cells in split if len(cells) >= max(2, width - 1)]
     data = next((i for i, (_, cells) in enumerate(rows) if _is_data(cells)), len(rows))
-    below = pairwise(rows[data + 1 : data + 1 + HISTORY.preamble_lines])
+    below = pairwise(rows[data + 1 : data + 1 + PREAMBLE_LINES])
     header = next(
         chain(
             (row for row in rows[:data] if data < len(rows) and _names_all(row[1])),
@@ -220,7 +225,7 @@ def _taken_as(lines: Sequence[str], delimiter: str) -> tuple[str, ...] | None:
     Each of the first rows must have the same shape: a stamp, a text unlike the rest, and a number; or a stamp first
     and then only numbers, which are named by their positions (loops.csv may assign them).
     """
-    rows = [row for row in _split(lines[: HISTORY.head_lines], delimiter) if row]
+    rows = [row for row in _split(lines[:HEAD_LINES], delimiter) if row]
     if len(rows) < 3 or len({len(row) for row in rows}) != 1 or len(rows[0]) < 3:
         return None
     columns = [[cell.strip() for cell in column] for column in zip(*rows, strict=True)]
@@ -251,7 +256,7 @@ def _kind_of_column(cells: Sequence[str], stamped: bool) -> str:
     `stamped` : whether the first one can be read as a stamp.
     """
     numbers = [float(cell.replace(",", ".")) for cell in cells if NUMBER.match(cell)]
-    if NUMBER.match(cells[0]) and len(numbers) >= HISTORY.numbers_share * len(cells):
+    if NUMBER.match(cells[0]) and len(numbers) >= NUMBERS_SHARE * len(cells):
         scale = time_scale_of(pa.array(numbers))
         return "number" if scale is None or scale in SINCE_START.values() else "stamp"
     if {cell.lower() for cell in cells} <= QUALITIES:

@@ -12,8 +12,14 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 from xml.parsers import expat
 
-from analyzer.limits import HISTORY
 from identification.errors import InputError
+
+SPANNED_CELLS = 5000000
+"""Cells that those of a sheet may span from the first to the last, independently of their contents [cells]: a
+reader holds 32 bytes for each, 160 MB."""
+SPANNED_TIMES = 20.0
+"""Times their own number that they may span beyond it: a table has most of its cells, and one stray one makes
+a thousand times as many."""
 
 CELL = re.compile(rb"<(?:\w+:)?c\b[^>]*?\br=\"([A-Za-z]{1,7})(\d{1,9})\"")
 BLOCK_BYTES = 1 << 20
@@ -75,7 +81,7 @@ def require_dense(path: Path, members: Sequence[zipfile.ZipInfo]) -> None:
 
 def _require_dense(path: Path, found: Spread) -> None:
     span = found.row * found.column
-    if span > HISTORY.spanned_cells and span > HISTORY.spanned_times * found.cells:
+    if span > SPANNED_CELLS and span > SPANNED_TIMES * found.cells:
         far = f"{column_letters(found.far[1])}{found.far[0]}"
         seen = f"{path}, {found.name}: {found.cells} cells that span {span}, as far as cell {far}"
         remedy = f"delete isolated cells far from the table, such as {far}, or save it as CSV"

@@ -21,8 +21,12 @@ from numpy.typing import NDArray
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.history.plant_clock import utc_seconds as utc_s
 from analyzer.history.table import WORDS, plain
-from analyzer.limits import HISTORY
 from identification.errors import InputError
+
+STATED_FROM_S = 0.0  # Times before it are no changes of settings, counted from 1970 [s]
+STATED_TO_S = 4102444800.0  # Times from it on are no changes of settings [s]: the year 2100
+CENTURY_TURN = 70  # Years of two figures from which on they are of the 1900s: no export is older
+OFFSET_S = 50400.0  # Largest offset from UTC in a stamp [s]. Source: no zone is further: 14 h
 
 LETTER = r"[^\x00-@\[-`{-\x7f]"
 """A letter of a month's name: any character except other ASCII ones. The class of all Unicode letters would make a
@@ -165,7 +169,7 @@ def fields(texts: pa.Array, timezone: str | None = None) -> Fields | None:
         _whole_numbers(part["c"]),
         clock_s,
         offset_s,
-        _readable(parts, part, known) & shown & (np.abs(offset_s) <= HISTORY.offset_s),
+        _readable(parts, part, known) & shown & (np.abs(offset_s) <= OFFSET_S),
         _numpy(pc.not_equal(part["z"], "")),
         _written_order(part),
         _numpy(pc.less_equal(pc.utf8_length(part["c"]), 2)),
@@ -200,7 +204,7 @@ def stamp_seconds(parts: Fields, first: str = "month") -> NDArray[np.float64]:
     month = np.where(order == MONTH, parts.a, parts.b)
     day = np.select([order == YEAR, order == DAY], [parts.c, parts.a], parts.b)
     short = np.where(order == YEAR, parts.order == OPEN, parts.short)
-    century = np.where(year < HISTORY.century_turn, 2000, 1900)
+    century = np.where(year < CENTURY_TURN, 2000, 1900)
     year = np.where(short & (year < 100), year + century, year)
     valid = parts.readable & (month >= 1) & (month <= 12) & (day >= 1)
     begins = ((year - 1970) * 12 + np.clip(month, 1, 12) - 1).astype("datetime64[M]")
@@ -313,7 +317,7 @@ def parse_times(
     unsure = either & (day_first is None) & (parts.year_may_begin | ~(above | pointed))
     local_s = np.where(day, stamp_seconds(parts, "day"), stamp_seconds(parts, "month"))
     with np.errstate(invalid="ignore"):
-        of_our_time = (local_s >= HISTORY.stated_from_s) & (local_s < HISTORY.stated_to_s)
+        of_our_time = (local_s >= STATED_FROM_S) & (local_s < STATED_TO_S)
     for at in np.flatnonzero(unsure | ~of_our_time)[:1].tolist():
         if unsure[at]:
             raise refused(at, " reads two ways", "write the year first, with four digits")

@@ -17,8 +17,11 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history.files import own_scratch
-from analyzer.limits import HISTORY
 from identification.errors import InputError
+
+NAME_LENGTH = 200
+"""Part of a name that is read [characters]: no tag has more, and patterns take the square of a name's
+length."""
 
 HEAD_ROWS = 1000
 """Rows from which a table's format is detected."""
@@ -133,7 +136,7 @@ def any_of(kind: str) -> str:
 
 def plain(name: str) -> str:
     """Name without case, units in brackets, blanks and underscores: ' Time_Stamp (UTC)' is 'timestamp'."""
-    return re.sub(r"\([^()]*\)|\[[^\[\]]*\]|[\s_\-\"']", "", name[: HISTORY.name_length]).lower()
+    return re.sub(r"\([^()]*\)|\[[^\[\]]*\]|[\s_\-\"']", "", name[:NAME_LENGTH]).lower()
 
 
 def first_named(names: Sequence[str], wanted: Iterable[str]) -> int | None:

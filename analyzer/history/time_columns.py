@@ -31,6 +31,7 @@ from analyzer.history.clock import (
 )
 from analyzer.history.table import (
     COLUMNS,
+    NAME_LENGTH,
     WORDS,
     ReadOptions,
     Table,
@@ -42,8 +43,14 @@ from analyzer.history.table import (
     plain,
     stated_column,
 )
-from analyzer.limits import HISTORY
 from identification.errors import InputError
+
+AHEAD_S = 172800.0  # Stamps later than now by more than this are taken as read in a wrong order [s]: two days
+MINUTES_ROWS = 10  # Rows from which stamps of whole minutes are tested for lost seconds
+MINUTES_SHARE = 0.7
+"""Share of such stamps that must differ: samples 42 s apart and more are read, a few of them on one stamp."""
+UNREADABLE_SHARE = 0.5  # Share of a column's texts that must be read as stamps for it to be a clock
+GLANCE = 50  # Texts of a column that are tested before they are parsed
 
 DAY_FIRST_ZONES = ("Europe/", "Africa/", "Australia/", "Asia/")
 """Zones in which ambiguous dates have the day first."""
@@ -67,13 +74,13 @@ RANK = {name: i for i, name in enumerate((*COLUMNS["stamp"], *COLUMNS["time_of_d
 
 def time_unit(name: str) -> str:
     """The unit in a time column's name, as in 'Time (min)' or 't_h': ms, s, min, h or d; '' if none."""
-    found = UNIT_IN_NAME.search(name[: HISTORY.name_length])
+    found = UNIT_IN_NAME.search(name[:NAME_LENGTH])
     return "" if found is None else str(found.lastgroup)
 
 
 def without_unit(name: str) -> str:
     """A time column's name without its unit."""
-    return UNIT_IN_NAME.sub("", name[: HISTORY.name_length])
+    return UNIT_IN_NAME.sub("", name[:NAME_LENGTH])
 
 
 def is_stamp(name: str) -> bool:
@@ -127,20 +134,20 @@ def stamps_clock(table: Table, column: int, options: ReadOptions, name: str) -> 
 def _stands(table: Table, second: NDArray[np.float64], tag: int) -> bool:
     """Whether all first rows have the same stamp [s], with several rows for each tag."""
     known = second[np.isfinite(second)]
-    if known.size < HISTORY.minutes_rows or np.ptp(known) > 0.0:
+    if known.size < MINUTES_ROWS or np.ptp(known) > 0.0:
         return False
-    return tag < 0 or len(pc.unique(table.head([tag])[0])) <= HISTORY.minutes_share * known.size
+    return tag < 0 or len(pc.unique(table.head([tag])[0])) <= MINUTES_SHARE * known.size
 
 
 def _check_seconds(table: Table, second: NDArray[np.float64], tag: int) -> None:
     """Raise InputError if the first stamps [s] have lost their seconds, so that all samples of a minute have the same
     one; `tag` is the column of the tags of a long table, -1 for a wide one."""
     known = np.isfinite(second)
-    if known.sum() < HISTORY.minutes_rows or (second[known] % 60.0 != 0).any():
+    if known.sum() < MINUTES_ROWS or (second[known] % 60.0 != 0).any():
         return
     tags = as_text(table.head([tag])[0]).to_pylist() if tag >= 0 else [""] * len(second)
     kept = {(tags[k], second[k]) for k in np.flatnonzero(known)}
-    if len(kept) <= HISTORY.minutes_share * known.sum():
+    if len(kept) <= MINUTES_SHARE * known.sum():
         samples = f"{known.sum()} samples on {len(kept)} whole minutes"
         remedy = (
             "export the time with its seconds (in a spreadsheet, format the column as yyyy-mm-dd hh:mm:ss)"
@@ -189,7 +196,7 @@ def _date_order(parts: stamps.Fields, example: str, timezone: str | None) -> Dat
         return shown
     if pointed:
         return DateOrder("day", "dates with points; no day above 12 occurs")
-    limit = time.time() + HISTORY.ahead_s
+    limit = time.time() + AHEAD_S
     ahead = [bool((stamps.stamp_seconds(parts, first) > limit).any()) for first in ("day", "month")]
     usual = timezone is not None and timezone.startswith(DAY_FIRST_ZONES)
     day = ahead[1] if ahead[0] != ahead[1] else usual
@@ -205,7 +212,7 @@ def _with_short_year(parts: stamps.Fields, pointed: bool) -> DateOrder | None:
     """
     if not parts.open.any() or not parts.short.all() or (parts.open & ~parts.year_may_begin).any():
         return None
-    limit = time.time() + HISTORY.ahead_s
+    limit = time.time() + AHEAD_S
     readings = {first: stamps.stamp_seconds(parts, first) for first in ("year", "day", "month")}
     possible = {
         k: found for k, found in readings.items() if np.isfinite(found).all() and found.max() <= limit
@@ -298,13 +305,13 @@ def _kind_of_time(name: str, head: pa.Array, timezone: str | None = None) -> str
 
 
 def _text_kind(texts: pa.Array, timezone: str | None = None) -> str:
-    if not any(LIKE_STAMP.search(text) for text in texts.slice(0, HISTORY.glance).to_pylist()):
+    if not any(LIKE_STAMP.search(text) for text in texts.slice(0, GLANCE).to_pylist()):
         return ""  # most columns of text are modes: the patterns below take most of the opening time
     of_day = pc.cast(pc.match_substring_regex(texts, TIME_OF_DAY), pa.float64())
-    if pc.mean(of_day).as_py() > HISTORY.unreadable_share:
+    if pc.mean(of_day).as_py() > UNREADABLE_SHARE:
         return "time of day"
     parts = stamps.fields(texts, timezone)
-    if parts is None or parts.readable.mean() <= HISTORY.unreadable_share:
+    if parts is None or parts.readable.mean() <= UNREADABLE_SHARE:
         return ""
     return "full" if (parts.clock_s != 0).any() or len(texts) == 1 else "date"
 

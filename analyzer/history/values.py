@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from analyzer.history.series import Series
 from analyzer.history.table import WORDS, distinct, is_text, numbers
-from analyzer.limits import HISTORY
+
+NUMBER_LENGTH = 100  # Length of a number at most [characters]
 
 BLANK = "cells are blank: no value (a historian that reports by exception leaves unchanged values blank)"
 ERROR_TEXTS = frozenset(WORDS["values"]["none"])
@@ -104,7 +105,7 @@ def parsed(texts: list[str], decimal: str) -> tuple[NDArray[np.float64], list[st
 
 def _number_and_grouping(text: str, decimal: str) -> tuple[float, bool]:
     """A text as a number, NaN if it is none, and whether its thousands are grouped."""
-    if len(text) > HISTORY.number_length:
+    if len(text) > NUMBER_LENGTH:
         return math.nan, False
     spaced = SPACES.sub(" ", text)
     grouped = bool(SPACED.match(spaced)) or bool(GROUPED[decimal].match(text))

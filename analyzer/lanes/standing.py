@@ -11,10 +11,9 @@ from analyzer.config import Config, LaneLimits
 from analyzer.history.plant_clock import HOUR_S
 from analyzer.loop.assessments import hour_edges, noise_band
 from analyzer.loop.quality import Prepared
-from identification.limits import SIGNALS
 from identification.models import Pid
 from identification.record import LoopRecord
-from identification.signals.correlation import correlation_time
+from identification.signals.correlation import SMOOTHING, correlation_time
 from identification.signals.setpoint_response import moves
 
 AVERAGING = "level"
@@ -54,7 +53,7 @@ def _memory(prepared: Prepared, controller: Pid | None, kind: str, config: Confi
         return None
     if float(use.mean()) < config.quality.usable_share:
         return None
-    averaged = max(SIGNALS.smoothing * controller.ti_s / record.dt_s, 1.0)
+    averaged = max(SMOOTHING * controller.ti_s / record.dt_s, 1.0)
     noise = config.lanes.noise * noise_band(record.pv) / math.sqrt(averaged)
     floor = max(config.lanes.at_set_point, prepared.pv_step, noise)
     if float(np.median(np.abs(record.error[use]))) <= floor:

@@ -34,8 +34,7 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import sentences
 from analyzer.words.units import beside_settings, intervals_of, number, of_controller, schedule_shown
-from identification.estimation.window import Fit
-from identification.limits import FIT
+from identification.estimation.window import LONGEST_DEAD_TIME, Fit
 from identification.models import Loop, Pid
 from identification.record import Floats, LoopRecord
 from tuning.frequency_response import integral_s, is_stable
@@ -326,7 +325,7 @@ def _proposed(
     if not right_way or verdict.cause not in (Cause.VALVE, Cause.TUNING):
         return Proposed(recommend(loop, verdict.cause, limits=config.tuning))
     duration_s, dead_time_s = verdict.fit.window.duration_s, loop.process.dead_time_s
-    if dead_time_s > FIT.longest_dead_time * duration_s:
+    if dead_time_s > LONGEST_DEAD_TIME * duration_s:
         shown = SAID["beyond_record"].format(number(dead_time_s), duration_s / 3600.0)
         return Proposed(Proposal(Action.UNDECIDED, shown))
     if verdict.cause is Cause.TUNING:

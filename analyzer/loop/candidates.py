@@ -8,14 +8,19 @@ from typing import NamedTuple
 
 from analyzer.config import CauseLimits
 from identification.errors import NotAssessedError
-from identification.estimation.backlash_stiction import better_linear, fit_linear, fit_play, fit_stick_slip
+from identification.estimation.backlash_stiction import (
+    SHORT,
+    better_linear,
+    fit_linear,
+    fit_play,
+    fit_stick_slip,
+)
 from identification.estimation.between_samples import Scans, settled, with_scans
 from identification.estimation.evidence import evidence, with_load_step, with_second_lag
 from identification.estimation.gauss_newton import descend
-from identification.estimation.noise import judged
+from identification.estimation.noise import AR_ORDER, judged
 from identification.estimation.stem_position import Seen, seen
 from identification.estimation.window import Fit, Window
-from identification.limits import FIT
 from identification.record import Mask
 
 Candidates = tuple[Fit, Fit, Fit | None]
@@ -53,7 +58,7 @@ def fits_of(window: Window, q: Question) -> Fits:
 
 def judged_count(window: Window) -> int:
     """Number of blocks that follow as many good ones as the noise model's order."""
-    return int(judged(window.usable, FIT.ar_order).sum())
+    return int(judged(window.usable, AR_ORDER).sum())
 
 
 def check_judged(window: Window, limits: CauseLimits) -> None:
@@ -61,7 +66,7 @@ def check_judged(window: Window, limits: CauseLimits) -> None:
     count = judged_count(window)
     if count < limits.judged:
         raise NotAssessedError(
-            f"needs {limits.judged} stretches of {FIT.ar_order + 1} good samples in a row, has {count}"
+            f"needs {limits.judged} stretches of {AR_ORDER + 1} good samples in a row, has {count}"
         )
 
 
@@ -86,7 +91,7 @@ def hopeful(window: Window, q: Question) -> float:
 def _is_searched(linear: Fit, play: Fit, q: Question) -> bool:
     """Whether the complete search for a valve fault is worthwhile: in a loop that oscillates always, because a stem
     that jumps by nearly its stickband resembles no backlash; in a calm one if backlash explains enough."""
-    if not q.calm or play.window.y.size < FIT.short:
+    if not q.calm or play.window.y.size < SHORT:
         return True
     return play.log_likelihood - linear.log_likelihood >= hopeful(play.window, q)
 
@@ -94,7 +99,7 @@ def _is_searched(linear: Fit, play: Fit, q: Question) -> bool:
 def _candidates(window: Window, q: Question) -> Candidates:
     """The fits of one window."""
     linear = fit_linear(window, q.scale_s)
-    short = q.calm and window.y.size < FIT.short
+    short = q.calm and window.y.size < SHORT
     play = fit_play(linear, q.scale_s, hopeful(window, q) if q.calm and not short else None)
     if not _is_searched(linear, play, q):
         return linear, play, None

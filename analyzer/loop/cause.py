@@ -40,14 +40,13 @@ from analyzer.loop.ringing import Regularity, Ringing, between_samples
 from analyzer.loop.signs import WEAK, signs_of
 from analyzer.loop.worn_valve import WornValve
 from identification.errors import NotAssessedError
-from identification.estimation.backlash_stiction import refined
+from identification.estimation.backlash_stiction import SHORT, refined
 from identification.estimation.between_samples import scans_per_row
 from identification.estimation.gauss_newton import descend
 from identification.estimation.irregular_slips import SlipPath, fit_irregular, near_path, path_evidence
 from identification.estimation.noise import generic_noise
 from identification.estimation.smooth_load import as_fit
 from identification.estimation.window import Fit
-from identification.limits import FIT
 from identification.models import Backlash, Loop
 from identification.record import LoopRecord
 from identification.simulation.valve import HALTS, RESTS
@@ -433,7 +432,7 @@ def refine_stick_slip(verdict: Verdict, period_s: float, config: Config) -> Verd
         verdict.cause is not Cause.VALVE
         or m is None
         or m.window.position is not None
-        or m.window.y.size < FIT.short
+        or m.window.y.size < SHORT
     ):
         return verdict
     window = m.play.window

@@ -20,11 +20,20 @@ from identification.controller.pi_regression import ControlLaw, Trends, unstated
 from identification.errors import NotAssessedError, TriageError
 from identification.experiments.find import Experiment, by_hand, in_automatic
 from identification.experiments.model import Modelled, Pooled, modelled, pooled
-from identification.limits import EXPERIMENTS, LIMITS
+from identification.limits import LIMITS
 from identification.models import Pid
 from identification.record import Floats, LoopRecord, Mask
 from identification.signals.robust import robust_deviation
 from tuning.from_test import FromTest, corners, settings_from
+
+MOST = 6  # Experiments of a record that are modelled, the largest [experiments]: a second of work each
+AS_GOOD = 1.3
+"""Factor between present and new gain, or integral time, from which new ones are proposed: less is within the
+accuracy of a test."""
+POINTS = 120  # Points of a response that a night stores for its page [points]: a picture shows no more
+MOST_A_NIGHT = 2
+"""Experiments of a loop that a night models, the largest [experiments]: two seconds of work each, for one
+loop of many."""
 
 CONSTANTS = {"gain": "gain", "slope_pct_per_s": "slope", "lags_s": "time_constant_s"}
 """Constants of a model, and their names in the belief."""
@@ -113,7 +122,7 @@ def learned(
         found = found_in(spec, even, series, config)
     models, untold, stated = [], [], controller_of(spec, even)
     wanted = [x for x in sorted(found, key=lambda x: -x.size) if closed or not x.course.closed]
-    for x in wanted[: EXPERIMENTS.most if closed else EXPERIMENTS.most_a_night]:
+    for x in wanted[: MOST if closed else MOST_A_NIGHT]:
         try:
             models.append(_the_right_way(modelled(even.record, x, beside), stated))
         except NotAssessedError as error:
@@ -231,7 +240,7 @@ def _as_row(record: LoopRecord, x: Experiment, m: Modelled | None, why: str | No
     }
     if m is None:
         return row | ({"untold": why} if why else {})
-    at = np.unique(np.linspace(0, m.pv.size - 1, EXPERIMENTS.points).round().astype(int))
+    at = np.unique(np.linspace(0, m.pv.size - 1, POINTS).round().astype(int))
     short = {k: [float(f"{v:.5g}") for v in getattr(m, k)[at]] for k in ("pv", "simulated", "op")}
     times = [round(float(t), 2) for t in m.time_s[at]]
     known = {
@@ -246,4 +255,4 @@ def chosen(of: Learned, present: Pid | None) -> Pid | None:
     if of.settings is None or present is None:
         return None
     new = replace(of.settings.robust, scan_s=present.scan_s, gain_share=present.gain_share)
-    return new if farther(present, new) > EXPERIMENTS.as_good else None
+    return new if farther(present, new) > AS_GOOD else None

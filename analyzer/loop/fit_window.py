@@ -8,12 +8,16 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from analyzer.config import CauseLimits
-from analyzer.limits import LOOP
 from analyzer.loop.assessments import noise_band
 from identification.estimation.between_samples import Rows, Scans, scans_per_row
 from identification.estimation.window import Window, block_means
 from identification.models import Pid
 from identification.record import Floats, LoopRecord, Mask
+
+BRIDGED = 0.05
+"""Holes of a record up to this long are bridged by a straight line before a model is fitted [periods]: a sine
+leaves 1 % of its amplitude over them; single missing rows left no worn valve assessed."""
+FEW_MORE = 0.1  # Share of a stretch that may be out of use beyond the least for the set point's moves in it
 
 LIVELIER = 2.0
 """Energy of the cycle in a stretch, over that in the latest one, from which that stretch is fitted instead: ours, a
@@ -34,7 +38,7 @@ def fit_stretch(record: LoopRecord, n: int, period: float, calm: bool = False) -
         return np.asarray(total[firsts + n] - total[firsts])
 
     out = within((~record.usable).astype(np.float64))
-    least, few = out <= out.min(), out <= out.min() + LOOP.few_more * n
+    least, few = out <= out.min(), out <= out.min() + FEW_MORE * n
     latest = int(np.argmin(out))
     if not calm:
         energy = within(np.where(record.usable, _of_cycle(record.error, period) ** 2, 0.0))
@@ -55,7 +59,7 @@ def _of_cycle(x: Floats, period: float) -> Floats:
 
 def bridged(usable: Mask, period: float) -> Mask:
     """Usable samples, shape (n,), and those in gaps shorter than a share of a period [samples]."""
-    most = int(LOOP.bridged * period)
+    most = int(BRIDGED * period)
     out = usable.copy()
     edges = np.flatnonzero(np.diff(np.concatenate(([1], usable.astype(np.int8), [1]))))
     for first, last in zip(edges[::2], edges[1::2], strict=True):

@@ -15,14 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.config import OscillationLimits
-from analyzer.limits import LOOP
 from analyzer.loop.decisions import counts
 from identification.controller.check import runs
-from identification.limits import SIGNALS
 from identification.record import Floats, LoopRecord, Mask
 from identification.signals.correlation import Rhythm, levelled_correlation, rhythm
 from identification.signals.setpoint_response import amplitude_at_rest, moves, without_setpoint
 from identification.signals.spectrum import (
+    WIDE_BAND,
     Bands,
     Spectrum,
     band_signal,
@@ -33,6 +32,10 @@ from identification.signals.spectrum import (
     tapered_power,
     usual_prominence,
 )
+
+FAR = 3.0  # First error over the usual error after settling, from which a record begins with a transient
+LONGEST_WAY = 0.5  # Largest share of a record for the transient to the set point
+REPORTED = 3  # Periods reported per loop
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,10 +85,10 @@ def begun_up(error: Floats) -> int:
     A vessel that heats up, or a loop just switched on, approaches its set point; this excursion hides every cycle.
     """
     arrived = int(np.argmax(error * error[0] <= 0.0))
-    if arrived == 0 or arrived > LOOP.longest_way * error.size:
+    if arrived == 0 or arrived > LONGEST_WAY * error.size:
         return 0
     usual = math.sqrt(float(np.mean(error[arrived:] ** 2)))
-    return arrived if abs(error[0]) > LOOP.far * usual else 0
+    return arrived if abs(error[0]) > FAR * usual else 0
 
 
 def error_spectrum(record: LoopRecord, whole: bool = False) -> Spectrum:
@@ -143,7 +146,7 @@ def _candidate(s: Spectrum, b: Bands, k: int, limits: OscillationLimits) -> Osci
     if expected < limits.samples_few * s.dt_s:
         return None
     x, dt = band_signal(s, line)
-    above = float(np.sum(np.abs(s.lines[math.ceil(line / SIGNALS.wide_band) :]) ** 2)) * 2 / s.n**2
+    above = float(np.sum(np.abs(s.lines[math.ceil(line / WIDE_BAND) :]) ** 2)) * 2 / s.n**2
     share = float(x @ x) / x.size / above if above > 0 else 0.0
     found = rhythm(x, dt, expected)
     cycles = s.duration_s / found.period_s
@@ -160,7 +163,7 @@ def peaks(b: Bands, least: float) -> list[int]:
     """Trial frequencies with the highest prominence within half an octave, the most power first."""
     p = b.prominence
     ks = [k for k in range(p.size) if p[k] >= least and p[k] >= p[max(k - 3, 0) : k + 4].max()]
-    return sorted(ks, key=lambda k: -float(b.power[k] * b.line[k]))[: 2 * LOOP.reported]
+    return sorted(ks, key=lambda k: -float(b.power[k] * b.line[k]))[: 2 * REPORTED]
 
 
 def subthreshold_period(found: Oscillations, limits: OscillationLimits) -> float | None:
@@ -266,7 +269,7 @@ def detect(record: LoopRecord, limits: OscillationLimits, whole: bool = False) -
             continue
         if o.period_s <= longest and not any(_is_harmonic_of(o, p) for p in kept):
             kept.append(o)
-    each = (_sized_by_envelope(s, o, usable, limits) for o in kept[: LOOP.reported])
+    each = (_sized_by_envelope(s, o, usable, limits) for o in kept[:REPORTED])
     lasting = (r for r in each if whole or _lasts(s, record, r[0], limits))
     sized = sorted(lasting, key=lambda r: -r[0].significance)
     if not sized:

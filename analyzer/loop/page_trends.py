@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analyzer.limits import LOOP
 from analyzer.loop.decisions import Cause
 from analyzer.loop.oscillation import Oscillations, counting
 from analyzer.loop.quality import Prepared
@@ -18,6 +17,8 @@ from identification.signals.turns import StemMarks, halves, turns_of
 
 if TYPE_CHECKING:
     from analyzer.loop.assess import Assessment
+
+QUICK = 0.2  # Time constant over a half-cycle up to which PV settles within it and can be seen as constant
 
 BUCKETS = 1200
 """Buckets a day: 72 s each, about a pixel of a screen's width."""
@@ -100,7 +101,7 @@ def _marks(faulty: Fit | None, fit: Fit | None, period_s: float) -> StemMarks:
     """Data for the marks: PV of a slow process does not settle, and the mark begins at the OP reversal."""
     if fit is None:
         return StemMarks(0.0, 0.0, 0.0)
-    quick = fit.time_constant_s <= LOOP.quick * 0.5 * period_s
+    quick = fit.time_constant_s <= QUICK * 0.5 * period_s
     answered = fit.dead_time_s + 2.0 * fit.time_constant_s if quick else 0.0
     return StemMarks(0.0 if faulty is None else float(faulty.valve.stickband), fit.dead_time_s, answered)
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from analyzer.config import QualityLimits
 from analyzer.history.series import Series
-from analyzer.limits import LOOP
 from analyzer.loop.decisions import LacksError, MissingData, Requirement, RequirementKind
 from analyzer.loop.sample_clock import (
     archived_share,
@@ -32,8 +31,15 @@ from analyzer.loops.spec import STATED, LoopSpec
 from identification.controller.check import runs
 from identification.controller.pi_regression import fed_back
 from identification.experiments.find import by_hand
-from identification.limits import EXPERIMENTS, LIMITS
+from identification.limits import LIMITS
 from identification.record import Floats, LoopRecord, Mask
+
+MOVING = 0.3
+"""Share of samples at which OP moves, from which no operator and no script moves it: a random sequence
+switches every fifth sample at most."""
+BEYOND_GAP = 1.1
+"""Error from which a constant OP is not within the gap of its controller [gaps]: rounding, and noise on
+PV."""
 
 RECORDED_RANGE = (0.005, 0.995)
 """Quantiles of PV that give its span if none is stated; contract of loops.csv."""
@@ -268,7 +274,7 @@ def moved_by_script(record: LoopRecord) -> bool:
     """Whether an operator or a script moves OP over the whole record: no SP is recorded, and OP, mostly constant,
     does not respond to PV."""
     op = record.op
-    stands = record.sp_estimated and float(np.mean(np.diff(op) != 0.0)) < EXPERIMENTS.moving
+    stands = record.sp_estimated and float(np.mean(np.diff(op) != 0.0)) < MOVING
     if not stands or not by_hand(record, np.ones(op.size, dtype=bool)):
         return False
     return fed_back(op, record.pv) < LIMITS.controller.feedback
@@ -289,7 +295,7 @@ def beyond_gap(manual: Mask, error: Floats, gap: float) -> Mask:
     automatic is constant too."""
     out = manual.copy()
     for first, last in runs(manual):
-        out[first:last] = float(np.abs(error[first:last]).max()) > LOOP.beyond_gap * gap
+        out[first:last] = float(np.abs(error[first:last]).max()) > BEYOND_GAP * gap
     return out
 
 

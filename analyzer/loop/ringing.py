@@ -152,7 +152,7 @@ class Ringing:
 
 
 def returning_line(limits: CauseLimits) -> float:
-    """Least correlation of the error after one period of a line [-]: it keeps its phase for line_kept periods, and is
+    """Least correlation of the error after one period of a line [-]: it keeps its phase for LINE_KEPT periods, and is
     the share of the cycle's power at which a sine in noise has the kurtosis kept_size."""
     share = math.sqrt((OF_NOISE - limits.kept_size) / (OF_NOISE - OF_SINE))
     return math.exp(-1.0 / limits.line_kept) * share

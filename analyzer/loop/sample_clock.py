@@ -9,9 +9,11 @@ from numba import njit
 
 from analyzer.config import QualityLimits
 from analyzer.history.series import Series, main_span
-from analyzer.limits import LOOP
 from analyzer.loop.decisions import LacksError, MissingData, Requirement, RequirementKind
 from identification.record import Floats, Mask
+
+GRID_SAMPLES = 20000  # Samples that are searched for a grid
+GRID_PER_LEVEL = 10  # Samples a level that distinguish a grid from values that repeat by chance
 
 
 def interval(stamp_s: Floats) -> float:
@@ -123,10 +125,10 @@ def resolution(value: Floats) -> float:
 
     It is the usual difference between occurring values; a minimum of samples per level identifies it.
     """
-    most = min(value.size, LOOP.grid_samples) / LOOP.grid_per_level
-    if np.unique(value[: int(most) + 2 * LOOP.grid_per_level]).size > most:
+    most = min(value.size, GRID_SAMPLES) / GRID_PER_LEVEL
+    if np.unique(value[: int(most) + 2 * GRID_PER_LEVEL]).size > most:
         return 0.0
-    levels = np.unique(value[: LOOP.grid_samples])
+    levels = np.unique(value[:GRID_SAMPLES])
     if levels.size < 2 or levels.size > most:
         return 0.0
     return float(np.median(np.diff(levels)))

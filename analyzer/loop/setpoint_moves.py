@@ -9,9 +9,12 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from analyzer.config import FigureLimits
-from analyzer.limits import LOOP
 from identification.record import Floats, LoopRecord, Mask
 from identification.signals.robust import robust_deviation
+
+ALIKE_LEAST = 3  # Number of similar moves of the set point from which they are a phase of a programme
+ALIKE_LEVEL = 0.1
+"""Largest difference of the levels of similar moves, over the size: recipes trim set points by less."""
 
 POINTS, FOLLOWED = 48, 2
 """Points kept of a response, and its recorded length in settling times; ours."""
@@ -174,13 +177,13 @@ def phases(found: Sequence[Move]) -> tuple[Phase, ...]:
             tuple(m.settled_s for m in k),
         )
         for k in kinds
-        if len(k) >= LOOP.alike_least
+        if len(k) >= ALIKE_LEAST
     )
 
 
 def alike(one: tuple[float, float], other: tuple[float, float]) -> bool:
     """Whether two moves between levels are of one kind [% of span]."""
-    most = LOOP.alike_level * abs(one[1] - one[0])
+    most = ALIKE_LEVEL * abs(one[1] - one[0])
     return all(abs(a - b) <= most for a, b in zip(one, other, strict=True))
 
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from analyzer.columns import Row
 from analyzer.config import AdviceLimits, Config
-from analyzer.limits import EXPLAIN
 from analyzer.loop.action import AGAINST
 from analyzer.loop.advice import Advice, propose, sought_for, withheld
 from analyzer.loop.assess import Assessment, assess
@@ -45,16 +44,24 @@ from identification.models import Estimate, Loop, Pid, Process, Valve
 from identification.record import Floats, LoopRecord
 from reports.pages import Field, Line, Panels, Picture, Place, Plot
 from tuning.describing import describe
-from tuning.forecast import Forecast, in_digits, loop_in_digits, predict, run
+from tuning.forecast import UNMODELLED, Forecast, in_digits, loop_in_digits, predict, run
 from tuning.frequency_response import is_stable, slowest_s
 from tuning.harmonic_balance import curves, travel_map
 from tuning.limit_cycle import Confirmed, confirm
-from tuning.limits import METHOD
 from tuning.recommend import WHY, WITHOUT_SETTINGS, Proposal
+
+NEIGHBOURS = 8
+"""Other loops whose OP is read with a loop's own trends, in the order of loops.csv [loops]: each is one more
+trend in memory, and the first that moves is the one that is tried."""
 
 if TYPE_CHECKING:
     from analyzer.night.decided import Decided
     from analyzer.night.nights import PlantLoop
+
+UNMODELLED_SPARSE = 0.13
+"""As UNMODELLED, of a faulty valve in a record of one row in several scans: rms of the logarithm of error that came
+over error forecast, 24 loops with backlash of benchmarks/world every 10 s (seeds 603 to 606); 0.05 of 31 at 1
+s."""
 
 SAID = sentences("settings")
 MAP_POINTS = 36
@@ -158,7 +165,7 @@ def _forecast(
         return None
     sparse = scans_per_row(now, record.dt_s) > 1 and model.valve is not None
     same = indistinguishable(fit, model, period_s, record) if sparse else ()
-    unmodelled = METHOD.unmodelled_sparse if sparse else METHOD.unmodelled
+    unmodelled = UNMODELLED_SPARSE if sparse else UNMODELLED
     found = predict(model, new, night, others, same, unmodelled)
     ratio = found.before[FORECAST[0]].value / max(error_of_night(record, now), 1e-9)
     apart = abs(math.log(max(ratio, 1e-9)))
@@ -336,7 +343,7 @@ def _neighbours(one: PlantLoop, record: LoopRecord) -> tuple[Floats, ...]:
     """OPs of the plant's other loops on a record's clock, up to the number that an explanation uses."""
     spec, plant = one.spec, one.plant
     tags = [s.op for s in plant.specs if s.loop != spec.loop and s.op and s.op != spec.op]
-    tags = list(dict.fromkeys(tags))[: EXPLAIN.neighbours]
+    tags = list(dict.fromkeys(tags))[:NEIGHBOURS]
     clock, found = record.start_s + record.time_s, []
     for x in plant.trends(tags, one.night).values() if tags else ():
         op, gap = onto_clock(x, clock, record.dt_s, plant.config.quality)

@@ -13,12 +13,12 @@ import numpy as np
 from analyzer.config import CauseLimits, Config
 from analyzer.loop.cause import Verdict, agrees, fault_of, hidden_by_grid, jump_evidence, needed
 from analyzer.loop.decisions import Cause, Fault
-from analyzer.loop.identified import slope_deviation
+from analyzer.loop.identified import DECODED, slope_deviation
 from analyzer.loop.measure import Measured
 from analyzer.loop.quality import Prepared
 from identification.estimation.backlash_stiction import WIDTHS, width_profile
+from identification.estimation.descent import LEAST_JUMP
 from identification.estimation.gauss_newton import covariance
-from identification.limits import INTERVALS
 from identification.record import Floats
 from identification.signals.robust import robust_deviation
 
@@ -91,6 +91,6 @@ def _constants_of_fit(
             found |= {"width": (fit.valve.stickband, relative), "slip_jump": (fit.valve.slip_jump, relative)}
     if slips is not None and slips.stick_slip is not None:
         valve = slips.stick_slip.valve
-        found["width"] = valve.stickband, INTERVALS.decoded
-        found["slip_jump"] = valve.slip_jump, math.log(INTERVALS.least_jump)
+        found["width"] = valve.stickband, DECODED
+        found["slip_jump"] = valve.slip_jump, math.log(LEAST_JUMP)
     return found

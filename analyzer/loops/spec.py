@@ -16,10 +16,11 @@ from typing import Any
 from analyzer.history.files import detect_encoding
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.history.stamps import parse_time
-from analyzer.limits import HISTORY
 from analyzer.loops.gain_schedule import GainSchedule, gain_schedule
 from identification.errors import InputError
 from identification.models import ErrorForm, Form
+
+MISSPELT = 0.75  # Similarity of a column's name to a known one from which it counts as misspelt
 
 STATED: dict[str, Any] = tomllib.loads(Path(__file__).with_name("loops.toml").read_text(encoding="utf-8"))
 """Endings of tags, allowed contents of columns and their names in other systems, and defaults for empty cells."""
@@ -220,7 +221,7 @@ def csv_table(path: Path, of: str) -> tuple[list[str], list[tuple[int, dict[str,
 def _check_header(path: Path, header: Sequence[str]) -> None:
     for name in header:
         known = name in (*COLUMNS, *OWN_COLUMNS)
-        near = [] if known else get_close_matches(name, COLUMNS, 1, HISTORY.misspelt)
+        near = [] if known else get_close_matches(name, COLUMNS, 1, MISSPELT)
         if near and near[0] not in header:
             remedy = f"did you mean '{near[0]}'? Rename it"
             raise InputError(f"{path}: column '{name}'", f"'{near[0]}'", remedy)

@@ -15,9 +15,15 @@ from contextlib import contextmanager, suppress
 from queue import Empty, SimpleQueue
 from typing import Any, Self
 
-from analyzer.limits import CLUSTER
 from analyzer.night.workers import Executor, R, T, WorkerDeath
 from identification.errors import InputError
+
+QUIET_S = 60.0
+"""Time without an answer of a cluster's workers after which its scheduler is queried for their number [s]."""
+ANSWER_S = 10.0  # Time in which a scheduler answers [s]
+GIVEN_UP_S = 900.0
+"""Time without workers, or without an answer of the scheduler, after which a run ends [s]: as long as
+machines take to come up."""
 
 GO_ON = (
     "finished work is kept in the store: start the scheduler and workers, then the same command with --resume"
@@ -43,7 +49,7 @@ class Cluster(Executor[T, R]):
             seen = f"--scheduler {self._address}: no Dask here"
             raise InputError(seen, "the extra 'cluster'", "pip install 'loop-triage[cluster]'") from error
         try:
-            asked = {"timeout": CLUSTER.answer_s, "set_as_default": False}
+            asked = {"timeout": ANSWER_S, "set_as_default": False}
             self._client: Any = Client(self._address, **asked)
         except (OSError, ValueError, TimeoutError) as error:
             seen = f"--scheduler {self._address}: no scheduler responds"
@@ -55,7 +61,7 @@ class Cluster(Executor[T, R]):
 
     def __exit__(self, *_: object) -> None:
         with suppress(Exception):  # do not wait for a scheduler that hangs
-            self._client.close(timeout=CLUSTER.answer_s)
+            self._client.close(timeout=ANSWER_S)
 
     def submit(self, task: T, alone: bool = False) -> None:
         with self._told():
@@ -81,22 +87,22 @@ class Cluster(Executor[T, R]):
         said = ""
         while True:
             try:
-                return self._coming.get(timeout=CLUSTER.quiet_s)
+                return self._coming.get(timeout=QUIET_S)
             except Empty:
                 seen = self._who_works()
             if seen and seen != said:
-                most = CLUSTER.given_up_s / 60.0
+                most = GIVEN_UP_S / 60.0
                 print(f"triage: --scheduler {self._address}: {seen}; waiting {most:.0f} min", file=sys.stderr)
             elif not seen:
                 idle_s = time.monotonic()
             said = seen
-            if time.monotonic() - idle_s > CLUSTER.given_up_s:
+            if time.monotonic() - idle_s > GIVEN_UP_S:
                 raise InputError(f"--scheduler {self._address}: {seen}", "workers that respond", GO_ON)
 
     def _who_works(self) -> str:
         """Why the cluster does not work; '' if it has workers."""
         try:
-            asked = {"callback_timeout": CLUSTER.answer_s}
+            asked = {"callback_timeout": ANSWER_S}
             workers = self._client.sync(self._client.scheduler.ncores, **asked)
         except (TimeoutError, OSError, ValueError):
             return "the scheduler does not respond"

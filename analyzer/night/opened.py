@@ -11,11 +11,10 @@ from typing import Any
 from weakref import finalize
 
 from analyzer.config import WorkerLimits
-from analyzer.finder.draft import Row, draft, found_told
+from analyzer.finder.draft import MA_HIGH, MA_LOW, Row, draft, found_told
 from analyzer.history.export import Export, ReadOptions, open_export
 from analyzer.history.files import own_scratch
 from analyzer.history.series import Series
-from analyzer.limits import HISTORY
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.spec import ROLES, LoopSpec, unknown_columns
 from analyzer.loops.tags import find_loops, match, read_loops
@@ -24,6 +23,8 @@ from analyzer.night.nights import Plant
 from analyzer.night.workers import WorkerDeath, Workers
 from analyzer.places import is_remote
 from identification.errors import InputError
+
+MA_LOOPS = 20  # Loops whose OPs are tested; the first in percent ends the test [loops]
 
 MOST_NAMES = 10
 """Maximum number of loops listed in a note; the others are counted."""
@@ -70,10 +71,8 @@ def in_milliamperes(
     unstated = [
         s for s in specs if s.op and s.pv and s.stated.isdisjoint(("op_lo", "op_hi")) and s.op_hi == 100.0
     ]
-    looked_at = unstated[: HISTORY.ma_loops]
-    if len(unstated) < 2 or not all(
-        _lies_within(source, str(s.op), HISTORY.ma_low, HISTORY.ma_high) for s in looked_at
-    ):
+    looked_at = unstated[:MA_LOOPS]
+    if len(unstated) < 2 or not all(_lies_within(source, str(s.op), MA_LOW, MA_HIGH) for s in looked_at):
         return specs, ()
     said = (
         f"OP of {len(unstated)} loops lies between 4 and 20, like mA: nothing is reported in % of OP; state "

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.limits import PAGES
 from analyzer.loop.settings_side_by_side import SPREAD, Comparison
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated, derivative_as_stated, unit_ratio
@@ -24,12 +23,28 @@ from identification.simulation.valve import law_of
 from reports import pages as parts
 from reports.texts import slug
 from tuning.describing import band, is_play
-from tuning.forecast import CALMER, DERIVATIVE, NOW, RECOMMENDED, REPAIRED, SMALLER, Tried
+from tuning.forecast import (
+    CALMER,
+    DERIVATIVE,
+    LEAST_PRELUDE,
+    NOW,
+    PRELUDE,
+    RECOMMENDED,
+    REPAIRED,
+    SMALLER,
+    WARM_UP,
+    Tried,
+)
 from tuning.frequency_response import slowest_s
 from tuning.harmonic_balance import TravelMap
 from tuning.limit_cycle import KICK
-from tuning.limits import METHOD
 from tuning.rules import simc
+
+SHOWN_RATIO = 3.0
+"""Times the present travel or error beyond which settings are omitted from the picture of costs."""
+MANY_TIMES = 100.0  # Multiple of the present figure beyond which no number is shown
+BETTER = 0.97  # Ratio to the present settings below which a figure is called better
+WORSE = 1.03  # The same above which it is called worse
 
 OFFERED = (CALMER, SMALLER, DERIVATIVE)
 """Alternative settings to choose from, besides the recommended ones."""
@@ -38,7 +53,7 @@ PLACED = {NOW: "now", RECOMMENDED: "recommended"}
 
 
 def _against(value: float, now: float) -> str:
-    return "better" if value < PAGES.better * now else "worse" if value > PAGES.worse * now else ""
+    return "better" if value < BETTER * now else "worse" if value > WORSE * now else ""
 
 
 def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
@@ -61,7 +76,7 @@ def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
     )
     if ratio is None:
         return f"{text}."
-    so = "; the cost is that" if ratio > PAGES.worse else ", and"
+    so = "; the cost is that" if ratio > WORSE else ", and"
     return f"{text}{so} the integrated error after a lasting load is {number(ratio)} times as large."
 
 
@@ -109,8 +124,8 @@ def _priced(c: Comparison, name: str) -> str:
 
 def _against_now_pct(ratio: float) -> str:
     """A change relative to now; no percentage if now is nearly zero."""
-    if ratio > PAGES.many_times:
-        return f"over {PAGES.many_times:g} times"
+    if ratio > MANY_TIMES:
+        return f"over {MANY_TIMES:g} times"
     return f"{signed(100.0 * (ratio - 1.0))} %"
 
 
@@ -183,7 +198,7 @@ def price(c: Comparison, unit: str) -> parts.Plot | None:
     """Travel over error of the settings that are not inferior in both, and of those compared; None without such."""
     if len(c.curve) < 2:
         return None
-    now, scale, most = c.tried[0], c.pv_span / 100.0, PAGES.shown_ratio
+    now, scale, most = c.tried[0], c.pv_span / 100.0, SHOWN_RATIO
     shown = [t for t in c.tried if t.stem_travel < most * now.stem_travel and t.error < most * now.error]
     places = tuple(_place(scale * t.error, t.stem_travel, t) for t in shown)
     found = [(x.error, x.travel) for x in c.curve if x.travel < most and x.error < most]
@@ -221,8 +236,8 @@ def _kick(c: Comparison) -> dict[str, float]:
     return {
         "kick": kick,
         "slowest_s": slowest_s(free),
-        "times": METHOD.prelude,
-        "least": METHOD.least_prelude,
+        "times": PRELUDE,
+        "least": LEAST_PRELUDE,
     }
 
 
@@ -254,7 +269,7 @@ def model(c: Comparison, spec: LoopSpec, unit: str) -> str:
         "op_lo": pid.op_lo,
         "op_hi": pid.op_hi,
         "op_start": 0.5 * (pid.op_lo + pid.op_hi),
-        "warm_up": METHOD.warm_up,
+        "warm_up": WARM_UP,
         "prelude": _kick(c),
         "settings": [
             {"name": t.name, "kp": t.controller.kp, "ti_s": _finite(t.controller.ti_s)} for t in alike

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from analyzer.columns import GROUP_LIST, names, row_of
-from analyzer.limits import PAGES
 from analyzer.loop.decisions import GroupRole
 from analyzer.pages import words
 from analyzer.pages.rank import PIPED, interactive
@@ -22,6 +21,8 @@ from reports import pages as parts
 from reports.markdown import escaped, rows_of_table
 from reports.plain import csv_text
 from reports.texts import visible
+
+GROUP_LOOPS = 12  # Loops of a group that are drawn one above the other [loops]: more do not fit on a screen
 
 PERIODS = 12.0
 """Periods in the aligned trends."""
@@ -194,7 +195,7 @@ def member_section(g: GroupView, loop: str, trends: Mapping[str, Thinned]) -> pa
 
 def graph(g: GroupView) -> parts.Graph:
     """Propagation of the oscillation from loop to loop."""
-    shown = [r for r in g.rows if r["role"] != GroupRole.SHARES or r is g.rows[0]][: PAGES.group_loops]
+    shown = [r for r in g.rows if r["role"] != GroupRole.SHARES or r is g.rows[0]][:GROUP_LOOPS]
     by_name = {r["loop"]: r for r in shown}
     first = shown[0]["loop"]
     parents = {n: r["parent"] if r["parent"] in by_name else first for n, r in by_name.items() if n != first}
@@ -223,7 +224,7 @@ def graph(g: GroupView) -> parts.Graph:
 
 def heat_map(g: GroupView) -> parts.HeatMap | None:
     """Spectra of the members below each other; None if the night has none."""
-    rows = g.rows[: PAGES.group_loops]
+    rows = g.rows[:GROUP_LOOPS]
     kept = [(r["loop"], json.loads(s)) for r in rows if (s := g.loops[r["loop"]]["spectrum"])]
     if not kept:
         return None
@@ -248,7 +249,7 @@ def heat_map(g: GroupView) -> parts.HeatMap | None:
 def aligned(g: GroupView, trends: Mapping[str, Thinned], only: Sequence[str] = ()) -> parts.Trend | None:
     """PV of the members below each other over some periods; None if the trends are too coarse."""
     shown = [r["loop"] for r in g.rows if r["loop"] in trends and (not only or r["loop"] in only)]
-    shown = (sorted(shown, key=only.index) if only else shown)[: PAGES.group_loops]
+    shown = (sorted(shown, key=only.index) if only else shown)[:GROUP_LOOPS]
     if not shown:
         return None
     first = trends[shown[0]]

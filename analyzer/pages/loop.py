@@ -14,7 +14,6 @@ import numpy as np
 from analyzer.columns import BY_NAME
 from analyzer.explain.words import beside_night, title
 from analyzer.history.plant_clock import UTC_NAME
-from analyzer.limits import PAGES
 from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES, Fault, Status
 from analyzer.pages import loop_pictures, words
@@ -29,6 +28,8 @@ from analyzer.words.units import row_settings
 from identification.mismatch.words import check
 from reports import pages as parts
 from reports.texts import slug
+
+MOST_SURE_PCT = 99.0  # Largest confidence shown [%]: nothing is certain
 
 WEEK = 7
 LEVELS = frozenset({"sp_mean_pct", "pv_mean_pct"})
@@ -155,7 +156,7 @@ def _believed(row: Row) -> parts.Facts:
     out = [("The verdict is based on", f"{nights} since {row['believed_since']}")]
     if row["worn_nights"]:
         certain = f", certain since {row['certain_since']}" if row["certain_since"] else ""
-        sure = "> 99" if row["worn_pct"] > PAGES.most_sure_pct else f"{row['worn_pct']:.0f}"
+        sure = "> 99" if row["worn_pct"] > MOST_SURE_PCT else f"{row['worn_pct']:.0f}"
         out.append(("Probability of a worn valve", f"{sure} %{certain}"))
     if row["certain_since"] and row["width_pct"] is not None:
         ends = f"{number(row['width_low_pct'])} … {number(row['width_high_pct'])}"

@@ -10,7 +10,6 @@ from datetime import date
 import numpy as np
 
 from analyzer.columns import BY_NAME
-from analyzer.limits import PAGES
 from analyzer.loop.cost import LOSS, MARK, OF_RECORDED, SIGNIFICANCE, cost, cost_column, mark
 from analyzer.loop.decisions import CAUSES, Action, Cause, Status, counts
 from analyzer.pages import words, work
@@ -36,6 +35,11 @@ from reports.pages import (
     section,
     there,
 )
+
+HISTORY = 60  # Nights of history on a page [nights]: two months, as a maintenance round takes
+CURVE_NIGHTS = 3  # Nights from which a curve is drawn [nights]
+AREA_LOOPS = 5  # Worst loops of an area that are named [loops]
+AREA_TILES = 15  # Loops of an area that are drawn separately; the rest is one rectangle [loops]
 
 NO_AREA = "no area stated"
 KEYS = (
@@ -143,7 +147,7 @@ def _area(name: str, rows: Sequence[words.Row]) -> tuple[words.NightDecision, ..
     worst = sorted((r for r in assessed if r["cause"] != Cause.NONE), key=lambda r: -(r[SIGNIFICANCE] or 0.0))
     numbers = [len(rows), len(assessed)]
     numbers += [sum(r["cause"] == c for r in assessed) for c in (*CAUSES, Cause.UNDECIDED)]
-    named = ", ".join(f"{r['loop']} ({words.number(r[SIGNIFICANCE])})" for r in worst[: PAGES.area_loops])
+    named = ", ".join(f"{r['loop']} ({words.number(r[SIGNIFICANCE])})" for r in worst[:AREA_LOOPS])
     return (name or NO_AREA, score(rows), *numbers, sum(r[SIGNIFICANCE] or 0.0 for r in assessed), named)
 
 
@@ -158,11 +162,11 @@ def _plant_tiles(night: ShownNight, rows: Sequence[words.Row], by: str) -> tuple
     """An area's loops, highest loss first, and the others in one tile."""
     ordered = sorted(((cost(r, by), r) for r in rows), key=lambda c: (-c[0], c[1]["loop"]))
     tiles = []
-    for worth, row in ordered[: PAGES.area_tiles]:
+    for worth, row in ordered[:AREA_TILES]:
         kind = "calm" if not needs_a_look(row) else row["cause"] if row["cause"] in CAUSES else "unclear"
         text = f"{row['loop']}: {words.number(worth)}. {words.cell(row, 'reason').text}"
         tiles.append(Tile(row["loop"], worth, kind, text, night.link(row["loop"]).href))
-    rest = [worth for worth, _ in ordered[PAGES.area_tiles :]]
+    rest = [worth for worth, _ in ordered[AREA_TILES:]]
     if rest:
         text = f"{len(rest)} more loops: {words.number(sum(rest))}"
         tiles.append(Tile(f"{len(rest)} more", sum(rest), "calm", text))
@@ -202,14 +206,14 @@ def summed(name: str, rows: Sequence[words.Row]) -> NightSum:
 
 def read_sums(store: Store, night: str) -> list[NightSum]:
     """The sums of a night and of those before it, oldest first."""
-    names = [n for n in store.nights() if n <= night][-PAGES.history :]
+    names = [n for n in store.nights() if n <= night][-HISTORY:]
     return [summed(n, read_nights(store, [n], SUMMED)) for n in names]
 
 
 def plant_history(sums: Sequence[NightSum]) -> Panels | None:
     """Curves over the nights: oscillating loops, and total loss, of the nights with the figure of the last one; None
     if there are too few."""
-    if len(sums) < PAGES.curve_nights:
+    if len(sums) < CURVE_NIGHTS:
         return None
     day = np.array([date.fromisoformat(s.name[:10]).toordinal() for s in sums], float)
     day -= day[-1]

@@ -8,12 +8,14 @@ from difflib import get_close_matches
 from functools import lru_cache
 
 from analyzer.explain.night import known
-from analyzer.limits import PAGES
 from analyzer.pages import groups, loop, morning, work
+from analyzer.pages.groups import GROUP_LOOPS
 from analyzer.pages.loop_pictures import trend_block
+from analyzer.pages.morning import HISTORY
 from analyzer.pages.reading import (
     BESIDE,
     NIGHT_COLUMNS,
+    USUAL_NIGHTS,
     ShownNight,
     Thinned,
     by_loop,
@@ -31,6 +33,9 @@ from reports.page_file import loads
 from reports.pages import Beside, Page, Section
 from reports.texts import slug
 
+DATED = 31  # Nights that have a page; the store has the others [nights]: a month
+DATED_LOOPS = 50  # Loops worth a look that a dated page lists at most [loops]
+
 LATEST = ("Latest night", "index.html")
 BUCKETS = 720
 """Maximum buckets of a trend in a side-by-side view; ours: two minutes of a day, and some kilobytes per loop."""
@@ -47,17 +52,17 @@ def pages_of_night(store: Store, name: str | None = None, top: int = 200) -> Ite
     night = read_night(store, name, top)
     shared = read_groups(store, night.name)
     nights = [n for n in store.nights() if n <= night.name]
-    links = nights_around(nights[-PAGES.dated :], night.name)
+    links = nights_around(nights[-DATED:], night.name)
     about = morning.morning_page(night, shared, morning.read_sums(store, night.name), links)
-    yield replace(about, choices=nights_to_choose(nights[-PAGES.dated :], night.name))
+    yield replace(about, choices=nights_to_choose(nights[-DATED:], night.name))
     yield work.maintenance_page(night)
     yield side_by_side(store, night)
     yield work.work_page(store, night)
-    members = {r["loop"] for g in shared for r in g.rows[: PAGES.group_loops]}
+    members = {r["loop"] for g in shared for r in g.rows[:GROUP_LOOPS]}
     trends = read_trends(store, members, [night.name])
     for g in shared:
         yield groups.group_page(g, trends, night)
-    yield from _loop_pages(store, night, nights[-PAGES.history :], shared, {**trends, **night.trends})
+    yield from _loop_pages(store, night, nights[-HISTORY:], shared, {**trends, **night.trends})
 
 
 def pages_of_loop(store: Store, name: str | None, tag: str) -> Iterator[Page]:
@@ -70,8 +75,8 @@ def pages_of_loop(store: Store, name: str | None, tag: str) -> Iterator[Page]:
         raise InputError(seen, f"one of its loops ({', '.join(near) or 'none is near'})", "correct --loop")
     shown = ShownNight(night, rows, {}, "", (), notes=read_notes(store.path), paged=(tag,))
     shared = [g for g in read_groups(store, night) if any(r["loop"] == tag for r in g.rows)]
-    members = {r["loop"] for g in shared for r in g.rows[: PAGES.group_loops]}
-    nights = [n for n in store.nights() if n <= night][-PAGES.history :]
+    members = {r["loop"] for g in shared for r in g.rows[:GROUP_LOOPS]}
+    nights = [n for n in store.nights() if n <= night][-HISTORY:]
     yield from _loop_pages(store, shown, nights, shared, read_trends(store, members, [night]))
 
 
@@ -122,12 +127,12 @@ def dated_pages(store: Store, name: str | None, written: Callable[[str], bool]) 
     """Morning pages by date, up to a night (the latest by default). Except for the last two, nights are skipped if
     `written` reports that their page is newer than their results."""
     last = name or store.require()
-    nights = [n for n in store.nights() if n <= last][-PAGES.dated :]
-    sums, told = morning.read_sums(store, last), lru_cache(PAGES.usual_nights)(told_of)
+    nights = [n for n in store.nights() if n <= last][-DATED:]
+    sums, told = morning.read_sums(store, last), lru_cache(USUAL_NIGHTS)(told_of)
     for night in nights:
         if night in nights[-2:] or not written(night):
             # loops' pages are those of the latest night
-            shown = replace(read_night(store, night, PAGES.dated_loops, told=told), paged=())
+            shown = replace(read_night(store, night, DATED_LOOPS, told=told), paged=())
             own = [s for s in sums if s.name <= night]
             found = morning.morning_page(shown, read_groups(store, night), own)
             links, choices = (*nights_around(nights, night), LATEST), nights_to_choose(nights, night)

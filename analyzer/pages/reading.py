@@ -15,7 +15,6 @@ import pyarrow as pa
 from analyzer.comparison.before_after import Span
 from analyzer.comparison.block_bootstrap import Floats
 from analyzer.lanes.lanes import FIGURE
-from analyzer.limits import PAGES
 from analyzer.loop.cost import LOSS, cost, cost_column
 from analyzer.loop.decisions import Cause, Status, counts
 from analyzer.pages.rank import worst_first
@@ -27,6 +26,9 @@ from analyzer.store.table import SHADED, TREND, read_stored, stored_names
 from analyzer.words.units import Row, row_settings
 from reports.pages import Cell, Table
 from reports.texts import slug
+
+USUAL_NIGHTS = 15
+"""Earlier nights that give the usual values of a loop [nights]: two weeks, and the night before."""
 
 BESIDE = "side-by-side"
 """Name of the page with loops below each other; the address after # lists them."""
@@ -269,7 +271,7 @@ def read_night(
     store.read("nights", night, ["loop"])
     earlier = [n for n in nights if n < night]
     rows = worst_first(read_nights(store, [night], NIGHT_COLUMNS))
-    remembered = by_loop([r for n in earlier[-PAGES.usual_nights :] for r in told(store, n)])
+    remembered = by_loop([r for n in earlier[-USUAL_NIGHTS:] for r in told(store, n)])
     remembered = {loop: own for loop, own in remembered.items() if own[-1]["night"] == earlier[-1]}
     known = notes.read_notes(store.path)
     most = largest_loss(rows)

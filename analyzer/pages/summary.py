@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from analyzer.lanes.lanes import FIGURE, lanes_in
-from analyzer.limits import PAGES
 from analyzer.loop.cost import SIGNIFICANCE, cost, cost_column
 from analyzer.loop.decisions import CAUSES, Action, Cause, Due, GroupRole, Lane, Status
 from analyzer.pages import words
@@ -17,15 +16,21 @@ from analyzer.words.orders import order
 from analyzer.words.units import changed_settings
 from reports.pages import Block, Cell, Page, Section, Table, Text, section, there
 
+SENTENCES = 3  # Sentences of a summary at most
+NAMED = 3  # Loops that a sentence names; the rest is counted [loops]
+SUMMARY_LOOPS = 10  # Loops that a summary lists [loops]
+NEWS = 8  # Changes that it lists
+LANE_NIGHTS = 2
+"""Nights in a row in or out of an inferred lane after which it is reported [nights]: one night can miss
+it."""
+
 CALM = "No loop needs action this morning."
 
 
 def listed(names: Sequence[str]) -> str:
     """Names in a sentence, only the first few."""
-    more = len(names) - PAGES.named
-    return (
-        ", ".join(names[: PAGES.named]) + f" and {more} more" if more > 0 else words.enumerated(list(names))
-    )
+    more = len(names) - NAMED
+    return ", ".join(names[:NAMED]) + f" and {more} more" if more > 0 else words.enumerated(list(names))
 
 
 def first_things(rows: Sequence[words.Row], groups: Sequence[GroupView] = ()) -> tuple[str, ...]:
@@ -48,7 +53,7 @@ def first_things(rows: Sequence[words.Row], groups: Sequence[GroupView] = ()) ->
             worth = 0.0 if work == Due.SHUTDOWN else sum(cost(r, by) for r in mine)
             found.append((worth, orders.asked(work, mine, listed([r["loop"] for r in mine]))))
     ordered = sorted(found, key=lambda pair: -pair[0])
-    return tuple(text for _, text in ordered[: PAGES.sentences]) or (CALM,)
+    return tuple(text for _, text in ordered[:SENTENCES]) or (CALM,)
 
 
 def _of_group(source: words.Row, others: Sequence[str]) -> str:
@@ -94,7 +99,7 @@ def _inside(nights: Sequence[words.Row], lane: Lane) -> list[bool]:
         return told
     states = told[:1]
     for k in range(1, len(told)):
-        last = told[max(k + 1 - PAGES.lane_nights, 0) : k + 1]
+        last = told[max(k + 1 - LANE_NIGHTS, 0) : k + 1]
         states.append(told[k] if len(set(last)) == 1 else states[-1])
     return states
 
@@ -151,10 +156,10 @@ def summary_page(store: Store, name: str | None = None) -> Page:
     InputError
         The store has no such night.
     """
-    night = read_night(store, name, PAGES.summary_loops, drawn=False)
+    night = read_night(store, name, SUMMARY_LOOPS, drawn=False)
     seen = [r for r in night.rows if r["loop"] not in night.hidden]
     first = words.listing(first_things(seen, read_groups(store, night.name)))
-    left, lines, most = sum(map(needs_a_look, seen)) - len(night.worst), news_lines(night), PAGES.news
+    left, lines, most = sum(map(needs_a_look, seen)) - len(night.worst), news_lines(night), NEWS
     news = [*lines[:most], f"{len(lines) - most} more"] if len(lines) > most else lines
     told = words.listing(news) if news else Text(("Nothing new.",))
     sections = there(

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from analyzer.history.plant_clock import stamp
-from analyzer.limits import PAGES
 from analyzer.loop.decisions import Action, Cause, Fault, Status
 from analyzer.pages.reading import ShownNight, by_loop, oscillates, read_nights
 from analyzer.pages.words import ALL_LOOPS, NightDecision, Row, cause_cell, with_noun
@@ -18,6 +17,10 @@ from analyzer.store.store import Store
 from analyzer.words.belief import wear_text
 from analyzer.words.orders import fault_width, stroke
 from reports.pages import Cell, Page, Section, Table, Text, Tiles, section, there
+
+TRAVELLED = 20  # Valves that the page of maintenance lists for their travel alone [loops]
+WORK_NIGHTS = 62  # Nights that the list of work looks at [nights]: a month, and the month before it
+BEFORE_WORK = 7  # Nights before a piece of work that are compared with those since [nights]: a week
 
 MAINTENANCE, WORK = "maintenance", "work"
 """Names of the two pages."""
@@ -63,7 +66,7 @@ def worn(night: ShownNight) -> Table:
     """The valves with the most travel."""
     rows = [r for r in night.rows if r["valve_travel_pct_per_h"] is not None]
     rows.sort(key=lambda r: -r["valve_travel_pct_per_h"])
-    return night.table("travel", rows[: PAGES.travelled])
+    return night.table("travel", rows[:TRAVELLED])
 
 
 def maintenance_page(night: ShownNight) -> Page:
@@ -95,7 +98,7 @@ class Sides:
 def sides(rows: Sequence[Row], day: str) -> Sides:
     """A loop's assessed nights, oldest first, split by the day of the work, which is in neither part."""
     told = [r for r in rows if r["status"] == Status.OK]
-    before = [r for r in told if r["night"] < day][-PAGES.before_work :]
+    before = [r for r in told if r["night"] < day][-BEFORE_WORK:]
     return Sides(before, [r for r in told if r["night"] > day])
 
 
@@ -137,7 +140,7 @@ def won(night: ShownNight, works: Mapping[str, Work], parted: Mapping[str, Sides
 def work_page(store: Store, night: ShownNight) -> Page:
     """The work list after a night."""
     works = {loop: work_on(notes) for loop, notes in night.notes.items() if notes}
-    names = [n for n in store.nights() if n <= night.name][-PAGES.work_nights :]
+    names = [n for n in store.nights() if n <= night.name][-WORK_NIGHTS:]
     history = by_loop(read_nights(store, names, READ, works))
     parted = {k: sides(history.get(k, ()), stamp(w.since_s, night.zone)[:10]) for k, w in works.items()}
 
@@ -160,7 +163,7 @@ def work_page(store: Store, night: ShownNight) -> Page:
         return work.state in FINISHED, work.due or "9999", -work.since_s, row["loop"]
 
     rows = sorted((r for r in night.rows if r["loop"] in works), key=urgency)
-    note = f"Since: nights after the day of the note, next to the {PAGES.before_work} before it."
+    note = f"Since: nights after the day of the note, next to the {BEFORE_WORK} before it."
     empty = Text(('Nothing is noted: triage note STORE LOOP "..." --state open --due DATE.',))
     sections = there(
         section(f"Won since {night.name[:7]}-01", won(night, works, parted)),

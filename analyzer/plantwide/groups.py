@@ -18,6 +18,16 @@ from analyzer.plantwide.wave import Wave, on_one_clock
 from identification.record import Floats
 from identification.signals.cross_spectrum import Whole, band, chance_coherence, coherences, drift, tapered
 
+HINTS = 4
+"""Loops with a hint of an oscillation from which it counts although none shows it alone:
+proofs/plant_wide.py."""
+HEARD = 6  # Clearest loops of a group that a further loop has to predict [loops]
+ASKED = 12  # Loops of a group that are tested for the loops they move with, the most coherent first
+SHIFTS = 12  # Largest number of shifts of the lines that estimate chance coherence
+HARMONIC = 0.03  # Logarithm by which a period may differ from a whole part of another one to be its harmonic
+NEAR_PERIOD = 0.25
+"""Largest difference of the logarithms of periods at which this is tested: proofs/plant_wide.py."""
+
 
 @dataclass(frozen=True, slots=True)
 class Group:
@@ -76,7 +86,7 @@ class _Neighbours:
         joined = self.moving_with(one)
         inside = {self._loop[j] for j in (one, *joined)}
         seen: dict[int, list[float]] = {}
-        for j in list(joined)[: self._limits.asked]:
+        for j in list(joined)[:ASKED]:
             for k, level in self.moving_with(j).items():
                 if self._loop[k] not in inside:
                     seen.setdefault(k, []).append(level)
@@ -120,7 +130,7 @@ class _Neighbours:
             return np.zeros(0)
         low, high, _ = band(self.waves[one].line)
         far = max((high - low) // 2, 4)
-        shifts = np.unique(np.linspace(3, far, self._limits.shifts // 2).astype(int))
+        shifts = np.unique(np.linspace(3, far, SHIFTS // 2).astype(int))
         found = [self._coherences(one, others, int(sign * s)) for s in shifts for sign in (-1, 1)]
         return np.asarray(np.max(found, axis=0))
 
@@ -171,7 +181,7 @@ def _is_wave(waves: Sequence[Wave], limits: PlantLimits) -> bool:
     """Whether the common signal is an oscillation, and not the load of neighbours: one loop shows it alone, or
     several indicate it."""
     hints = sum(w.prominence >= limits.hint_prominence for w in waves)
-    return hints >= limits.hints or any(w.own for w in waves)
+    return hints >= HINTS or any(w.own for w in waves)
 
 
 def _merged(groups: Sequence[Group], limits: PlantLimits) -> list[Group]:
@@ -198,7 +208,7 @@ def _is_same(one: Group, other: Group, limits: PlantLimits) -> bool:
 def _is_group_of_harmonics(one: Group, other: Group, limits: PlantLimits) -> bool:
     """Whether the oscillations of a group are harmonics of a loop of another one."""
     ratio = other.period_s / one.period_s
-    if round(ratio) < 2 or abs(math.log(ratio / round(ratio))) > limits.harmonic:
+    if round(ratio) < 2 or abs(math.log(ratio / round(ratio))) > HARMONIC:
         return False
     return any(w.harmonic == round(ratio) and loop in other.waves for loop, w in one.waves.items())
 
@@ -206,8 +216,8 @@ def _is_group_of_harmonics(one: Group, other: Group, limits: PlantLimits) -> boo
 def _with_foresight(group: Group, beside: _Neighbours, limits: PlantLimits) -> Group:
     """A group with further loops that are not coherent enough but predict it: a source with irregular stick-slip
     moves others by the part of it that their filters pass."""
-    clearest = sorted(group.waves.values(), key=lambda w: -w.prominence)[: limits.heard]
-    near = (beside.waves[k] for k in beside.near(next(iter(group.waves.values())).line, limits.near_period))
+    clearest = sorted(group.waves.values(), key=lambda w: -w.prominence)[:HEARD]
+    near = (beside.waves[k] for k in beside.near(next(iter(group.waves.values())).line, NEAR_PERIOD))
     asked = [w for w in near if w.loop not in group.waves and w.harmonic == 1 and _shows(w, limits)]
     best: dict[str, tuple[float, Wave]] = {}
     for wave, level in zip(asked, foresight(asked, clearest), strict=True):

@@ -31,6 +31,15 @@ from analyzer.plantwide.groups import Group, groups_of
 from analyzer.plantwide.source import Candidate, Lags, candidates_of
 from analyzer.plantwide.wave import Wave
 
+LAG_KNOWN = 0.5
+"""Standard deviation of a lag over the lag up to which it is reported: two deviations from nothing."""
+MOST_IN_TREE = 40
+"""Loops of a group up to which the path from loop to loop is reported [loops]: in larger groups all are
+linked to the source."""
+BY_WAY = 0.02
+"""Coherence surplus of a loop with another follower over that with the source, for a path by that follower:
+less is chance."""
+
 READ = ("usable_h", "evidence", "average_absolute_error_pct")
 """Columns of a loop that are read here, in addition to attributes of a Finding."""
 Loops = Mapping[str, Finding]
@@ -216,7 +225,7 @@ def _links_to_source(group: Group, best: Candidate, lags: Lags, limits: PlantLim
     for loop, coherence in group.coherence.items():
         if loop != best.loop:
             lag = lags.between(best.loop, loop)
-            known = lag.lag_s if lag.deviation_s < limits.lag_known * abs(lag.lag_s) else None
+            known = lag.lag_s if lag.deviation_s < LAG_KNOWN * abs(lag.lag_s) else None
             out[loop] = Root(best.loop, max(lag.coherence, coherence), known, best.confidence_pct)
     return out
 
@@ -227,7 +236,7 @@ def _parents(source: str, lags: Lags, limits: PlantLimits) -> dict[str, str]:
     Coherence decreases along the path, because each loop adds its own noise; in large groups all follow the source.
     """
     others = [loop for loop in lags.waves if loop != source]
-    if len(lags.waves) > limits.most_in_tree:
+    if len(lags.waves) > MOST_IN_TREE:
         return dict.fromkeys(others, source)
     best = {loop: (lags.between(source, loop).coherence, source) for loop in others}
     out: dict[str, str] = {}
@@ -236,7 +245,7 @@ def _parents(source: str, lags: Lags, limits: PlantLimits) -> dict[str, str]:
         out[loop] = best.pop(loop)[1]
         for other, (level, _) in best.items():
             found = lags.between(loop, other).coherence
-            if found > level + limits.by_way:
+            if found > level + BY_WAY:
                 best[other] = found, loop
     return out
 

@@ -16,11 +16,23 @@ from itertools import combinations
 import numpy as np
 
 from analyzer.config import PlantLimits
-from analyzer.limits import WAVES
 from analyzer.loop.decisions import Cause, Finding
 from analyzer.plantwide.wave import Wave, in_steps
 from identification.record import Floats
 from identification.signals.cross_spectrum import Delay, band, granger_f, lag, tapered
+
+CANDIDATES = 12
+"""Candidates of a group that are weighed, the likeliest by their verdicts and the clearness of their
+oscillations [loops]."""
+MUCH_EVIDENCE = 1000.0  # Evidence of a valve's fault that counts as the maximum [nat]
+SURE_LEAD = 3.0  # Deviations from which a lead is certain
+
+LAG_PERIODS = 4.0  # Range of the search for lags [periods]
+LAG_LEAST_S = 900.0  # The same at least [s]: clocks of two historians differ by minutes
+FORESEEN = 12  # Steps of the past that predict others [steps]: half of a period to a whole one
+LEAST_STEPS = 300  # Fewest common steps of trends for a test of prediction [steps]: 12 for each constant
+LEAST_F = 3.0  # F of Granger's test from which a prediction is more than chance: one in a thousand by chance
+PLAIN_RATIO = 10.0  # Ratio of the F of both directions from which the direction is clear
 
 AT_ONCE = 64
 """Oscillations whose predictions are computed at a time."""
@@ -60,7 +72,7 @@ def _leads(loops: Sequence[str], lags: Lags, limits: PlantLimits) -> tuple[Float
     ahead, shared = np.zeros((n, n)), np.zeros((n, n))
     for i, j in combinations(range(n), 2):
         found = lags.between(loops[i], loops[j])
-        sure = max(min(found.lag_s / (limits.sure_lead * max(found.deviation_s, 1e-9)), 1.0), -1.0)
+        sure = max(min(found.lag_s / (SURE_LEAD * max(found.deviation_s, 1e-9)), 1.0), -1.0)
         ahead[i, j], ahead[j, i] = sure * found.coherence, -sure * found.coherence
         shared[i, j] = shared[j, i] = found.coherence
     count = max(n - 1, 1)
@@ -78,7 +90,7 @@ def candidates_of(lags: Lags, peers: Mapping[str, Finding], limits: PlantLimits)
 
     lags : of the group's oscillations, on one clock; peers : verdicts by loop; a loop without one is no candidate.
     """
-    waves = _first_guess(list(lags.waves.values()), peers, limits.candidates)
+    waves = _first_guess(list(lags.waves.values()), peers, CANDIDATES)
     if not waves:
         return ()
     signs = _signs_by_name(waves, [peers[w.loop] for w in waves], lags, limits)
@@ -97,7 +109,7 @@ def _signs_by_name(
     """The criteria of each candidate by name."""
     first, shared = _leads([w.loop for w in waves], lags, limits)
     own = [p.number("evidence") if p.cause is Cause.VALVE else 0.0 for p in peers]
-    most = math.log1p(limits.much_evidence)
+    most = math.log1p(MUCH_EVIDENCE)
     columns: dict[str, Sequence[float] | Floats] = {
         "valve": [min(math.log1p(max(x, 0.0)) / most, 1.0) for x in own],
         "best_valve": _relative(np.array(own)),
@@ -135,7 +147,7 @@ def _lag(one: Wave, other: Wave) -> Delay:
     if high - low < 4:
         return Delay(0.0, math.inf, 0.0)
     x, y = (tapered(w.lines[low - w.first - 1 : high - w.first + 1]) for w in (one, other))
-    return lag(x, y, one.duration_s, max(WAVES.lag_periods * one.period_s, WAVES.lag_least_s))
+    return lag(x, y, one.duration_s, max(LAG_PERIODS * one.period_s, LAG_LEAST_S))
 
 
 def _foreseeing(waves: Sequence[Wave], asked: int | None = None) -> tuple[list[int], Floats]:
@@ -150,11 +162,11 @@ def _foreseeing(waves: Sequence[Wave], asked: int | None = None) -> tuple[list[i
         found.append((i, *in_steps(w.trend, w.trend_first, few)))
     begin = max((first for _, first, _ in found), default=0)
     end = min((first + x.size for _, first, x in found), default=0)
-    if len(found) < 2 or end - begin < WAVES.least_steps:
+    if len(found) < 2 or end - begin < LEAST_STEPS:
         return [], np.zeros((0, 0))
     trends = np.array([x[begin - first : end - first] for _, first, x in found], float)
     known = [i for i, *_ in found]
-    return known, granger_f(trends, WAVES.foreseen, asked and sum(i < asked for i in known))
+    return known, granger_f(trends, FORESEEN, asked and sum(i < asked for i in known))
 
 
 def foresees(waves: Sequence[Wave]) -> Floats:
@@ -163,8 +175,8 @@ def foresees(waves: Sequence[Wave]) -> Floats:
     known, f = _foreseeing(waves)
     if not known:
         return out
-    clear = np.maximum(f, f.T) >= WAVES.least_f
-    ratio = np.log(np.maximum(f, 0.1) / np.maximum(f.T, 0.1)) / math.log(WAVES.plain_ratio)
+    clear = np.maximum(f, f.T) >= LEAST_F
+    ratio = np.log(np.maximum(f, 0.1) / np.maximum(f.T, 0.1)) / math.log(PLAIN_RATIO)
     out[known] = np.where(clear, np.clip(ratio, -1.0, 1.0), 0.0).sum(axis=1) / (len(known) - 1)
     return out
 

@@ -15,8 +15,14 @@ import numpy as np
 import pyarrow as pa
 
 from analyzer.config import PlantLimits
-from analyzer.limits import WAVES
 from identification.record import Floats, LoopRecord
+
+BLOCK_S = 120.0
+"""Length of the blocks between which moves are compared [s]: longer than delays of recorders and scans, short
+compared with a shift."""
+LEAST_BLOCKS = 30  # Blocks from which moves are compared [blocks]
+USUAL_MOVE = 0.6  # Quantile of moves that is a usual one
+MOST_MOVE = 3.0  # Largest move that counts, in usual ones
 
 STEPS = 40
 """Steps per usual move that are stored; ours: a fortieth is far below the errors of recorders."""
@@ -57,10 +63,10 @@ class Moves:
 
 def moves_of(record: LoopRecord) -> Moves | None:
     """Stored moves of a record; None if it is too short."""
-    at = np.floor((record.start_s + record.time_s) / WAVES.block_s).astype(np.int64)
+    at = np.floor((record.start_s + record.time_s) / BLOCK_S).astype(np.int64)
     block = at - at[0]
     count = int(block[-1]) + 1
-    if count < WAVES.least_blocks:
+    if count < LEAST_BLOCKS:
         return None
     good = ~record.bad
     kept = np.bincount(block, good.astype(np.float64), count).astype(np.float64)
@@ -77,10 +83,10 @@ def _in_steps(total: Floats, kept: Floats) -> Small:
     there = kept > 0
     move = np.diff(total / np.maximum(kept, 1.0))
     move[~(there[1:] & there[:-1])] = 0.0
-    usual = float(np.quantile(np.abs(move), WAVES.usual_move))
+    usual = float(np.quantile(np.abs(move), USUAL_MOVE))
     if not usual > 1e-9 * max(float(np.abs(total).max()), 1.0):
         return np.empty(0, np.int8)
-    return np.round(STEPS * np.clip(move / usual, -WAVES.most_move, WAVES.most_move)).astype(np.int8)
+    return np.round(STEPS * np.clip(move / usual, -MOST_MOVE, MOST_MOVE)).astype(np.int8)
 
 
 def links_of(moves: Sequence[Moves], limits: PlantLimits) -> dict[str, Link]:

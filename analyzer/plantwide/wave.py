@@ -15,10 +15,23 @@ import pyarrow as pa
 from scipy.fft import fft, ifft, irfft, next_fast_len
 
 from analyzer.config import PlantLimits
-from analyzer.limits import WAVES
 from analyzer.loop.oscillation import Oscillations, peaks
 from identification.record import Floats
 from identification.signals.spectrum import Complex, Spectrum, locked_harmonic, peak_prominence
+
+WAVES = 8  # Periods of a loop that are compared with those of others, at most: more were never shared
+
+REACH = 1.35
+"""Factor to either side of a period's frequency up to which lines are kept, for neighbours whose period
+differs."""
+STEPS = 12  # Steps of a period that a trend keeps at least
+TREND_STEPS = 2400  # Steps of a trend at most: a hundred periods show which loop predicts which
+APART = 1.2  # Ratio from which two peaks of one loop are two oscillations
+ENVELOPE = 0.5
+"""An oscillation is present if its envelope exceeds this share of its 90 % quantile: as an oscillation's
+is."""
+SAME = 0.02  # Difference of two spans that counts as zero [periods]
+COVERED = 0.8  # Share of the common span that a record has to cover for a comparison
 
 FINE = 8
 """Samples of the envelope for each line."""
@@ -75,13 +88,13 @@ class Wave:
         padded = np.pad(power, width, mode="reflect")
         level = np.sqrt(np.convolve(padded, np.ones(width) / width, mode="same"))[width:-width]
         top = float(np.quantile(level, 0.9))
-        on = level >= WAVES.envelope * top if top > 0 and math.isfinite(top) else np.zeros(1)
+        on = level >= ENVELOPE * top if top > 0 and math.isfinite(top) else np.zeros(1)
         return 100.0 * float(np.mean(on))
 
 
 def _centred(s: Spectrum, line: float) -> float:
     """Period [s] at the centre of the power about a frequency [lines]."""
-    at = np.arange(math.floor(line / WAVES.apart), min(math.ceil(line * WAVES.apart), s.lines.size - 1) + 1)
+    at = np.arange(math.floor(line / APART), min(math.ceil(line * APART), s.lines.size - 1) + 1)
     power = np.abs(s.lines[at]) ** 2
     return s.duration_s / float(power @ at / power.sum())
 
@@ -92,9 +105,9 @@ def _thinned_wave(error: Floats, dt_s: float, start_s: float, period_s: float) -
     Steps are the sample interval times a power of two and begin at whole multiples of themselves, so that those of
     other loops with the same interval coincide or can be joined in pairs.
     """
-    few = 2 ** max(math.floor(math.log2(max(period_s / (WAVES.steps * dt_s), 1.0))), 0)
+    few = 2 ** max(math.floor(math.log2(max(period_s / (STEPS * dt_s), 1.0))), 0)
     first, means = in_steps(error, round(start_s / dt_s), few)
-    last = means[-WAVES.trend_steps :]
+    last = means[-TREND_STEPS:]
     return few * dt_s, first + means.size - last.size, last.astype(np.float32)
 
 
@@ -115,12 +128,12 @@ def _cut(
     """
     period_s, harmonic, own = asked
     line = s.duration_s / period_s
-    low = max(math.floor(line / WAVES.reach) - BESIDE, 0)
-    high = min(math.ceil(line * WAVES.reach) + BESIDE, s.lines.size - 1)
+    low = max(math.floor(line / REACH) - BESIDE, 0)
+    high = min(math.ceil(line * REACH) + BESIDE, s.lines.size - 1)
     if line * 1.1 > s.lines.size - 1 or high - low < 2 * BESIDE:
         return None
-    near = slice(math.floor(line / WAVES.apart), math.ceil(line * WAVES.apart) + 1)
-    above = float(power[max(math.ceil(line / (2 * WAVES.apart)), 1) :].sum())
+    near = slice(math.floor(line / APART), math.ceil(line * APART) + 1)
+    above = float(power[max(math.ceil(line / (2 * APART)), 1) :].sum())
     return Wave(
         loop,
         period_s,
@@ -154,9 +167,9 @@ def waves_of(loop: str, found: Oscillations, end_s: float, limits: PlantLimits) 
             wanted += [(o.period_s / m, m, False) for m, size in sizes if size > limits.locked_harmonic]
     for k in peaks(b, limits.weak_prominence):
         period = _centred(s, float(b.line[k]))
-        if all(abs(math.log(period / p)) > math.log(WAVES.apart) for p, *_ in wanted):
+        if all(abs(math.log(period / p)) > math.log(APART) for p, *_ in wanted):
             wanted.append((period, 1, False))
-        if len(wanted) >= limits.waves:
+        if len(wanted) >= WAVES:
             break
     error, power = irfft(s.lines, s.n), s.lines.real**2 + s.lines.imag**2
     cut = (_cut(s, power, loop, end_s - s.duration_s, error, asked) for asked in wanted)
@@ -221,10 +234,10 @@ def _on_span(wave: Wave, span: tuple[float, float]) -> Wave | None:
     """The lines of an oscillation over another span, start and duration [s]; None if its record covers too little of
     it."""
     start, length = span
-    if abs(wave.start_s - start) + abs(wave.duration_s - length) <= WAVES.same * wave.period_s:
+    if abs(wave.start_s - start) + abs(wave.duration_s - length) <= SAME * wave.period_s:
         return wave
     begin, end = max(start, wave.start_s), min(start + length, wave.start_s + wave.duration_s)
-    if end - begin < WAVES.covered * length:
+    if end - begin < COVERED * length:
         return None
     count = wave.lines.size
     size = next_fast_len(FINE * count)

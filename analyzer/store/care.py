@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from datetime import date, timedelta
 from pathlib import Path
 
-from analyzer.limits import STORE
 from analyzer.store import notes
+from analyzer.store.lock import LEFT_OVER_S
 from analyzer.store.store import MAKE_ONE, SCHEMA, Store, is_night
 from analyzer.store.table import KEPT, DamagedError, stored_parts
 from identification.errors import InputError, NotNowError
@@ -99,7 +99,7 @@ def pruned(store: Store, keep_d: int, detail_d: int | None, dry: bool = False) -
     first = _days_before(latest, keep_d)
     detailed = first if detail_d is None else max(first, _days_before(latest, detail_d))
     gone = [p for t in KEPT for p in store.files(t.name) if p.stem < (detailed if t.bulky else first)]
-    half_written, before = sorted(store.path.rglob(f".*{SUFFIX}")), time.time() - STORE.left_over_s
+    half_written, before = sorted(store.path.rglob(f".*{SUFFIX}")), time.time() - LEFT_OVER_S
     gone += [path for path in half_written if path.stat().st_mtime < before]
     if not dry:
         for path in gone:

@@ -25,13 +25,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analyzer.history.parquet import forget_halves, holds_copies
-from analyzer.limits import STORAGE, STORE
 from analyzer.places import answering, content, is_remote
 from analyzer.store.notes import user
 from identification.errors import InputError
 
 if TYPE_CHECKING:
     from filelock import BaseFileLock
+
+SETTLE_S = 2.0
+"""Time after which a lock taken over from a dead run is tested again [s]: another run may take it over at the
+same moment."""
+ALIVE_S = 60.0  # How often a holder of shared storage renews its lock [s]
+DEAD_S = 600.0  # Age from which its signature is a dead run's [s]: ten that failed to come
+LEFT_OVER_S = 86400.0  # Age from which unfinished files count as remains of a process that died [s]
 
 LOCK, OWNER = "run.lock", "run.owner.json"
 """Names within the store."""
@@ -40,7 +46,7 @@ SCRATCH, MAKING = ".copies-", ".making"
 TRIED = ".written"
 """Name of an object that tests whether shared storage can be written."""
 Signature = dict[str, Any]
-"""User, host, process, start time, a mark of its own, and time of the last signature (alive_s [s])."""
+"""User, host, process, start time, a mark of its own, and time of the last signature (ALIVE_S [s])."""
 
 
 @contextmanager
@@ -89,7 +95,7 @@ def _held_scratch(store: Path, resume: bool) -> tuple[Path, BaseFileLock]:
     """A directory of copies and its lock: for a resumed run the newest unused one, otherwise a new one. Other unused
     ones are removed."""
     for left in store.glob(f"{MAKING}{SCRATCH}*"):
-        if time.time() - _changed_s(left) > STORE.left_over_s:
+        if time.time() - _changed_s(left) > LEFT_OVER_S:
             shutil.rmtree(left, ignore_errors=True)
     taken: tuple[Path, BaseFileLock] | None = None
     for left in sorted(store.glob(f"{SCRATCH}*"), key=_changed_s, reverse=True):
@@ -153,7 +159,7 @@ def _sign_alone(store: Path, mine: Signature) -> None:
                 raise
             known = True
         if dead or not known:
-            time.sleep(STORAGE.settle_s)
+            time.sleep(SETTLE_S)
             if _signature(store).get("mark") != mine["mark"]:
                 raise _in_use(store)
 
@@ -188,8 +194,8 @@ def _require_unsigned(store: Path) -> bool:
     alive_s = known.get("alive_s")
     if _is_dead_here(known):
         return True
-    if isinstance(alive_s, int | float) and time.time() - alive_s < STORE.dead_s:
-        left = max(math.ceil((STORE.dead_s + alive_s - time.time()) / 60.0), 1)
+    if isinstance(alive_s, int | float) and time.time() - alive_s < DEAD_S:
+        left = max(math.ceil((DEAD_S + alive_s - time.time()) / 60.0), 1)
         raise _in_use(store, f"; if it died, its hold ends in {left} min, then --resume continues it")
     return bool(known)
 
@@ -200,7 +206,7 @@ def _renewed(store: Path, mine: Signature) -> Iterator[None]:
     ended = threading.Event()
 
     def live() -> None:
-        while not ended.wait(STORE.alive_s):
+        while not ended.wait(ALIVE_S):
             with contextlib.suppress(Exception):  # the next one may succeed
                 _sign_lock(store, mine)
 

@@ -8,9 +8,9 @@ from typing import Any
 
 from analyzer.columns import Row
 from analyzer.lanes.lanes import lanes_in
-from analyzer.limits import PAGES
 from analyzer.loop.decisions import Action, Cause, Due, Fault, Lane
 from analyzer.words import toml_of
+from analyzer.words.reason import STROKE_STEPS
 from analyzer.words.units import changed_settings, duration
 
 Cases = Mapping[Action, Callable[[Row], str]]
@@ -32,7 +32,7 @@ def stroke(row: Row) -> tuple[str, str]:
     width, kind = fault_width(row), texts("by_hand").get(row["valve_fault"], "")
     if width is None:
         return "5", kind.format(width="some steps")
-    return f"{width / PAGES.stroke_steps:.2g}", kind.format(width=f"about {width:.2g} %")
+    return f"{width / STROKE_STEPS:.2g}", kind.format(width=f"about {width:.2g} %")
 
 
 def _of_valve(row: Row) -> str:

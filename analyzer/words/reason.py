@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from analyzer.lanes.lanes import SAID
-from analyzer.limits import PAGES
 from analyzer.loop.decisions import (
     Action,
     Cause,
@@ -26,6 +25,10 @@ from analyzer.loop.decisions import (
 )
 from analyzer.words import sentences
 from analyzer.words.units import duration
+
+REASON_WORDS = 20  # Largest number of words of a reason in lists [words]
+STROKE_STEPS = 4.0
+"""Steps of a stroke test over the width of the fault: the first three must then move nothing."""
 
 MOST_NAMES = 5
 """Maximum number of followers listed in a row."""
@@ -44,7 +47,7 @@ def in_short(text: str) -> tuple[str, str]:
     """The first clauses of a reason, as many as make a short sentence (at least one), and the others."""
     clauses = text.split("; ")
     words = [len(clause.split()) for clause in clauses]
-    kept = max([n for n in range(1, len(clauses) + 1) if sum(words[:n]) <= PAGES.reason_words], default=1)
+    kept = max([n for n in range(1, len(clauses) + 1) if sum(words[:n]) <= REASON_WORDS], default=1)
     return "; ".join(clauses[:kept]), "; ".join(clauses[kept:])
 
 
@@ -118,7 +121,7 @@ def to_stroke(found: Finding) -> str:
     width = found.width_pct
     if found.remedy.action is not Action.REPAIR_VALVE or width is None:
         return ""
-    return sentences("by_hand")[found.remedy.due or Due.NOW].format(step=width / PAGES.stroke_steps)
+    return sentences("by_hand")[found.remedy.due or Due.NOW].format(step=width / STROKE_STEPS)
 
 
 def valve_text(found: Finding) -> str:

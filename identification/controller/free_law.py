@@ -15,7 +15,7 @@ from itertools import chain, pairwise
 import numpy as np
 
 from identification.controller.gain_pieces import APART
-from identification.controller.law_comparison import settings_of
+from identification.controller.law_comparison import AS_WELL, ROUNDING, WORTH, settings_of
 from identification.controller.law_ways import (
     STRAIGHT,
     Look,
@@ -27,10 +27,13 @@ from identification.controller.law_ways import (
     usual_ways,
     with_best_filter,
 )
-from identification.controller.pid_regression import best_gains, fit_pi
-from identification.limits import LAW
+from identification.controller.pid_regression import SMALL, best_gains, fit_pi
 from identification.models import Estimate, Pid
 from identification.record import Floats, LoopRecord, Mask
+
+USUAL_SCAN = 1.0
+"""Scan of a controller for which nothing is stated [s]: systems have .1 to 1 s, and historians keep rows that
+are slower."""
 
 INTEGRAL = np.eye(3)[1:2]
 SIMPLEST_FIRST = (np.eye(3)[:1], INTEGRAL, np.eye(3)[:2], np.eye(3))
@@ -76,12 +79,12 @@ def free_law(record: LoopRecord, scale_s: float) -> FreeLaw | None:
     first = fit_pi(record, scale_s)
     if first is None or first.kp == 0.0:
         return None
-    start = Pid(first.kp, first.ti_s, scan_s=min(record.dt_s, LAW.usual_scan))
+    start = Pid(first.kp, first.ti_s, scan_s=min(record.dt_s, USUAL_SCAN))
     x = look(record, scale_s, start)
     seen = _clearest(x, start)
     if seen is None:
         return None
-    enough = LAW.as_well * seen.left_over_all(seen.free) + LAW.rounding
+    enough = AS_WELL * seen.left_over_all(seen.free) + ROUNDING
     for along in SIMPLEST_FIRST:
         gains = best_gains(seen.moves.values(), seen.weight, along, np.zeros(3))
         pid = settings_of(gains, record.duration_s, start)
@@ -111,9 +114,9 @@ def _clearest(x: Look, start: Pid) -> Seen | None:
     best: Seen | None = None
     for seen in _variants(x, start):
         lawful = seen.is_law(gains_of(start))
-        if lawful and (best is None or seen.poorness(seen.free) < best.poorness(best.free) - LAW.worth):
+        if lawful and (best is None or seen.poorness(seen.free) < best.poorness(best.free) - WORTH):
             best = seen
-        if best is not None and best.poorness(best.free) < math.log(LAW.small) + LAW.worth:
+        if best is not None and best.poorness(best.free) < math.log(SMALL) + WORTH:
             break  # no residual is so small that another variant is clearly better
     if best is None or best.way.pv_filter == 0.0:
         return best

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.controller.law_ways import gains_of, no_law, shape_of, shaped
-from identification.limits import LAW
+from identification.controller.law_ways import GIVES, gains_of, no_law, shape_of, shaped
 from identification.models import Pid
 from identification.record import Floats, LoopRecord
 from identification.simulation.lag import first_order
@@ -55,7 +54,7 @@ def gain_pieces(record: LoopRecord, stated: Pid) -> ScheduledGain | None:
     same = any(1.0 / SAME <= factor <= SAME for factor in (below, above))
     if not same or min(below, above) <= 0.0 or max(below, above) < APART * min(below, above):
         return None
-    return ScheduledGain(over, edge, below, above) if left < min(LAW.gives * whole, BETTER * alone) else None
+    return ScheduledGain(over, edge, below, above) if left < min(GIVES * whole, BETTER * alone) else None
 
 
 def _best_edge(x: Floats, due: Floats, moved: Floats) -> tuple[float, float, float, float]:

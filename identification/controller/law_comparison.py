@@ -11,6 +11,9 @@ import numpy as np
 
 from identification.controller.gain_pieces import ScheduledGain
 from identification.controller.law_ways import (
+    GIVES,
+    PLAINLY_BETTER,
+    SEEN_FILTER,
     STRAIGHT,
     Look,
     Seen,
@@ -25,10 +28,25 @@ from identification.controller.law_ways import (
     with_best_filter,
     with_shape,
 )
-from identification.controller.pid_regression import best_gains, blurred, explained, integral_time
-from identification.limits import LAW
+from identification.controller.pid_regression import (
+    LONGEST_INTEGRAL,
+    SMALL,
+    best_gains,
+    blurred,
+    explained,
+    integral_time,
+)
 from identification.models import Pid
 from identification.record import Floats, LoopRecord
+
+AS_WELL = 1.15
+"""Largest ratio of the residual of a law with fewer settings to that of the freest law: the simplest such is
+the answer."""
+WORTH = 0.1  # Log reduction of the residual from which a filter, or another usual form of the law, is taken
+PARTS = ((0.0, 0.33), (0.67, 1.0), (0.33, 0.67), (0.0, 0.5), (0.5, 1.0))
+"""Parts of the range of OP, PV or SP, as quantiles, in which a stated law may hold alone: gains are scheduled
+in two to four pieces."""
+ROUNDING = 1e-6  # Share of OP's variance below which what a law leaves is rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +91,7 @@ def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompar
             return LawsCompared(recognized(x, stated, seen, _way_needed(seen, given, stated)), 1.0, 1.0, True)
         if not seen.is_law(gains):
             continue
-        if best is None or seen.poorness(seen.free) < best.poorness(best.free) - LAW.worth:
+        if best is None or seen.poorness(seen.free) < best.poorness(best.free) - WORTH:
             best = seen
         if given is None or seen.poorness(gains) < given.poorness(gains):
             given = seen
@@ -81,7 +99,7 @@ def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompar
             break
     if best is None or given is None:
         return None
-    if given.way.pv_filter >= LAW.seen_filter:
+    if given.way.pv_filter >= SEEN_FILTER:
         near = with_best_filter(x, given.way, gains)
         if near is not None and near.does(gains):
             return LawsCompared(recognized(x, stated, near, near.way), 1.0, 1.0, True)
@@ -94,7 +112,7 @@ def _way_needed(seen: Seen, before: Seen | None, stated: Pid) -> Way:
     own, gains = shape_of(stated), gains_of(stated)
     if seen.way.shape == own or before is None:
         return seen.way
-    bent = before.poorness(gains) - seen.poorness(gains) > LAW.plainly_better
+    bent = before.poorness(gains) - seen.poorness(gains) > PLAINLY_BETTER
     return seen.way if bent else replace(seen.way, shape=own)
 
 
@@ -107,7 +125,7 @@ def scheduled_over(record: LoopRecord, period_s: float, stated: Pid) -> Schedule
     gains, whole = gains_of(stated), look(record, period_s, stated)
     for name in ("op", "pv", "sp"):
         x = getattr(record, name)
-        for low, high in LAW.parts:
+        for low, high in PARTS:
             a, b = (float(np.quantile(x[record.usable], share)) for share in (low, high))
             within = replace(whole, out=whole.out | (x < a) | (x > b))
             seen = within.plainly(shape_of(stated)) if b > a else None
@@ -127,16 +145,16 @@ def best_of(record: LoopRecord, period_s: float, laws: Sequence[Pid]) -> Pid:
     poor = np.full(len(laws), np.inf)
     for seen in usual_ways(look(record, period_s, laws[0]), STRAIGHT, *laws, smoothing=False):
         left = np.stack([seen.left(gains_of(law)) for law in laws])
-        poor = np.minimum(poor, np.log(np.maximum(left, LAW.rounding)).mean(axis=1))
+        poor = np.minimum(poor, np.log(np.maximum(left, ROUNDING)).mean(axis=1))
     best = int(np.argmin(poor))
-    return laws[best] if poor[0] - poor[best] > LAW.plainly_better else laws[0]
+    return laws[best] if poor[0] - poor[best] > PLAINLY_BETTER else laws[0]
 
 
 def _settled(best: Seen, given: Seen, gains: Floats) -> bool:
     """Whether another law reproduces OP fully and the stated one is far off, so that more variants are useless; asked
     only after a longer filter of PV is no better for the stated one."""
     left = best.left_over_all(best.free)
-    return left < LAW.small and given.left_over_all(gains) > max(10.0 * left, LAW.gives)
+    return left < SMALL and given.left_over_all(gains) > max(10.0 * left, GIVES)
 
 
 def _most_apart(best: Seen, given: Seen, gains: Floats, pid: Pid, law: Floats) -> LawsCompared | None:
@@ -158,7 +176,7 @@ def settings_of(gains: Floats, record_s: float, stated: Pid) -> Pid | None:
     if kd / kp < -1e-9:
         return None
     ti_s = integral_time(kp, ki, record_s)
-    integral_runs_back = ki / kp < 0 and abs(ki / kp) * record_s > 1.0 / LAW.longest_integral
+    integral_runs_back = ki / kp < 0 and abs(ki / kp) * record_s > 1.0 / LONGEST_INTEGRAL
     return None if integral_runs_back else replace(stated, kp=kp, ti_s=ti_s, td_s=max(kd / kp, 0.0))
 
 
@@ -175,7 +193,7 @@ def _simplest(seen: Seen, gains: Floats, record_s: float, stated: Pid) -> tuple[
         (np.stack((p + whole * d, i)), none),  # kp and ti
         (np.eye(3), none),
     ]
-    enough = LAW.as_well * seen.left_over_all(seen.free) + 1e-6  # an exact law has only a rounding residual
+    enough = AS_WELL * seen.left_over_all(seen.free) + 1e-6  # an exact law has only a rounding residual
     for along, held in trials:
         law = best_gains(seen.moves.values(), seen.weight, along, held)
         pid = settings_of(law, record_s, stated)

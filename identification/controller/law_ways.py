@@ -15,6 +15,9 @@ import numpy as np
 from numba import njit
 
 from identification.controller.pid_regression import (
+    CLAMPED,
+    END_SAMPLES,
+    SMALL,
     best_gains,
     blurred,
     clamped,
@@ -24,11 +27,49 @@ from identification.controller.pid_regression import (
     rows_of,
     weights_of,
 )
-from identification.limits import LAW
 from identification.models import ErrorForm, Pid
 from identification.record import Floats, LoopRecord, Mask
 from identification.simulation.lag import first_order
 from identification.simulation.pi import Law, acting_error
+
+REACH = 4
+"""Longest increments, in integral times: beyond it the integral gathers PV's rounding rather than errors."""
+ENOUGH = 1.25
+"""Largest ratio of the residual of a stated law to that of the freest law, if that reproduces OP, to be in
+force without a further test."""
+GIVES = 0.1  # What the freest law leaves at some length where it gives OP
+PV_FILTERS = (0.0, 1.0, 2.0, 3.0, 5.0, 8.0, 13.0, 21.0)
+"""Filters of PV before the controller that are tried [samples]: none is far from one of them."""
+SLOPE_FILTERS = (0.0, 2.0, 8.0)  # Filters of the slope that are tried [samples]
+SEEN_FILTER = 2.0
+"""Filter of PV from which it is recognized [samples]: a shorter one may be a matter of stamps."""
+PLAIN_WEIGHT = 0.9  # Set point weight from which it is taken as 1: a gain is known within 10 %
+FILTERS_NEAR = 13
+"""Filters of PV tried between half and twice a suitable one, to estimate its time constant: 12 % from one to
+the next."""
+FILTER_PARTS = (4.0, 6.0, 8.0, 10.0, 16.0)
+"""N of the derivative filters tried with a derivative time Td, with time constants Td/N: systems have 4 to
+20."""
+PLAINLY_BETTER = 0.7
+"""Log reduction of OP's residual from which another form of the law is reported instead of the stated one: of
+18 laws stated truly the wrong form left 0.8 to 6.0 more, none less (proofs/controllers.py)."""
+LONGER = 4  # Times that a length of increments is longer than the one before
+LEAST_REACH = 256
+"""Least value of the longest increments, independently of the stated integral time [samples]: what is stated
+may be wrong."""
+MOST_INCREMENTS = 40000
+"""Increments of one length at most, evenly over the record: a gain is then known to a few thousandths, and
+three days at 1 s take no longer than a night."""
+AT_RATE = 0.99  # Share of OP's fastest move from which a move counts as one at a limit of its rate: rounding
+RATE_STEPS = 20.0
+"""OP's fastest move over its smallest, from which it may be a limit of its rate: an OP that moves by few of
+its steps has a fastest move that is not rare."""
+NEAR_RATE = 0.9  # Share of OP's fastest move from which further moves are examined
+GAPS = (0.1, 0.25, 0.5, 1.0, 1.5, 2.2, 3.3, 5.0, 8.0)  # Gaps begun with [medians of the error]
+GAPS_APART = 2.0
+"""How far about the best of these gaps a better one is looked for, as a factor: beyond the next of them."""
+GAP_WITHIN = 0.05  # To what share of itself a gap is found
+GAP_GAINS = (0.0, 0.3)  # Gains inside a gap that are tried, over the gain outside: none, and a reduced one
 
 ON_ERROR = ((1.0, 1.0), (1.0, 0.0), (0.0, 0.0))
 """Set point weights of gain and derivative: the usual three [-]."""
@@ -81,13 +122,13 @@ class Seen:
 
     def poorness(self, gains: Floats) -> float:
         """Misfit of given gains: mean logarithm of the residual, comparable between all variants of the law."""
-        return float(np.mean(np.log(LAW.small + self.left(gains))))
+        return float(np.mean(np.log(SMALL + self.left(gains))))
 
     def does(self, gains: Floats) -> bool:
         """Whether the gains reproduce OP about as well as any, and well enough."""
         left, least = self.left(gains), self.left(self.free)
         unsure = np.array([blurred(m, gains) for m in self.moves.values()])
-        return bool((left - unsure <= LAW.enough * least + LAW.small).all() and least.min() < LAW.gives)
+        return bool((left - unsure <= ENOUGH * least + SMALL).all() and least.min() < GIVES)
 
 
 def gains_of(c: Pid) -> Floats:
@@ -100,11 +141,11 @@ def fastest(op: Floats) -> Mask:
     rate limit. Adjacent samples are included, because a limit may act between two of them."""
     size = np.abs(np.diff(op, prepend=op[0]))
     top = float(size.max())
-    at = size >= LAW.at_rate * top
-    nearly = np.count_nonzero((size >= LAW.near_rate * top) & ~at)
-    coarse = top < LAW.rate_steps * float(np.min(size, where=size > 0.0, initial=np.inf))
-    expected = PILED_UP * nearly * (1.0 - LAW.at_rate) / (LAW.at_rate - LAW.near_rate)
-    limited = not coarse and np.count_nonzero(at) > expected + LAW.clamped * LAW.end_samples
+    at = size >= AT_RATE * top
+    nearly = np.count_nonzero((size >= NEAR_RATE * top) & ~at)
+    coarse = top < RATE_STEPS * float(np.min(size, where=size > 0.0, initial=np.inf))
+    expected = PILED_UP * nearly * (1.0 - AT_RATE) / (AT_RATE - NEAR_RATE)
+    limited = not coarse and np.count_nonzero(at) > expected + CLAMPED * END_SAMPLES
     return _spread(at) if limited else np.zeros(op.size, dtype=bool)
 
 
@@ -167,7 +208,7 @@ class Look:
 
     def seen(self, rows: Floats, way: Way) -> Seen | None:
         """The recording under one variant; None where no length shows a law."""
-        every = len(self.record) // LAW.most_increments
+        every = len(self.record) // MOST_INCREMENTS
         of = {k: increments(rows, self.out, k, max(k // 8, every, 1), True) for k in self.lengths}
         found = {k: m for k, m in of.items() if m is not None}
         weight = weights_of(found.values())
@@ -186,15 +227,15 @@ class Look:
 def look(record: LoopRecord, scale_s: float, stated: Pid) -> Look:
     """Prepare the recording of a loop that moves on a time scale [s]."""
     n, ti = len(record), stated.ti_s if stated.ki else 0.0
-    reach = min(n / 20, max(LAW.reach * max(ti, scale_s) / record.dt_s, LAW.least_reach))
-    lengths = tuple(LAW.longer**k for k in range(12) if LAW.longer**k <= reach)
+    reach = min(n / 20, max(REACH * max(ti, scale_s) / record.dt_s, LEAST_REACH))
+    lengths = tuple(LONGER**k for k in range(12) if LONGER**k <= reach)
     return Look(record, no_law(record, stated), lengths, stated.scan_s)
 
 
 def slope_filters(dt_s: float, laws: Iterable[Pid]) -> tuple[float, ...]:
     """Time constants of the slope's filter [samples]: usual fractions of the laws' derivative times, then others."""
-    parts = {n * dt_s / c.td_s for c in laws if c.td_s > 0 for n in LAW.filter_parts}
-    return (*(float(1.0 / np.log1p(part)) for part in sorted(parts)), *LAW.slope_filters)
+    parts = {n * dt_s / c.td_s for c in laws if c.td_s > 0 for n in FILTER_PARTS}
+    return (*(float(1.0 / np.log1p(part)) for part in sorted(parts)), *SLOPE_FILTERS)
 
 
 def usual_ways(x: Look, shape: Shape, *laws: Pid, smoothing: bool = True) -> Iterator[Seen]:
@@ -202,7 +243,7 @@ def usual_ways(x: Look, shape: Shape, *laws: Pid, smoothing: bool = True) -> Ite
     record, narrow = x.record, slope_filters(x.record.dt_s, laws)
     moves = float(np.ptp(record.sp)) > 0 and not record.sp_estimated
     stated = sorted({c.pv_filter_s / record.dt_s for c in laws} - {0.0})
-    filters = [*stated, *LAW.pv_filters] if smoothing else [0.0]
+    filters = [*stated, *PV_FILTERS] if smoothing else [0.0]
     for smooth, (late_pv, late_sp) in product(filters, LATE if moves else LATE[:2]):
         pv, sp = delayed(first_order(record.pv, smooth), late_pv), delayed(record.sp, late_sp)
         for rows, weight in _slopes(x, sp, pv, narrow, moves, shape):
@@ -253,7 +294,7 @@ def bent_shapes(x: Look, gains: Floats | None) -> Iterator[Shape]:
     size = float(np.median(np.abs(x.record.error[~x.out]))) if not x.out.all() else 0.0
     if size <= 0.0:
         return
-    for inside, free in product(LAW.gap_gains, (True,) if gains is None else (True, False)):
+    for inside, free in product(GAP_GAINS, (True,) if gains is None else (True, False)):
         width = _best_gap(x, size, inside, None if free else gains)
         if width > 0.0:
             yield width, inside, False
@@ -266,12 +307,12 @@ def _best_gap(x: Look, size: float, inside: float, gains: Floats | None) -> floa
         seen = x.plainly((width, inside, False) if width > 0.0 else STRAIGHT)
         return np.inf if seen is None else seen.poorness(seen.free if gains is None else gains)
 
-    tried = {w: poor(w) for w in (0.0, *(size * w for w in LAW.gaps))}
+    tried = {w: poor(w) for w in (0.0, *(size * w for w in GAPS))}
     best = min(tried, key=tried.__getitem__)
     if best == 0.0:
         return 0.0
-    low, high = best / LAW.gaps_apart, best * LAW.gaps_apart
-    while high - low > LAW.gap_within * best:
+    low, high = best / GAPS_APART, best * GAPS_APART
+    while high - low > GAP_WITHIN * best:
         a, b = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
         low, high = (low, b) if poor(a) < poor(b) else (a, high)
     return 0.5 * (low + high)
@@ -281,7 +322,7 @@ def recognized(x: Look, stated: Pid, seen: Seen, way: Way) -> Pid:
     """A stated controller completed by what the record shows: the properties `way` of the variant seen, which agrees
     with the stated gains, and the visible limits of OP and of its rate."""
     way = _clearer(x, seen, way, stated)
-    if way.pv_filter >= LAW.seen_filter and not stated.pv_filter_s:
+    if way.pv_filter >= SEEN_FILTER and not stated.pv_filter_s:
         way = replace(way, pv_filter=_best_filter(x, way, gains_of(stated)))
     return terms_of(x, stated, replace(seen, way=way))
 
@@ -289,14 +330,14 @@ def recognized(x: Look, stated: Pid, seen: Seen, way: Way) -> Pid:
 def terms_of(x: Look, c: Pid, seen: Seen) -> Pid:
     """A controller with the terms of a variant, and with the visible limits of OP and of its rate."""
     record, way, c = x.record, seen.way, with_shape(c, seen.way.shape)
-    if way.pv_filter >= LAW.seen_filter and not c.pv_filter_s:
+    if way.pv_filter >= SEEN_FILTER and not c.pv_filter_s:
         c = replace(c, pv_filter_s=way.pv_filter * record.dt_s)
     weight = _set_point_weight(x, seen, gains_of(c)) if way.sp_weight is None else way.sp_weight
-    if weight < LAW.plain_weight and c.kp and c.sp_weight == 1.0:
+    if weight < PLAIN_WEIGHT and c.kp and c.sp_weight == 1.0:
         c = replace(c, sp_weight=weight)
     if fastest(record.op).any():
         rate = float(np.abs(np.diff(record.op)).max()) / record.dt_s
-        c = c if c.op_rate <= rate / LAW.at_rate else replace(c, op_rate=rate)
+        c = c if c.op_rate <= rate / AT_RATE else replace(c, op_rate=rate)
     at_end, middle = record.op[clamped(record.op)], 0.5 * float(record.op.min() + record.op.max())
     low, high = at_end[at_end < middle], at_end[at_end > middle]
     return replace(c, op_lo=float(max([c.op_lo, *low[:1]])), op_hi=float(min([c.op_hi, *high[:1]])))
@@ -318,11 +359,11 @@ def _clearer(x: Look, seen: Seen, way: Way, stated: Pid) -> Way:
     """Its properties, or those with the filter of PV with which the stated gains reproduce OP clearly better than in
     the variant seen: where little of OP is noise, gains agree with the record whatever filters it."""
     own = seen.poorness(gains_of(stated))
-    if stated.td_s or stated.pv_filter_s or own < np.log(LAW.small) + LAW.plainly_better:
+    if stated.td_s or stated.pv_filter_s or own < np.log(SMALL) + PLAINLY_BETTER:
         return way
-    found = {f: _poorness(x, way, gains_of(stated), f) for f in LAW.pv_filters if f > way.pv_filter}
+    found = {f: _poorness(x, way, gains_of(stated), f) for f in PV_FILTERS if f > way.pv_filter}
     best = min(found, key=found.__getitem__, default=way.pv_filter)
-    return replace(way, pv_filter=best) if found.get(best, own) < own - LAW.plainly_better else way
+    return replace(way, pv_filter=best) if found.get(best, own) < own - PLAINLY_BETTER else way
 
 
 def with_best_filter(x: Look, way: Way, gains: Floats | None) -> Seen | None:
@@ -348,5 +389,5 @@ def _best_filter(x: Look, way: Way, gains: Floats | None) -> float:
     [samples]; the variant's own if there is a derivative, which also has a filter."""
     if gains is not None and gains[2]:
         return way.pv_filter
-    near = way.pv_filter * np.geomspace(0.5, 2.0, LAW.filters_near)
+    near = way.pv_filter * np.geomspace(0.5, 2.0, FILTERS_NEAR)
     return float(min(near, key=lambda smooth: _poorness(x, way, gains, smooth)))

@@ -12,9 +12,20 @@ from functools import partial
 
 import numpy as np
 
-from identification.limits import LAW, LIMITS, ControllerLimits
+from identification.limits import LIMITS, ControllerLimits
 from identification.record import Floats, Mask
 from identification.simulation.lag import first_order
+
+SHIFTS = (-2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
+"""Latenesses of PV that are tried [samples]."""
+FILTERS = (0.5, 1.0, 2.0, 4.0, 8.0)
+"""Time constants of a filter between PV and the controller that are tried [samples]."""
+GUESSES = (10.0, 40.0, 160.0, 640.0)
+"""Integral times begun with where none is stated [samples]: each finds any within four of itself."""
+LATE_STEP = 0.25  # Part of a sample to which lateness is estimated [samples]
+OWN = (1, 2, 3)  # Moves of OP's own past that predict its next one [samples]
+SEEN = (1, 2, 4, 8)
+"""Samples back from which PV's way to now is looked at [samples]: as far as a proportional action reaches."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,14 +141,14 @@ def recovered_law(x: Trends, ti_samples: float, stated_kp: float = 1.0, late: bo
     def scatter(found: ControlLaw) -> float:
         return found.scatter if found.kp * stated_kp > 0 and found.kp * found.ki > 0 else math.inf
 
-    shifts = LAW.shifts if late else (0.0,)
+    shifts = SHIFTS if late else (0.0,)
     plain = min((at(s) for s in shifts), key=scatter)
-    filtered = min((at(s, f) for f in LAW.filters for s in shifts if s <= max(plain.late, 0.0)), key=scatter)
+    filtered = min((at(s, f) for f in FILTERS for s in shifts if s <= max(plain.late, 0.0)), key=scatter)
     best = filtered if scatter(filtered) < x.limits.filter_leaves * scatter(plain) else plain
     if math.isinf(scatter(best)):
         return at(0.0)
     for step in (0.5, 0.25, 0.125, 0.06) if best.smoothed else (0.5, 0.25):
-        told = late and step >= LAW.late_step
+        told = late and step >= LATE_STEP
         later = [at(best.late + way * step, best.smoothed) for way in (-1, 1) if told]
         slower = [at(best.late, best.smoothed * (1 + way * step)) for way in (-1, 1) if best.smoothed]
         best = min([best, *later, *slower], key=scatter)
@@ -150,7 +161,7 @@ def unstated_law(x: Trends) -> ControlLaw | None:
     The spans of the regression have the length of the integral time, so it is identified in two steps.
     """
     best = None
-    for guess in LAW.guesses:
+    for guess in GUESSES:
         first = law(x, span_length(x.op.size, guess, x.limits), 0.0)
         if first.kp * first.ki > 0.0 and (best is None or first.explained > best.explained):
             best = first
@@ -168,13 +179,13 @@ def fed_back(op: Floats, pv: Floats) -> float:
 
     Both of shape (n,). 0 for a record of fewer samples than twenty times the constants.
     """
-    reach = max(max(LAW.own) + 1, max(LAW.seen))
+    reach = max(max(OWN) + 1, max(SEEN))
     k = np.arange(reach, op.size)
-    if k.size < 20 * (2 + len(LAW.own) + 1 + len(LAW.seen)):
+    if k.size < 20 * (2 + len(OWN) + 1 + len(SEEN)):
         return 0.0
     moved = op[k] - op[k - 1]
-    own = [np.ones(k.size), op[k - 1], *(op[k - i] - op[k - i - 1] for i in LAW.own)]
-    seen = [pv[k], *(pv[k] - pv[k - i] for i in LAW.seen)]
+    own = [np.ones(k.size), op[k - 1], *(op[k - i] - op[k - i - 1] for i in OWN)]
+    seen = [pv[k], *(pv[k] - pv[k - i] for i in SEEN)]
     alone, together = _left(moved, own), _left(moved, own + seen)
     return 1.0 - together / alone if alone > 0.0 else 0.0
 

@@ -14,8 +14,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.limits import LAW
 from identification.record import Floats, LoopRecord, Mask
+
+LONGEST_INTEGRAL = 10.0
+"""Integral time, in lengths of the record, from which there is no integral action: over the record it gives a
+tenth of what the gain gives."""
+INCREMENTS = 50  # Increments from which a length of them counts
+LEVEL_OF = 16
+"""Lengths of an increment over which the integral's drift is taken as an error of SP's or PV's record that
+stays: an error of SP's record that stays for hours is no other law (test_rounded_setpoint.py); increments are
+far shorter."""
+CLAMPED = 4  # Ratio of OP's time at a clamp to that at the next value: a sine does so 2.4 times
+END_SAMPLES = 5
+"""Samples at the next value that are added [samples]: those of an OP without steps are one each."""
+OP_VALUES = 8  # Number of OP values from which its ends are distinguished from its steps
+TELLING = 0.5
+"""Share of OP's increments explained by the best law, from which a length of them identifies a law."""
+SMALL = 0.01  # Share of OP's variance under which the residual is from scans and rounding, not from the law
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +46,7 @@ class ControllerFit:
 def integral_time(kp: float, ki: float, record_s: float) -> float:
     """Integral time [s] of a law, inf where its integral is negligible in a record of so many seconds."""
     ti = kp / ki if ki != 0 and kp / ki > 0 else math.inf
-    return ti if ti < LAW.longest_integral * record_s else math.inf
+    return ti if ti < LONGEST_INTEGRAL * record_s else math.inf
 
 
 def explained(products: Floats, gains: Floats) -> float:
@@ -59,16 +74,16 @@ def increments(
 ) -> Floats | None:
     """Mean products, shape (5, 5), of increments over `samples`, begun every `step`, of the rows, shape (5, n),
     without those that span samples outside the law and without the part explained by further rows; `level`: less
-    their means over blocks of LAW.level_of of them, because a constant rounding error of SP or PV makes the integral
+    their means over blocks of LEVEL_OF of them, because a constant rounding error of SP or PV makes the integral
     drift."""
     since = np.cumsum(out_of_law)
     inside = (since[samples::step] == since[:-samples:step]) & ~out_of_law[:-samples:step]
     count = int(np.count_nonzero(inside))
-    if count < LAW.increments:
+    if count < INCREMENTS:
         return None
     moved = (rows[:, samples::step] - rows[:, :-samples:step]) * inside
     if level:
-        moved -= _level_by_turns(moved, inside, LAW.level_of * samples // step) * inside
+        moved -= _level_by_turns(moved, inside, LEVEL_OF * samples // step) * inside
     for feed in moved[5:]:
         moved = _without(moved, feed.copy())
     moved = moved[:5]
@@ -111,7 +126,7 @@ def clamped(op: Floats) -> Mask:
     ends = [
         levels[end]
         for end, next_to in ((0, 1), (-1, -2))
-        if levels.size > LAW.op_values and counts[end] > LAW.clamped * (counts[next_to] + LAW.end_samples)
+        if levels.size > OP_VALUES and counts[end] > CLAMPED * (counts[next_to] + END_SAMPLES)
     ]
     return np.isin(op, ends)
 
@@ -125,7 +140,7 @@ def fit_pi(record: LoopRecord, period_s: float) -> ControllerFit | None:
     """PI settings by least squares on increments over an eighth of a period [s], or of another time scale on which
     the loop moves; None where OP or the error never moves, or too little of the record is in automatic."""
     step = max(round(period_s / 8 / record.dt_s), 1)
-    if len(record) < 10 * step + LAW.increments:
+    if len(record) < 10 * step + INCREMENTS:
         return None
     found = increments(rows_of(record, record.error), out_of_law(record), step)
     if found is None:
@@ -149,4 +164,4 @@ def weights_of(of: Iterable[Floats]) -> Floats:
     own = [explained(m, best_gains([m], np.ones(1), np.eye(3), np.zeros(3))) for m in of]
     share = np.clip(own, 0.0, 1.0)
     moved = np.array([m[3, 3] for m in of])
-    return np.where(share >= LAW.telling, share / (1.0 + 2 * LAW.small - share) / moved, 0.0)
+    return np.where(share >= TELLING, share / (1.0 + 2 * SMALL - share) / moved, 0.0)

@@ -6,8 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.limits import LAW
 from identification.record import Floats, Mask
+
+SWITCHED_PCT = 5.0
+"""Least distance of two values between which OP switches [% of OP]: steps of a converter are far less."""
+SWITCH_LEVEL = 0.01  # Share of that distance within which OP is at one of them
+SWITCHED_SHARE = 0.97  # Share of the samples at one of them: the others are averages over a switch
+SWITCHES = 6
+"""Switches from which a controller is one that switches: a PID that winds up from end to end passes the
+values between."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,13 +33,13 @@ def switching(op: Floats, use: Mask) -> Switching | None:
     values count for neither.
     """
     seen = op[use]
-    if seen.size == 0 or float(np.ptp(seen)) < LAW.switched_pct:
+    if seen.size == 0 or float(np.ptp(seen)) < SWITCHED_PCT:
         return None
     low, high = float(seen.min()), float(seen.max())
-    at = np.where(seen > high - LAW.switch_level * (high - low), 1, 0)
-    at[(at == 0) & (seen > low + LAW.switch_level * (high - low))] = -1
+    at = np.where(seen > high - SWITCH_LEVEL * (high - low), 1, 0)
+    at[(at == 0) & (seen > low + SWITCH_LEVEL * (high - low))] = -1
     known = at[at >= 0]
     switches = int(np.count_nonzero(np.diff(known)))
-    if known.size < LAW.switched_share * seen.size or switches < LAW.switches:
+    if known.size < SWITCHED_SHARE * seen.size or switches < SWITCHES:
         return None
     return Switching(low, high, switches)

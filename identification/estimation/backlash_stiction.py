@@ -28,10 +28,62 @@ from identification.estimation.search import (
     whitened_stem,
 )
 from identification.estimation.window import Fit, Window, stem_blocks
-from identification.limits import FIT
 from identification.record import Floats
 from identification.simulation.lag import Lag, respond, unit_lag
 from identification.simulation.valve import HALTS, IDEAL, RESTS, SLIDES, StemLaw, sticking
+
+SCREEN_SHARES = (0.1, 0.3, 0.55, 0.8)
+"""Stickbands that a loop without an evident fault is screened with [of OP's range]: the nearest of them
+detects backlash of any width between."""
+SCREENED = 3.0
+"""Gain in log likelihood from which the screening of backlash is followed by its whole search [nat]: a third
+of what a verdict needs."""
+SMALL = (0.06, 0.12, 0.2, 0.3)
+"""Small stickbands tried first [of OP's range]: at the period a small backlash with a long dead time responds
+like a large one with a short one, and the scan ranks the first before; with only the best of all followed, 3
+of 20 oscillating loops lost 10 nat and more, and two backlashes all their evidence; with the best of each
+part 3 of 209 lose as much."""
+MIDDLE = (0.42, 0.55)  # The same between small and large [of OP's range]: as SMALL
+LARGE = (0.7, 0.85, 1.0)
+"""The same of large ones: a valve much wider than OP's range would not move at all [of OP's range]: as
+SMALL."""
+JUMP_SHARES = (0.2, 0.4, 0.7, 1.0)  # Slip jumps tried [of the stickband]
+COAST = 0.15  # Reversal of OP that a sliding stem ignores: OP's noise [of the stickband]
+LATER = (0.0, 0.4, 0.8, 1.2, 1.6, 2.0, 2.5, 3.0)
+"""Dead times tried beyond that of the best backlash: backlash in place of a jump responds too soon
+[blocks]."""
+FINALISTS = 8
+"""Candidates of the fine scan, per behaviour, that are descended to their minimum: of 165 loops two lost more
+than 1 nat where the likeliest two of all these alone were brought there a second time."""
+SHORT = 1000  # Length of a record so short that every candidate can be tried on it [blocks]
+FOLLOWED_SHORT = 5
+"""Candidates that are followed on a short record: with few events there are more local minima."""
+FOLLOWED = 2  # Candidates of a scan of stick-slip that are followed to the end
+CLEAR = 1.0  # Gain in log likelihood from which one fit of the same model is preferred to another [nat]
+WIDTH_SEEN = 0.03  # Width below which backlash moves PV like an ideal valve [of OP's range]
+WIDTH_WHOLE = 1.25  # Width from which on the stem never moves [of OP's range]
+PROFILE_HALVINGS = 1
+"""Halvings of the steps in the search of dynamics, which begins at the result for the neighbouring width."""
+FINE_WIDTHS = (0.88, 1.34, 0.012)
+"""First, end (not tried) and step of the stickbands tried about the best backlash [of the backlash]: on
+simulated stick-slip from 0.94 to 1.3 times the best-fitting backlash, in minima about 1 % wide if OP is
+recorded finely."""
+FINE_JUMPS = (0.1, 1.01, 0.06)
+"""First, end (not tried) and step of the slip jumps tried about the best backlash [of the stickband]."""
+NARROW_WIDTHS = (0.6, 0.88, 0.012)
+"""The same for stems that jump by most of their stickband: the best backlash in their place is 1.5 times as
+wide [of the backlash]: of 16 sticking valves of benchmarks/world (seeds 16 and 72) 3 come to a likelihood
+higher by 98 to 820 nat from here, with the right stickband; none to a lower one."""
+NEAR_WIDTHS = (0.94, 1.06, 0.004)
+"""First, end (not tried) and step of the stickbands tried about a stick-slip that was found [of the
+stickband]: pits are about 1 % wide."""
+NEAR_JUMPS = (-0.15, 0.16, 0.03)
+"""The same for slip jumps, next to the jump found [of the stickband]: as NEAR_WIDTHS."""
+NEAR_DEAD = (-1.6, -1.2, -0.8, -0.4, 0.0, 0.4, 0.8, 1.2, 1.6)
+"""The same for dead times, next to the one found [blocks]: as NEAR_WIDTHS."""
+REFINED_MOST = 3  # Largest number of repetitions: for time
+REFINED_WORTH = 5.0
+"""Gain of one time from which it is repeated [nat]: as a slip jump has to bring (cause.evidence_jump)."""
 
 
 def fit_linear(window: Window, period_s: float) -> Fit:
@@ -74,18 +126,18 @@ def fit_play(linear: Fit, period_s: float, hopeful: float | None = None) -> Fit:
 
     linear : the best fit behind an ideal valve; period_s : time scale of the search [s]; hopeful : gain in log
     likelihood [nat] of a quick screening above which the full search follows; None: the screening is thorough and the
-    limit is FIT.screened.
+    limit is SCREENED.
     """
     window = linear.window
     reach = window.reach
-    screened = [sticking(share * reach, 0.0) for share in FIT.screen_shares]
+    screened = [sticking(share * reach, 0.0) for share in SCREEN_SHARES]
     followed = len(screened) if hopeful is None else 1
     best = _likeliest(_chosen(linear, screened, period_s, followed))
-    if best.log_likelihood - linear.log_likelihood < (FIT.screened if hopeful is None else hopeful):
+    if best.log_likelihood - linear.log_likelihood < (SCREENED if hopeful is None else hopeful):
         return best
-    followed = FIT.followed_short if window.y.size < FIT.short else 1
+    followed = FOLLOWED_SHORT if window.y.size < SHORT else 1
     begun = []
-    for part in (FIT.small, FIT.middle, FIT.large, (best.valve.stickband / reach,)):
+    for part in (SMALL, MIDDLE, LARGE, (best.valve.stickband / reach,)):
         valves = [sticking(share * reach, 0.0) for share in part]
         begun += _chosen(best, valves, period_s, followed)
     return max(best, _likeliest(begun), key=lambda fit: fit.log_likelihood)
@@ -98,7 +150,7 @@ def better_linear(linear: Fit, play: Fit) -> Fit:
     linear fit from its own search is returned.
     """
     trial = descend(replace(play, valve=IDEAL))
-    return trial if trial.log_likelihood > linear.log_likelihood + FIT.clear else linear
+    return trial if trial.log_likelihood > linear.log_likelihood + CLEAR else linear
 
 
 def fit_stick_slip(play: Fit, period_s: float) -> Fit:
@@ -109,9 +161,9 @@ def fit_stick_slip(play: Fit, period_s: float) -> Fit:
     to half as wide again where the slip jump is most of the stickband; narrower bands have their own finalists.
     period_s : time scale of the search [s].
     """
-    short = play.window.y.size < FIT.short
-    begun = _chosen(play, _coarse(play), period_s, FIT.followed_short if short else FIT.followed)
-    narrow, laws = _grid(FIT.narrow_widths, FIT.fine_jumps), (RESTS, HALTS, SLIDES)
+    short = play.window.y.size < SHORT
+    begun = _chosen(play, _coarse(play), period_s, FOLLOWED_SHORT if short else FOLLOWED)
+    narrow, laws = _grid(NARROW_WIDTHS, FINE_JUMPS), (RESTS, HALTS, SLIDES)
     fits = [_likeliest(begun), *pits(play, laws), *pits(play, laws, narrow)]
     return refined(max(fits, key=lambda fit: fit.log_likelihood))
 
@@ -119,14 +171,14 @@ def fit_stick_slip(play: Fit, period_s: float) -> Fit:
 def refined(fit: Fit) -> Fit:
     """The most likely stick-slip near a given one. Minima in stickband and slip jump are about 1 % wide, so a scan
     that uses time constant and dead time of the backlash fit misses the deepest one."""
-    for _ in range(FIT.refined_most):
+    for _ in range(REFINED_MOST):
         share = fit.valve.slip_jump / max(fit.valve.stickband, 1e-9)
-        first, end, step = FIT.near_jumps
-        about = _grid(FIT.near_widths, (max(share + first, step), min(share + end, 1.0 + 1e-9), step))
-        found = pits(fit, (fit.valve.tolerance,), about, FIT.near_dead)
+        first, end, step = NEAR_JUMPS
+        about = _grid(NEAR_WIDTHS, (max(share + first, step), min(share + end, 1.0 + 1e-9), step))
+        found = pits(fit, (fit.valve.tolerance,), about, NEAR_DEAD)
         best = max((fit, *found), key=lambda fit: fit.log_likelihood)
         gained, fit = best.log_likelihood - fit.log_likelihood, best
-        if gained < FIT.refined_worth:
+        if gained < REFINED_WORTH:
             break
     return fit
 
@@ -141,17 +193,17 @@ def _coarse(play: Fit) -> list[StemLaw]:
     """Stickbands up to the range of OP, with stems that rest and stems that slide."""
     reach = play.window.reach
     near = play.valve.stickband / reach
-    widths = {round(s, 4) for s in FIT.middle + FIT.large} | {near, 1.1 * near}
+    widths = {round(s, 4) for s in MIDDLE + LARGE} | {near, 1.1 * near}
     return [
         sticking(width * reach, jump, tolerance)
         for width in sorted(widths)
-        for jump in FIT.jump_shares
-        for tolerance in (RESTS, FIT.coast * width * reach)
+        for jump in JUMP_SHARES
+        for tolerance in (RESTS, COAST * width * reach)
     ]
 
 
 def pits(
-    play: Fit, tolerances: tuple[float, ...], grid: Floats | None = None, later: tuple[float, ...] = FIT.later
+    play: Fit, tolerances: tuple[float, ...], grid: Floats | None = None, later: tuple[float, ...] = LATER
 ) -> list[Fit]:
     """The most likely stick-slips near a backlash or another stick-slip: local minima of the best few of each
     behaviour.
@@ -161,17 +213,15 @@ def pits(
     later : dead times added to that of the backlash fit [blocks].
     """
     window = play.window
-    pairs = np.array([play.valve.stickband, 1.0]) * (
-        _grid(FIT.fine_widths, FIT.fine_jumps) if grid is None else grid
-    )
+    pairs = np.array([play.valve.stickband, 1.0]) * (_grid(FINE_WIDTHS, FINE_JUMPS) if grid is None else grid)
     t, deads = play.time_constant_s, np.maximum(play.dead_time_s + np.array(later) * window.dt_s, 0.0)
     out, pv, begins = [], white_pv(window, generic_noise()), [(t, float(dead)) for dead in deads]
     for tolerance in tolerances:
         left = _scan(pv, pairs, tolerance, t, deads)
-        best = [sticking(pairs[i, 0], pairs[i, 1], tolerance) for i in np.argsort(left)[: FIT.finalists]]
+        best = [sticking(pairs[i, 0], pairs[i, 1], tolerance) for i in np.argsort(left)[:FINALISTS]]
         fits = _ranked(window, generic_noise(), best, begins)
         out += [_bottom(descend(fit)) for fit in fits]
-    likeliest = sorted(out, key=lambda fit: -fit.log_likelihood)[: FIT.followed]
+    likeliest = sorted(out, key=lambda fit: -fit.log_likelihood)[:FOLLOWED]
     return [_bottom(fit) for fit in likeliest]
 
 
@@ -246,7 +296,7 @@ def width_profile(linear: Fit, play: Fit) -> Floats:
     window = linear.window
     blocks = replace(window, position=None)
     out, reach = np.zeros(WIDTHS.size), float(np.ptp(window.op))
-    asked = np.flatnonzero((FIT.width_seen * reach < WIDTHS) & (FIT.width_whole * reach > WIDTHS))
+    asked = np.flatnonzero((WIDTH_SEEN * reach < WIDTHS) & (WIDTH_WHOLE * reach > WIDTHS))
     if asked.size == 0:
         return out
     ideal, least, own = _ideal(blocks, linear, play, linear.ar), np.full(asked.size, np.inf), math.inf
@@ -266,7 +316,7 @@ def width_profile(linear: Fit, play: Fit) -> Floats:
 def _ideal(window: Window, linear: Fit, play: Fit, ar: Floats) -> float:
     """Innovations variance behind an ideal valve under one noise model."""
     begins = [_dynamics(linear), _dynamics(play)]
-    return search(behind(white_pv(window, ar), IDEAL), begins, FIT.profile_halvings)[1]
+    return search(behind(white_pv(window, ar), IDEAL), begins, PROFILE_HALVINGS)[1]
 
 
 def _dynamics(fit: Fit) -> Dynamics:
@@ -281,5 +331,5 @@ def _swept(pv: WhitePv, widths: Floats, play: Fit) -> Floats:
         near = _dynamics(play)
         for k in way:
             prepared = behind(pv, sticking(widths[k], 0.0))
-            near, out[k], _, _ = search(prepared, [near, _dynamics(play)], FIT.profile_halvings)
+            near, out[k], _, _ = search(prepared, [near, _dynamics(play)], PROFILE_HALVINGS)
     return out

@@ -11,10 +11,13 @@ from scipy.signal import lfilter
 from identification.estimation.gauss_newton import descend, innovations
 from identification.estimation.noise import judged
 from identification.estimation.window import Fit, stem_of
-from identification.limits import FIT
 from identification.record import Floats, Mask
 from identification.signals.robust import clipped_gain
 from identification.signals.turns import turns_of
+
+STEP_PENALTY = 6.0
+"""Gain in log likelihood that one step of the load at any time costs [nat]. Source: log of the blocks,
+nearly."""
 
 SECOND_LAGS = (0.1, 0.2, 0.4, 0.7)
 """Second lags that are tried, as shares of the dead time or of a block, the longer of both: ours; half of a longer
@@ -54,7 +57,7 @@ def with_load_step(fit: Fit, answering: Mask, noise: Floats) -> Fit:
     stepped = replace(fit, window=replace(fit.window, step_at=at))
     tried = descend(stepped), descend(replace(stepped, ar=noise))
     trial = max(tried, key=lambda f: f.log_likelihood)
-    return trial if trial.log_likelihood - fit.log_likelihood > FIT.step_penalty else fit
+    return trial if trial.log_likelihood - fit.log_likelihood > STEP_PENALTY else fit
 
 
 def with_second_lag(fit: Fit) -> Fit:
@@ -75,7 +78,7 @@ def with_second_lag(fit: Fit) -> Fit:
         behind = replace(window, op=late[0], paths=None if window.paths is None else late)
         trial = descend(replace(fit, window=behind))
         best = max(best, trial, key=lambda x: x.log_likelihood)
-    return best if best.log_likelihood - fit.log_likelihood > FIT.step_penalty else fit
+    return best if best.log_likelihood - fit.log_likelihood > STEP_PENALTY else fit
 
 
 @dataclass(frozen=True, slots=True)

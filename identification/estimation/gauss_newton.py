@@ -18,12 +18,15 @@ from numpy.typing import NDArray
 from identification.estimation.descent import Descent, down, inverse, scattered
 from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.window import Fit, Stems, stem_of
-from identification.limits import FIT
 from identification.record import Floats
 from identification.simulation.lag import respond, respond_together, unit_lag
 from identification.simulation.valve import StemLaw, sticking
 
-NARROWEST = FIT.narrowest
+ITERATIONS = 25  # Largest number of Gauss-Newton steps: nine in ten fits stop before the fifteenth
+SETTLED = 0.01  # Gain in log likelihood below which the steps stop [nat]
+FIT_NARROWEST = 0.2  # Stickband after a step, in terms of that before, that is tried no more
+
+NARROWEST = FIT_NARROWEST
 """Smallest ratio of a stickband after a step to that before, in the kernels' type."""
 BASE = 8
 """Number of constants before the noise model."""
@@ -240,8 +243,8 @@ def descend(fit: Fit, free_width: bool = False) -> Fit:
     because their optimum lies in narrow valleys.
     """
     b, theta, valve = _at(fit, free_width)
-    steps = FIT.iterations
-    rule = Descent(steps, steps, b.at.size, FIT.settled, 10.0, 5.0, steps)
+    steps = ITERATIONS
+    rule = Descent(steps, steps, b.at.size, SETTLED, 10.0, 5.0, steps)
     best = _descend(b, theta, valve, rule)
     head, base, ar = np.split(best.theta, (4, BASE))
     gain, t, dead = float(head[3]), math.exp(head[0]), float(head[1])

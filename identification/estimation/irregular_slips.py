@@ -14,11 +14,38 @@ from identification.estimation.gauss_newton import descend, disturbance, residua
 from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.slip_beam import Noise, Response, SlipDistances, decoded, log_chance
 from identification.estimation.window import Fit
-from identification.limits import SLIPS
 from identification.record import Floats
 from identification.simulation.lag import unit_lag
 from identification.simulation.valve import StemLaw, sticking
 from identification.simulation.valve import play as play_stem
+
+WIDTHS = (0.78, 0.88, 0.98, 1.12)
+"""Stickbands tried, in widths of the best-fitting backlash [of the backlash]: on 32 simulated stems of dry
+friction 0.7 to 1.3."""
+JUMPS = (0.35, 0.6, 0.9)  # Slip jumps tried [of the stickband]
+ABSURD = 2.0
+"""Ratio of the backlash model's gain to the gain that stick-slip needs, from which the latter is taken:
+backlash may explain a square PV by a stem that barely moves and an impossible gain."""
+LATER = (0.0, 0.8, 1.6, 2.8)
+"""Dead times tried, beyond that of the backlash: backlash in place of a jump responds too soon [blocks]."""
+SCREENED = 8  # Paths side by side while these are tried: for time
+CARRIED = 16  # Paths side by side later: for time
+ROUNDS = 5  # Rounds of decoding and fitting: of six followed by hand the last turns gained a few nat
+HOPELESS = 0.15
+"""Largest deficit of a path to the backlash, per judged block, after two rounds of decoding and fitting, to
+be continued [nat / block]: after two rounds the worst of 40 simulated sticking stems that were found was .04
+behind; tanks behind backlash .21 and more. After one round a sticking valve of the sample mill is .39 behind,
+and is found."""
+HOT = (8.0, 4.0, 2.0, 1.0)
+"""Times the innovations' variance in the first rounds, in which the process is not known yet."""
+FEWEST = 6  # Slips of a path at least: three cycles
+RESTS = 0.9
+"""Longest rest of a stem while the process is not known: a stem at rest explains nothing [periods]."""
+STEPS = (0.15, 0.08, 0.04)  # Relative steps of the search for the friction in the end
+DEAD_STEPS = 8.0
+"""Dead time that a step of one takes [blocks]: a stem that lets go later is like one behind a longer pipe."""
+WORTH = 1.0  # Gain of a step from which it is taken [nat]
+MOST_MOVES = 40  # Steps that are taken at most, for time: on 9 simulated stems some five were
 
 MOVES = (
     *((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)),
@@ -89,7 +116,7 @@ def _gain(play: Fit, band: float, share: float, half: int) -> float:
     moved = (float(np.std(x[half:] - x[:-half])) if 0 < half < x.size else 0.0 for x in (centred, stem))
     pv, swing = moved
     found = math.copysign(pv / swing, play.gain) if swing > 0.0 else 0.0
-    return found if abs(found) < abs(play.gain) / SLIPS.absurd else 0.0
+    return found if abs(found) < abs(play.gain) / ABSURD else 0.0
 
 
 def _screened(play: Fit, noise: Floats, rest: int, gains: Gains) -> list[_Trial]:
@@ -99,13 +126,13 @@ def _screened(play: Fit, noise: Floats, rest: int, gains: Gains) -> list[_Trial]
     e = whitened(disturbance(play), noise, every_lag(noise.size))[noise.size :]
     sigma2 = float(np.mean(e[window.usable[noise.size :]] ** 2))
     mean, out = float(play_stem(window.op, play.valve.stickband).mean()), list[_Trial]()
-    for later in SLIPS.later:
+    for later in LATER:
         for (width, share), gain in gains.items():
             if gain:
                 band = width * play.valve.stickband
                 fit = replace(play, dead_time_s=play.dead_time_s + later * window.dt_s, gain=gain)
                 law, least = sticking(band, share), _bound(out, band, share)
-                path, score = _decoded(fit, mean, law, rest, Noise(noise, sigma2), SLIPS.screened, least)
+                path, score = _decoded(fit, mean, law, rest, Noise(noise, sigma2), SCREENED, least)
                 out = _chosen([*out, _Trial(score, _slips(path), band, share, later, gain, path)])
         if not out:  # a gain without slips at the backlash fit's dead time has none at later dead times
             break
@@ -127,7 +154,7 @@ def _chosen(tried: list[_Trial]) -> list[_Trial]:
     """
     best: dict[tuple[str, float], _Trial] = {}
     for t in sorted(tried, key=lambda t: -t.score):
-        if t.slips >= SLIPS.fewest:
+        if t.slips >= FEWEST:
             best.setdefault(("width", t.band), t)
             best.setdefault(("share", t.share), t)
     return list(dict.fromkeys(best.values()))
@@ -143,7 +170,7 @@ def _path(fit: Fit, valve: StemLaw, stem: Floats) -> SlipPath:
 
 def _decoded_anew(path: SlipPath, fit: Fit, law: StemLaw, rest: int, hot: float) -> Floats:
     """The most probable stem under a fit near a path, shape of OP; hot : factor of the innovations variance."""
-    return _decoded(fit, path.mean, law, rest, Noise(fit.ar, hot * fit.sigma2), SLIPS.carried)[0]
+    return _decoded(fit, path.mean, law, rest, Noise(fit.ar, hot * fit.sigma2), CARRIED)[0]
 
 
 def _followed(play: Fit, begun: _Trial, rest: int) -> SlipPath:
@@ -152,11 +179,11 @@ def _followed(play: Fit, begun: _Trial, rest: int) -> SlipPath:
     later_s = begun.later * play.window.dt_s
     fit = replace(play, dead_time_s=play.dead_time_s + later_s, gain=begun.gain)
     best = path = _path(fit, valve, stem)
-    hopeless = play.log_likelihood - SLIPS.hopeless * play.count
-    for k in range(1, SLIPS.rounds):
-        longest, hot = rest if k == 1 else stem.size, SLIPS.hot[min(k - 1, len(SLIPS.hot) - 1)]
+    hopeless = play.log_likelihood - HOPELESS * play.count
+    for k in range(1, ROUNDS):
+        longest, hot = rest if k == 1 else stem.size, HOT[min(k - 1, len(HOT) - 1)]
         stem = _decoded_anew(path, path.fit, valve, longest, hot)
-        if _slips(stem) < SLIPS.fewest:
+        if _slips(stem) < FEWEST:
             break
         path = _path(path.fit, valve, stem)
         best = max(best, path, key=lambda p: p.worth)
@@ -167,9 +194,7 @@ def _followed(play: Fit, begun: _Trial, rest: int) -> SlipPath:
 
 def _settled(best: SlipPath) -> SlipPath:
     """Move stickband, jump and dead time by decreasing steps to the most probable path."""
-    return compass(
-        None, best, -best.worth, _moved, MOVES, SLIPS.steps, worth=SLIPS.worth, most=SLIPS.most_moves
-    )[0]
+    return compass(None, best, -best.worth, _moved, MOVES, STEPS, worth=WORTH, most=MOST_MOVES)[0]
 
 
 def _moved(_: None, best: SlipPath, move: tuple[int, int, int], step: float) -> tuple[SlipPath, float]:
@@ -177,13 +202,13 @@ def _moved(_: None, best: SlipPath, move: tuple[int, int, int], step: float) -> 
     window = best.fit.window
     v, (wider, jumpier, later) = best.fit.valve, (step * m for m in move)
     band, share = v.stickband * (1.0 + wider), v.slip_jump / v.stickband + 2.0 * jumpier
-    dead_s = best.fit.dead_time_s + later * SLIPS.dead_steps * window.dt_s
+    dead_s = best.fit.dead_time_s + later * DEAD_STEPS * window.dt_s
     if not 0.0 < share <= 1.0 or dead_s < 0.0:
         return best, math.inf
     gain = best.fit.gain * v.slip_jump / (band * share)  # a slip moves PV by gain times jump
     fit, law = replace(best.fit, dead_time_s=dead_s, gain=gain), sticking(band, share)
     stem = _decoded_anew(best, fit, law, window.op.size, 1.0)
-    if _slips(stem) < SLIPS.fewest:
+    if _slips(stem) < FEWEST:
         return best, math.inf
     path = _path(fit, law, stem)
     return path, -path.worth
@@ -200,9 +225,9 @@ def fit_irregular(play: Fit, noise: Floats, period_s: float, any_gain: bool = Tr
     if play.gain == 0.0:
         return None
     window = play.window
-    rest = max(int(SLIPS.rests * period_s / window.step_s), 1)
+    rest = max(int(RESTS * period_s / window.step_s), 1)
     bands, half = play.valve.stickband, rest // (window.factor * window.steps) // 2
-    usual: Gains = {(w, s): play.gain for w in SLIPS.widths for s in SLIPS.jumps}
+    usual: Gains = {(w, s): play.gain for w in WIDTHS for s in JUMPS}
     best = _likeliest(play, noise, rest, usual)
     if best is None and any_gain:
         smaller = {(w, s): _gain(play, w * bands, s, half) for w, s in usual}

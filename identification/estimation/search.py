@@ -14,19 +14,25 @@ from numba import njit
 from numba.extending import register_jitable
 
 from identification.estimation.descent import compass
-from identification.estimation.noise import arx_noise, every_lag, generic_noise, judged, whitened
+from identification.estimation.noise import AR_ORDER, arx_noise, every_lag, generic_noise, judged, whitened
 from identification.estimation.window import Stems, Window, stem_of
-from identification.limits import FIT
 from identification.models import Fopdt
 from identification.record import Floats, Mask
 from identification.simulation.lag import Lag, stepped, unit_lag
 from identification.simulation.valve import IDEAL, StemLaw, sticking
 
+INPUT_LAGS = 10  # Lags of OP in the unstructured model that gives the first noise model: as AR_ORDER
+SHORTEST = 1.5  # Shortest time constant tried [samples]
+APART = 2.5  # Ratio of neighbouring time constants tried: the descent covers a factor of three either way
+DELAYS = (0.0, 0.1, 0.3, 0.8)  # Dead times tried [of the time constant]
+LONGEST_DELAY = 0.1  # Longest dead time tried at first, as a share of the record; the descent may exceed it
+FIT_PIT_STEPS = (0.02, 0.007, 0.0025)  # Relative steps of the search within a minimum of stickband and jump
+
 FADED = 1e-17
 """A decay below this share of its start is treated as zero; numbers have sixteen digits."""
 MOVES = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, -1.0))
 """Compass moves in log time constant and dead time."""
-PIT_STEPS = FIT.pit_steps
+PIT_STEPS = FIT_PIT_STEPS
 """Step sizes of the local search in stickband and jump, in the kernels' type."""
 PIT_MOVES = ((1, 0), (-1, 0), (0, 1), (0, -1))
 """Compass moves in stickband and jump."""
@@ -244,9 +250,9 @@ def starts(window: Window, period_s: float) -> list[Dynamics]:
 
 def record_starts(samples: int, dt_s: float) -> list[Dynamics]:
     """Time constants and dead times [s] at which the search begins, over all time scales of the record."""
-    count = 1 + math.ceil(math.log(max(samples / FIT.shortest, FIT.apart)) / math.log(FIT.apart))
-    times = FIT.shortest * FIT.apart ** np.arange(count)
-    pairs = {(t, min(round(t * d, 1), FIT.longest_delay * samples)) for t in times for d in FIT.delays}
+    count = 1 + math.ceil(math.log(max(samples / SHORTEST, APART)) / math.log(APART))
+    times = SHORTEST * APART ** np.arange(count)
+    pairs = {(t, min(round(t * d, 1), LONGEST_DELAY * samples)) for t in times for d in DELAYS}
     return [(t * dt_s, d * dt_s) for t, d in sorted(pairs)]
 
 
@@ -263,9 +269,9 @@ def simulated_best(y: Floats, op: Floats, usable: Mask, dt_s: float) -> Fopdt:
 
 
 def learnt_noise(window: Window) -> Floats:
-    """An initial noise model of a window, shape (FIT.ar_order,), learnt without a process."""
+    """An initial noise model of a window, shape (AR_ORDER,), learnt without a process."""
     stem = window.stems_in_blocks.ideal
-    return arx_noise(window.centred, stem, window.usable, FIT.ar_order, FIT.input_lags)
+    return arx_noise(window.centred, stem, window.usable, AR_ORDER, INPUT_LAGS)
 
 
 def plain_processes(y: Floats, op: Floats, usable: Mask, dt_s: float) -> list[Fopdt]:

@@ -24,13 +24,37 @@ from numba import njit
 from numpy.typing import NDArray
 
 from identification.estimation.descent import Descent, down, nats
+from identification.estimation.noise import AR_ORDER
 from identification.estimation.search import Dynamics
 from identification.estimation.window import Fit, Window, stem_of
-from identification.limits import FIT, SMOOTH
 from identification.models import Fopdt
 from identification.record import Floats, Mask
 from identification.simulation.lag import Lag, stepped, unit_lag
 from identification.simulation.valve import IDEAL, StemLaw
+
+LAGS = (0.05, 0.1, 0.2, 0.45, 1.0, 2.1, 4.5, 10.0, 20.0)
+"""Time constants of the lags with which a controller would ring at a period, from which the search begins
+[periods]: from a lag whose phase is that of a gain alone to one that is an integrator there."""
+MARGIN = 1.2  # Gain margin of these lags: a damping of about .05
+FOLLOWED = 2
+"""Starts that are followed to the end: on 48 loops of benchmarks/world of seed 1 two come to the optimum that
+nine come to."""
+FIRST_STEPS = 5  # Gauss-Newton steps of every start, after which the best are followed: as followed
+SMOOTH_STEPS = 20  # Largest number of Gauss-Newton steps
+SETTLED = 0.1  # Gain of a step below which a descent ends [nat]: far below what an answer needs
+FORGETS = 3
+"""Usable blocks after a hole that are not judged [blocks]: a noise model of two poles and two zeros looks
+back two."""
+LINE_AWAY = 1.3
+"""Factor within which the period of a load's line is searched: the error's own period is known far better."""
+LINE_KEPT = 3.0
+"""Time over which a periodic load keeps its phase at least; less is the resonance of a loop [periods]: a loop
+of damping .1 forgets its phase in 1.6 periods, one of .05 in 3.2."""
+LINE_STARTS = (6.0, 60.0)  # The same from which the search begins [periods]
+CUT = 0.02
+"""Share of an innovation that remains in a load's correlation where its noise model is truncated: innovations
+within 5 % of the load's own (tests/identification/estimation/test_smooth_load.py)."""
+MOST_LAGS = 30  # Lags of such a noise model at most: with more, holes in a record leave no block to judge
 
 LOAD, LINE = 5, 8
 """Constants of a model: log time constant [s], dead time [blocks], log corner time [s], inverse hyperbolic tangents
@@ -183,9 +207,9 @@ def _stepped(case: _Case, p: _Point, step: Floats) -> _Point:
 def _judged(usable: Mask) -> NDArray[np.int64]:
     """Blocks that are judged: usable, with enough usable ones before for the noise model to forget a gap."""
     out = ~usable
-    for k in range(1, SMOOTH.forgets + 1):
+    for k in range(1, FORGETS + 1):
         out[k:] |= ~usable[:-k]
-    out[: 2 * SMOOTH.forgets] = True
+    out[: 2 * FORGETS] = True
     return np.flatnonzero(~out)
 
 
@@ -197,8 +221,8 @@ def _case(window: Window, law: StemLaw, period_s: float, count: int) -> _Case:
     low = [math.log(0.1 * dt_s), 0.0, math.log(0.5 * dt_s), -1.5, -1.5]
     high = [math.log(most_t), most_dead / dt_s, math.log(1e3 * window.duration_s), 3.0, 3.0]
     if count > LOAD:
-        away, heights = math.log(SMOOTH.line_away), count - LINE + 1
-        low += [-away, math.log(SMOOTH.line_kept), *heights * [-1.0]]
+        away, heights = math.log(LINE_AWAY), count - LINE + 1
+        low += [-away, math.log(LINE_KEPT), *heights * [-1.0]]
         high += [away, math.log(10.0 * periods), *heights * [8.0]]
     ranges = np.array([low, high])
     return _Case(window.centred, stem, _judged(window.usable), dt_s, ranges, period_s)
@@ -208,12 +232,12 @@ def _descended(case: _Case, starts: Sequence[Floats]) -> _Point:
     """The most likely result of several starts: all take a few steps, the best of them descend to the end."""
 
     def went(begun: _Point, steps: int) -> _Point:
-        rule = Descent(steps, 2 * steps, case.at.size, SMOOTH.settled, 10.0, 5.0, steps)
+        rule = Descent(steps, 2 * steps, case.at.size, SETTLED, 10.0, 5.0, steps)
         return down(case, begun, _curved, _stepped, rule)
 
     begun = (_point(case, np.clip(s, case.ranges[0], case.ranges[1])) for s in starts)
-    near = sorted((went(p, SMOOTH.first_steps) for p in begun), key=lambda p: p.loss)
-    return min((went(p, SMOOTH.steps) for p in near[: SMOOTH.followed]), key=lambda p: p.loss)
+    near = sorted((went(p, FIRST_STEPS) for p in begun), key=lambda p: p.loss)
+    return min((went(p, SMOOTH_STEPS) for p in near[:FOLLOWED]), key=lambda p: p.loss)
 
 
 def _fit(window: Window, law: StemLaw, case: _Case, p: _Point) -> SmoothFit:
@@ -231,15 +255,15 @@ def resonant_starts(window: Window, period_s: float, law_response: complex) -> l
     gains.
 
     law_response : the controller's response there [% OP / % PV]. The loop phase is -180 degrees with the gain margin
-    SMOOTH.margin; empty where no dead time achieves this.
+    MARGIN; empty where no dead time achieves this.
     """
     omega, found = 2.0 * math.pi / period_s, []
     sign = 1.0 if law_response.real >= 0.0 else -1.0
     phase = float(np.angle(sign * law_response))
-    for t in SMOOTH.lags * np.array(period_s):
+    for t in LAGS * np.array(period_s):
         dead_s = (math.pi - math.atan(omega * t) + phase) / omega - window.half_block_s
         if 0.0 <= dead_s <= window.bounds[1] and t <= window.bounds[0]:
-            gain = sign * math.hypot(1.0, omega * t) / (abs(law_response) * SMOOTH.margin)
+            gain = sign * math.hypot(1.0, omega * t) / (abs(law_response) * MARGIN)
             found.append(((float(t), dead_s), gain))
     return found
 
@@ -282,7 +306,7 @@ def fit_line(
     process far from the true one.
     """
     case = _case(window, law, period_s, LINE)
-    lines = [np.array([0.0, math.log(kept), 2.0]) for kept in SMOOTH.line_starts]
+    lines = [np.array([0.0, math.log(kept), 2.0]) for kept in LINE_STARTS]
     starts = [fit.theta[:LINE] for fit in near if fit.line is not None]
     starts += [np.append(fit.theta[:LOAD], line) for fit in near for line in lines]
     loads = [*_loads(period_s), *(fit.theta[2:LOAD] for fit in near)]
@@ -314,12 +338,12 @@ def innovations_of(found: SmoothFit, window: Window, period_s: float) -> tuple[N
 
 def as_fit(found: SmoothFit, window: Window) -> Fit:
     """The result as a fit of the batch run, whose noise model has single lags: as many as reproduce the load to
-    SMOOTH.cut."""
+    CUT."""
     dt_s, p = window.dt_s, found.process
     pole, slow = math.exp(-dt_s / p.time_constant_s), math.exp(-dt_s / math.exp(found.theta[2]))
     z1, z2 = math.tanh(found.theta[3]), math.tanh(found.theta[4])
     longest = max(abs(z1), abs(z2), 1e-3)
-    order = min(max(math.ceil(math.log(SMOOTH.cut) / math.log(longest)), FIT.ar_order), SMOOTH.most_lags)
+    order = min(max(math.ceil(math.log(CUT) / math.log(longest)), AR_ORDER), MOST_LAGS)
     given, memory = np.zeros(order + 1), np.zeros(order + 1)
     given[:3] = 1.0, -(pole + slow), pole * slow
     for k in range(order + 1):

@@ -8,10 +8,19 @@ from itertools import pairwise
 import numpy as np
 
 from identification.estimation.descent import compass
-from identification.limits import STEM
 from identification.record import Floats
 from identification.signals.robust import robust_deviation
 from identification.simulation.valve import StemLaw, first_slip, sticking, walk
+
+STEPS = (0.03, 0.01, 0.003, 0.001)  # Relative steps of the search of the best backlash
+LEAST_SHARE = 0.5
+"""Share of the difference between position and OP that a fault has to explain: a positioner's lag leaves less
+than a third to backlash."""
+SLIP = 5.0
+"""Move of the stem within a sample, in standard deviations of its noise, from which it may be a slip
+[deviations]."""
+SLIPS = 6  # Slips of which medians are taken
+BY_SLIPS = 0.5  # Share of slips in the stem's travel, from which it sticks and does not only have backlash
 
 WIDTHS = tuple(float(w) for w in np.geomspace(0.03, 1.2, 60))
 """Backlash widths tried, relative to the range of OP: steps of a sixteenth."""
@@ -37,7 +46,7 @@ def closed_in(op: Floats, position: Floats, width: float) -> StemLaw:
         other = width * (1 + way * step)
         return other, left(op, position, sticking(other, 0.0))
 
-    width, _ = compass(op, width, left(op, position, sticking(width, 0.0)), tried, (1, -1), STEM.steps, 1e-9)
+    width, _ = compass(op, width, left(op, position, sticking(width, 0.0)), tried, (1, -1), STEPS, 1e-9)
     return sticking(width, 0.0)
 
 
@@ -46,7 +55,7 @@ def least_move(position: Floats) -> float:
     step = np.diff(position)
     noise = robust_deviation(step - np.median(step)) / np.sqrt(2.0)
     resolution = float(np.min(np.abs(step)[np.abs(step) > 0], initial=np.inf))
-    return max(STEM.slip * noise, 2.5 * resolution)
+    return max(SLIP * noise, 2.5 * resolution)
 
 
 def slips(op: Floats, position: Floats) -> Floats:
@@ -86,8 +95,8 @@ def seen(op: Floats, position: Floats) -> Seen | None:
     band = 0.5 * least_move(position)
     way = float(np.abs(np.diff(walk(position, StemLaw(band, band), float(position[0])))).sum())
     by_slips = min(float(found[:, 2].sum()) / max(way, 1e-9), 1.0)
-    if len(large) >= STEM.slips and by_slips > STEM.by_slips:
+    if len(large) >= SLIPS and by_slips > BY_SLIPS:
         go, rest = float(np.median(large[:, 0])), float(np.median(large[:, 1]))
         if go > max(rest, 0.0):
             return Seen(play, sticking(go + rest, (go - rest) / (go + rest)))
-    return Seen(play, None) if left(op, position, play) < (1.0 - STEM.least_share) * apart else None
+    return Seen(play, None) if left(op, position, play) < (1.0 - LEAST_SHARE) * apart else None

@@ -18,10 +18,18 @@ import numpy as np
 from numba import njit
 
 from identification.estimation.descent import nats
-from identification.limits import FIT
 from identification.models import Fopdt
 from identification.record import Floats, Mask
 from identification.simulation.valve import RESTS, StemLaw, first_slip, stem_step
+
+FAR_SMALLER = 0.5
+"""Range of OP in its cycle over its whole range, below which widths are searched up to the cycle's: a cycle
+that keeps its size has nearly all of OP's range in each two periods."""
+LONGEST_DEAD_TIME = 0.25
+"""Largest dead time searched, as a share of the window: beyond it the window holds under four of them."""
+LONGEST_TIME_CONSTANT = 3.0
+"""Largest time constant searched [windows]. Source: beyond it a lag and an integrator are one (PHYSICS:
+integrator)."""
 
 
 class Stems(NamedTuple):
@@ -113,7 +121,7 @@ class Window:
     @cached_property
     def bounds(self) -> tuple[float, float]:
         """Largest time constant and dead time that are searched [s]."""
-        longest = FIT.longest_time_constant * self.duration_s, FIT.longest_dead_time * self.duration_s
+        longest = LONGEST_TIME_CONSTANT * self.duration_s, LONGEST_DEAD_TIME * self.duration_s
         known = self.most_time_constant_s, self.most_dead_time_s
         return max(min(longest[0], known[0]), self.dt_s), max(min(longest[1], known[1]), 2 * self.dt_s)
 
@@ -166,7 +174,7 @@ class Window:
     def reach(self) -> float:
         """Range of OP that limits the widths searched [% OP]: of all samples, unless its cycle is far smaller."""
         whole, cycle = self.op_range, self.cycle_range
-        return max(cycle if cycle < FIT.far_smaller * whole else whole, 1e-9)
+        return max(cycle if cycle < FAR_SMALLER * whole else whole, 1e-9)
 
 
 def block_means(x: Floats, factor: int) -> Floats:

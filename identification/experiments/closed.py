@@ -13,9 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from identification.experiments.columns import Kind, Trial
-from identification.experiments.fit import Fitted, Shape, descended
+from identification.experiments.fit import RAMP_FROM, Fitted, Shape, descended
 from identification.experiments.wander import Wander, wander_of, whitened
-from identification.limits import EXPERIMENTS
 
 
 def shown_sign(trial: Trial) -> float:
@@ -58,7 +57,7 @@ def _lags(kind: Kind, lag: float) -> tuple[float, ...]:
 
 def _is_slow(fit: Fitted) -> bool:
     """Whether the process responds with a delay, unlike the inverse control law."""
-    most = EXPERIMENTS.ramp_from * fit.trial.duration_s
+    most = RAMP_FROM * fit.trial.duration_s
     return 2.0 * fit.trial.block_s < sum(fit.lags_s) + fit.dead_s and max(fit.lags_s) < most
 
 

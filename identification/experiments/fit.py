@@ -14,9 +14,29 @@ from scipy.optimize import least_squares
 
 from identification.experiments.columns import Kind, Trial, answers, stem_of
 from identification.experiments.wander import Wander, log_likelihood, wander_of, whitened
-from identification.limits import EXPERIMENTS
 from identification.record import Floats, Mask
 from identification.simulation.lag import respond, unit_lag
+
+LONGEST_LAG = 5.0
+"""Longest lag that is searched for [of the experiment]: beyond it the answer is an integrator's."""
+STEPS = 40  # Evaluations of a search for times
+NOISE_PASSES = 3
+"""Passes that make a fit and its noise consistent: the likelihood moves by less than .1 nat with more."""
+SCREENED = 14
+"""Lags that are screened from a block to the whole experiment: neighbours are nearer than a factor of two."""
+DEAD_SHARES = (0.0, 0.1, 0.3, 0.6, 1.0, 1.6, 2.5)  # Dead times that are screened with each lag [of the lag]
+STARTS = 3  # Screened lags that are followed
+TWO_LAGS = ((0.9, 0.3, 0.6), (0.7, 0.6, 0.3), (1.0, 0.1, 1.0))
+"""Where the search for two lags begins, in terms of the best lag with dead time [of lag, lag, dead time]."""
+PLAY_STARTS = ((0.1, 0.5), (0.3, 0.9))
+"""Backlash, and the part of it that the first move takes up, at the start of the search [of OP's range, of
+the backlash]."""
+WITH_PLAY = 2  # Best candidates that are tried with backlash if OP reverses [candidates]
+RARE = 2.3
+"""Additional gain that an inverse response needs over other candidates: one process in ten has one [nat]."""
+RAMP_FROM = 1.5
+"""Lag from which a response is an integrator's: PV has made less than half of its move [of the
+experiment]."""
 
 TIMES = {Kind.NO_ANSWER: 0, Kind.LAG: 1, Kind.TWO_LAGS: 2, Kind.INVERSE: 2, Kind.INTEGRATOR: 0}
 """Lags of each kind."""
@@ -77,7 +97,7 @@ class Fitted:
     @property
     def score(self) -> float:
         """Log likelihood [nat] less the Akaike penalty of its constants and the prior penalty of its kind."""
-        rare = EXPERIMENTS.rare if self.shape.kind is Kind.INVERSE else 0.0
+        rare = RARE if self.shape.kind is Kind.INVERSE else 0.0
         return self.log_likelihood - self.shape.constants - rare
 
     @property
@@ -154,7 +174,7 @@ def bounds_of(trial: Trial, shape: Shape) -> tuple[Floats, Floats]:
     long, own = trial.duration_s, TIMES[shape.kind]
     short = 0.5 * trial.block_s if own > 1 else 0.1 * trial.dt_s
     low = [math.log(short)] * own
-    high = [math.log(EXPERIMENTS.longest_lag * long)] * own
+    high = [math.log(LONGEST_LAG * long)] * own
     if shape.answers:
         low, high = [*low, 0.0], [*high, 0.5 * long]
     if shape.play:
@@ -184,7 +204,7 @@ def descended(trial: Trial, shape: Shape, start: Floats, noise: Wander, late: bo
             bounds=(low[free], high[free]),
             x_scale=scale[free],
             diff_step=1e-4,
-            max_nfev=EXPERIMENTS.steps,
+            max_nfev=STEPS,
         )
         times = placed(times, free, found.x)
     e, linear, logs = projected(trial, shape, times, noise)
@@ -201,7 +221,7 @@ def placed(all_times: Floats, free: Mask, found: Floats) -> Floats:
 
 def settled(fit: Fitted) -> Fitted:
     """Fit and noise model estimated alternately until they agree."""
-    for _ in range(EXPERIMENTS.noise_passes):
+    for _ in range(NOISE_PASSES):
         noise = wander_of(fit.trial.pv - fit.simulated, fit.trial.usable)
         again = descended(fit.trial, fit.shape, fit.times, noise)
         if again.log_likelihood <= fit.log_likelihood + 0.01 and noise == fit.wander:
@@ -213,15 +233,15 @@ def settled(fit: Fitted) -> Fitted:
 def screened(trial: Trial, noise: Wander) -> list[Floats]:
     """Times (log lag, dead time) of the lags with dead time of least residual, one per time scale; best first."""
     shape = Shape(Kind.LAG, drift=True)
-    lags = np.geomspace(max(trial.block_s, 2e-3 * trial.duration_s), trial.duration_s, EXPERIMENTS.screened)
+    lags = np.geomspace(max(trial.block_s, 2e-3 * trial.duration_s), trial.duration_s, SCREENED)
     found = []
     for lag in lags:
-        tried = [np.array([math.log(lag), share * lag]) for share in EXPERIMENTS.dead_shares]
+        tried = [np.array([math.log(lag), share * lag]) for share in DEAD_SHARES]
         tried = [t for t in tried if t[1] < 0.5 * trial.duration_s]
         left = [float((projected(trial, shape, t, noise)[0] ** 2).sum()) for t in tried]
         found.append((min(left), tried[int(np.argmin(left))]))
     found.sort(key=lambda x: x[0])
-    return [times for _, times in found[: EXPERIMENTS.starts]]
+    return [times for _, times in found[:STARTS]]
 
 
 def starts_of(kind: Kind, lag: Fitted) -> list[Floats]:
@@ -229,9 +249,7 @@ def starts_of(kind: Kind, lag: Fitted) -> list[Floats]:
     log_t, dead = float(lag.times[0]), lag.dead_s
     if kind is Kind.INTEGRATOR:
         return [np.array([dead]), np.array([dead + 0.1 * math.exp(log_t)])]
-    return [
-        np.array([log_t + math.log(a), log_t + math.log(b), c * dead]) for a, b, c in EXPERIMENTS.two_lags
-    ]
+    return [np.array([log_t + math.log(a), log_t + math.log(b), c * dead]) for a, b, c in TWO_LAGS]
 
 
 def best_of(trial: Trial, shape: Shape, starts: list[Floats], noise: Wander) -> Fitted:
@@ -274,7 +292,7 @@ def _makes_sense(fit: Fitted) -> bool:
     """Whether an inverse response really starts in the opposite direction, and no lag is so long that it is an
     integrator."""
     led = fit.shape.kind is Kind.INVERSE and fit.linear[0] * fit.linear[1] >= 0.0
-    return not led and max(fit.lags_s, default=0.0) < EXPERIMENTS.ramp_from * fit.trial.duration_s
+    return not led and max(fit.lags_s, default=0.0) < RAMP_FROM * fit.trial.duration_s
 
 
 def _with_more(found: list[Fitted]) -> list[Fitted]:
@@ -287,9 +305,9 @@ def _with_more(found: list[Fitted]) -> list[Fitted]:
         more += [best_of(f.trial, replace(f.shape, start=True), [f.times], f.wander) for f in bases]
     if tells_play(best.trial.op):
         travel = float(np.ptp(best.trial.op))
-        for base in {id(f): f for f in (*bases, *found[: EXPERIMENTS.with_play])}.values():
+        for base in {id(f): f for f in (*bases, *found[:WITH_PLAY])}.values():
             shape = replace(base.shape, play=True)
-            worn = (with_term(base, shape, [math.log(w * travel), s]) for w, s in EXPERIMENTS.play_starts)
+            worn = (with_term(base, shape, [math.log(w * travel), s]) for w, s in PLAY_STARTS)
             more.append(max(worn, key=lambda f: f.log_likelihood))
     best = min(best, *more, key=lambda f: f.criterion) if more else best
     for place in range(len(best.trial.beside)):

@@ -13,9 +13,22 @@ from identification.estimation.descent import NINETY
 from identification.experiments.columns import Kind
 from identification.experiments.fit import TIMES, Fitted, columns, descended
 from identification.experiments.wander import whitened
-from identification.limits import EXPERIMENTS
 from identification.models import Estimate
 from identification.record import Floats
+
+DEAD_STEP = 0.7
+"""Step from one dead time to the next, at each of which an experiment's other constants are fitted again
+[deviations]: a normal density in steps of .7 deviations has its moments within .1 %."""
+DEAD_TIMES = 8  # Dead times on either side of the likeliest at most: they reach 5.6 deviations
+UNLIKELY = 4.0
+"""Loss of log likelihood from which a dead time no longer counts [nat]. Source: theory: beyond 2.8 deviations
+of a normal density, .5 % of it."""
+COUNTS = 0.02
+"""Akaike weight from which a candidate counts: less moves a mean by less than its deviation's fiftieth."""
+LOG_KNOWN = 1.5  # Prior deviation of a lag's log: a second lag without effect has no limit
+LOOSE = 0.3
+"""Deviation of a gain's log from which a candidate next to the best does not count: its terms are
+indistinguishable."""
 
 NUDGE = 1e-4
 """Step of a numerical derivative, in logs, or relative to the shortest time."""
@@ -50,7 +63,7 @@ def covariance_of(fit: Fitted) -> Floats:
     size = np.sqrt((white**2).sum(axis=0)) + 1e-12
     gram = white.T @ white / fit.variance
     logs = np.zeros(size.size)
-    logs[: times.size] = EXPERIMENTS.log_known**-2
+    logs[: times.size] = LOG_KNOWN**-2
     if shape.answers:
         logs[own] = (sum(fit.lags_s) + fit.dead_s if fit.lags_s else trial.duration_s) ** -2.0
     gram += np.diag(logs + 1e-10 * size**2 / fit.variance)
@@ -102,14 +115,14 @@ def along_dead_time(fit: Fitted, step_s: float) -> list[Fitted]:
     most = 0.5 * fit.trial.duration_s
     for way in (-1.0, 1.0):
         at = fit
-        for _ in range(EXPERIMENTS.dead_times):
+        for _ in range(DEAD_TIMES):
             times = at.times.copy()
             times[own] = min(max(times[own] + way * step_s, 0.0), most)
             if times[own] == at.times[own]:
                 break
             at = descended(fit.trial, fit.shape, times, fit.wander, late=False)
             out.append(at)
-            if at.log_likelihood < fit.log_likelihood - EXPERIMENTS.unlikely:
+            if at.log_likelihood < fit.log_likelihood - UNLIKELY:
                 break
     return out
 
@@ -123,7 +136,7 @@ def averaged(found: Sequence[Fitted], closed: bool = False) -> Averaged:
     """
     best = found[0]
     tried = [(f, spread_of(f)) for f in found if f is best or _counts(f, best)]
-    told = [(f, s) for f, s in tried if f is best or s.log_gain < EXPERIMENTS.loose]
+    told = [(f, s) for f, s in tried if f is best or s.log_gain < LOOSE]
     weight, at, own = _mixture(told, closed)
     mean = weight @ at
     wide = np.sqrt(weight @ (own**2 + (at - mean) ** 2))
@@ -140,9 +153,9 @@ def _mixture(told: Sequence[tuple[Fitted, Spread]], closed: bool) -> tuple[Float
     # OP moved at an unknown time between two samples, and the record shows the move at the second
     unseen_s = told[0][0].trial.dt_s
     for share, (f, s) in zip(weights_of([f for f, _ in told]), told, strict=True):
-        if share < EXPERIMENTS.counts:
+        if share < COUNTS:
             continue
-        step_s = max(EXPERIMENTS.dead_step * s.dead_s, 0.05 * unseen_s)
+        step_s = max(DEAD_STEP * s.dead_s, 0.05 * unseen_s)
         row = [f] if closed else along_dead_time(f, step_s)
         likely = np.exp([x.log_likelihood - f.log_likelihood for x in row])
         weight += (share * likely / likely.sum()).tolist()

@@ -12,13 +12,33 @@ from identification.errors import NotAssessedError
 from identification.estimation.descent import NINETY
 from identification.experiments.closed import closed_candidates, shown_sign
 from identification.experiments.columns import Kind, trial_of
-from identification.experiments.find import Course, Experiment
+from identification.experiments.find import LEAST_PART, SAMPLES, Course, Experiment
 from identification.experiments.fit import Fitted, candidates, tells_play
 from identification.experiments.intervals import Averaged, averaged, estimates_of
-from identification.limits import EXPERIMENTS
 from identification.models import Estimate, Fopdt, Integrator, Process
 from identification.record import Floats, LoopRecord, Mask
 from identification.signals.lone import lone_values, without_lone
+
+BLOCKS = 1500
+"""Blocks in which an experiment is fitted at first [blocks]: each of some hundred columns passes the filter
+once."""
+BLOCKS_A_LAG = 12.0
+"""Blocks in the shortest time of a response: the sum of lags of proofs/step_tests.md moves by less than 1 %
+with more."""
+MOST_BLOCKS = 20000  # Largest number of blocks for a fast response [blocks]: a second of work
+ANSWERS = 10.0  # Gain in log likelihood by OP from which PV responds [nat]: one in 20,000 of noise alone
+MOST_GAIN = 0.7
+"""Half-width of the 90 % interval of the gain's log from which no model is reported: a factor of two."""
+EXPLAINED = 0.7
+"""Share of PV's motion that a simulation explains of an experiment in automatic: less is made by a load that
+OP answers."""
+LONE = 20.0
+"""Jump there and back of a single value, over the upper quartile of changes, from which it is left out: as
+recorder.spike."""
+LONE_SHARE = 0.5
+"""The same over the range of all other values [of PV's range]: a single value that goes by less is noise that
+does little."""
+STANDS = 5  # Samples of constant OP about an isolated other value that is excluded [samples]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,9 +84,9 @@ def process_of(kind: Kind, e: Mapping[str, Estimate]) -> Process:
 
 def lone_in(record: LoopRecord) -> tuple[Mask, Mask]:
     """Isolated single values of PV, and of an OP that is otherwise constant before and after; shape (n,) each."""
-    factor, stands = EXPERIMENTS.lone, EXPERIMENTS.stands
-    pv = lone_values(record.pv, record.at_work, factor, EXPERIMENTS.lone_share)
-    op = lone_values(record.op, record.at_work, factor, EXPERIMENTS.least_part)
+    factor, stands = LONE, STANDS
+    pv = lone_values(record.pv, record.at_work, factor, LONE_SHARE)
+    op = lone_values(record.op, record.at_work, factor, LEAST_PART)
     for k in np.flatnonzero(op):
         around = np.r_[record.op[max(k - stands, 0) : k], record.op[k + 1 : k + 1 + stands]]
         op[k] = float(np.ptp(around)) == 0.0
@@ -84,7 +104,7 @@ def modelled(record: LoopRecord, x: Experiment, beside: Sequence[Floats] = ()) -
     others = tuple(b[x.first : x.last] for b in beside if float(np.ptp(b[x.first : x.last])) > 0.0)
     found, nat = _candidates(part, x, others)
     best, mean = found[0], averaged(found, x.course.closed)
-    if nat < EXPERIMENTS.answers or NINETY * mean.spread.log_gain > EXPERIMENTS.most_gain:
+    if nat < ANSWERS or NINETY * mean.spread.log_gain > MOST_GAIN:
         raise NotAssessedError(f"PV does not respond to OP beyond its noise in the {x.course}")
     trial, start_s = best.trial, x.first * record.dt_s
     blocks = trial.op.reshape(-1, trial.factor).mean(axis=1)
@@ -107,16 +127,16 @@ def modelled(record: LoopRecord, x: Experiment, beside: Sequence[Floats] = ()) -
 
 def _candidates(part: LoopRecord, x: Experiment, others: tuple[Floats, ...]) -> tuple[list[Fitted], float]:
     """Candidates, best first, and OP's gain [nat]; with finer blocks if the response is too fast for the first."""
-    factor = max(len(part) // EXPERIMENTS.blocks, 1)
+    factor = max(len(part) // BLOCKS, 1)
     for _ in range(2):
         found, nat = _in_blocks(part, x, factor, others)
         if not found:
             raise NotAssessedError(f"no process explains PV in the {x.course}")
         fast_s = sum(found[0].lags_s) + found[0].dead_s
-        fine = max(int(fast_s / EXPERIMENTS.blocks_a_lag / part.dt_s), 1)
+        fine = max(int(fast_s / BLOCKS_A_LAG / part.dt_s), 1)
         if fine >= factor:
             break
-        factor = max(fine, len(part) // EXPERIMENTS.most_blocks, 1)
+        factor = max(fine, len(part) // MOST_BLOCKS, 1)
     return found, nat
 
 
@@ -124,14 +144,14 @@ def _in_blocks(
     part: LoopRecord, x: Experiment, factor: int, others: tuple[Floats, ...]
 ) -> tuple[list[Fitted], float]:
     trial = trial_of(part, factor, others)
-    if int(trial.usable.sum()) < EXPERIMENTS.samples:
-        need = f"needs {EXPERIMENTS.samples} good samples, has {int(trial.usable.sum())}"
+    if int(trial.usable.sum()) < SAMPLES:
+        need = f"needs {SAMPLES} good samples, has {int(trial.usable.sum())}"
         raise NotAssessedError(f"{need} in the {x.course}")
     if x.course.closed:
         found = closed_candidates(trial, shown_sign(trial), x.course is Course.WARM_UP)
         left = math.inf if not found else float(np.var(found[0].trial.pv - found[0].simulated))
-        good = left < (1.0 - EXPERIMENTS.explained) * float(np.var(trial.pv))
-        return found, EXPERIMENTS.answers if good else 0.0
+        good = left < (1.0 - EXPLAINED) * float(np.var(trial.pv))
+        return found, ANSWERS if good else 0.0
     found, still = candidates(trial)
     return found, found[0].score - still.score
 

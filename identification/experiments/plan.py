@@ -8,9 +8,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.estimation.descent import NINETY
-from identification.limits import EXPERIMENTS
 from identification.record import Floats, LoopRecord
 from identification.signals.robust import robust_deviation
+
+HOLD_LAGS = 4.0
+"""Sums of lags for which a step of a test is held, in addition to the dead time. Source: theory: PV is then
+at 98 % of its way."""
+HOLD_SAMPLES = 20  # Samples for which a step of a test is held at least [samples]
+OVER_WANDER = 16.0
+"""PV's answer to a step of a test over what the means of two holds differ by. Source: theory: the gain's 90 %
+interval is then 10 %."""
+OVER_SAMPLE = 4.0
+"""The same over PV's noise from sample to sample: the samples of the rise determine the dead time."""
+OVER_PLAY = 3.0  # Step of a test over the width of backlash or stickband: a step within it moves nothing
+FIRST_STEP = 3.0  # First step of a test of a loop of unknown gain [% of OP]: what plants allow without asking
+LEAST_STEP = 1.0  # Least step of a test [% of OP]: positioners resolve a few tenths of a percent
+MARGIN = 5.0  # Distance from OP's limits that a test keeps [% of OP]
+MOST_ANSWER = 10.0  # PV's answer to one step of a test at most [% of PV's span]: a plant may allow twice that
 
 MOVES = (1.0, 1.0, -1.0, -1.0)
 """Moves of a test, in steps: the second identifies the gain free of backlash, the third backlash; the last
@@ -70,27 +84,27 @@ def planned(record: LoopRecord, known: Known) -> Plan:
     good = record.at_work
     pv, op = record.pv[good], record.op[good]
     noise = robust_deviation(np.diff(pv)) / math.sqrt(2.0) if pv.size > 2 else 0.0
-    hold_s = known.dead_s + EXPERIMENTS.hold_lags * known.lag_s
-    hold_s = max(hold_s, EXPERIMENTS.hold_samples * record.dt_s)
+    hold_s = known.dead_s + HOLD_LAGS * known.lag_s
+    hold_s = max(hold_s, HOLD_SAMPLES * record.dt_s)
     wander = max(
         wander_between(pv, max(int(hold_s / record.dt_s), 1)), noise / math.sqrt(hold_s / record.dt_s)
     )
     gain = abs(known.gain) if known.gain else None
-    answer = max(EXPERIMENTS.over_wander * wander, EXPERIMENTS.over_sample * noise)
-    wanted = EXPERIMENTS.first_step if gain is None else answer / gain
-    wanted = max(wanted, EXPERIMENTS.over_play * known.width_pct, EXPERIMENTS.least_step)
+    answer = max(OVER_WANDER * wander, OVER_SAMPLE * noise)
+    wanted = FIRST_STEP if gain is None else answer / gain
+    wanted = max(wanted, OVER_PLAY * known.width_pct, LEAST_STEP)
     middle = float(np.median(op[-max(op.size // 20, 1) :])) if op.size else 50.0
-    room = max(100.0 - EXPERIMENTS.margin - middle, middle - EXPERIMENTS.margin)
-    bearable = math.inf if gain is None or known.integrating else EXPERIMENTS.most_answer / gain
+    room = max(100.0 - MARGIN - middle, middle - MARGIN)
+    bearable = math.inf if gain is None or known.integrating else MOST_ANSWER / gain
     step = min(wanted, max(0.5 * room, 0.0), bearable)
-    way = 1.0 if middle + 2.0 * step <= 100.0 - EXPERIMENTS.margin else -1.0
+    way = 1.0 if middle + 2.0 * step <= 100.0 - MARGIN else -1.0
     step = float(f"{max(step, 0.1):.2g}")
     moves = RAMPS if known.integrating else MOVES
     levels = tuple(round(middle + way * step * x, 2) for x in np.cumsum((0.0, *moves)))
     seen = None if gain is None else gain * step
-    if known.integrating and seen is not None and seen > EXPERIMENTS.most_answer:
-        hold_s = known.dead_s + known.lag_s * EXPERIMENTS.most_answer / seen
-        seen = EXPERIMENTS.most_answer
+    if known.integrating and seen is not None and seen > MOST_ANSWER:
+        hold_s = known.dead_s + known.lag_s * MOST_ANSWER / seen
+        seen = MOST_ANSWER
     within = None if seen is None or seen == 0.0 else NINETY * wander / seen
     play = None if within is None or known.width_pct <= 0.0 else 2.0 * within * step / known.width_pct
     return Plan(step, levels, hold_s, noise, wander, seen, within, play, step < 0.9 * wanted)

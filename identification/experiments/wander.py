@@ -12,8 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from identification.limits import EXPERIMENTS
 from identification.record import Floats, Mask
+
+WANDERS = 2.0
+"""Gain in log likelihood from which noise includes drift: it has two more constants [nat]. Source: Akaike
+1974: one nat a constant."""
 
 RATIOS = tuple(float(x) for x in np.geomspace(1e-6, 30.0, 13))
 """Candidate variances of w relative to that of e [-]."""
@@ -68,7 +71,7 @@ def wander_of(residual: Floats, usable: Mask) -> Wander:
         e, logs = whitened(column, usable, phi, ratio)
         return log_likelihood(float((e**2).sum()), logs, count)
 
-    best, top = Wander(), value(0.0, 0.0) + EXPERIMENTS.wanders
+    best, top = Wander(), value(0.0, 0.0) + WANDERS
     memories = [m for m in MEMORIES if m <= 10.0 * residual.size]
     ratios = RATIOS
     for _ in range(2):

@@ -16,6 +16,19 @@ from identification.models import Estimate
 from identification.record import Floats
 from identification.simulation.parameters import Act, Param, Signal, Slot, Start, Variant, each, own_slot
 
+PARAMETER_PENALTY = 3.0
+"""Gain that one more constant has to bring [nat]: half of log(n) would be 4.5, chance brings a half."""
+
+SEARCH_PENALTY = 6.0
+"""Gain that the choice among some forty candidates and their starts costs, or that of a load step's place
+[nat]: the largest of forty by chance."""
+
+ONE_CONSTANT = SEARCH_PENALTY + PARAMETER_PENALTY  # Required gain of an effect with one constant [nat]
+
+TIE = 2.0
+"""Candidates within this gain of the winner are indistinguishable from it and are its alternatives; a square-
+root outflow, the commoner, is reported before a nonlinear gain [nat]: odds of seven to one."""
+
 __all__ = ["Act", "Block", "Effect", "Ends", "Estimate", "Fault", "Finding", "Floats", "Friction"]
 __all__ += ["Param", "Parameters", "Recording", "Signal", "Slot", "Start", "Variant"]
 __all__ += ["each", "exact", "own_slot", "within"]

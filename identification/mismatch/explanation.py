@@ -18,12 +18,14 @@ import numpy as np
 
 from identification.controller.check import Finding
 from identification.controller.pi_regression import ControlLaw
-from identification.estimation.prediction_error import Fitted, Problem, descended, gain, problem
+from identification.estimation.prediction_error import FULL_STEPS, Fitted, Problem, descended, gain, problem
 from identification.mismatch.catalogue import EFFECTS, fault
-from identification.mismatch.effect import Ends
+from identification.mismatch.effect import ONE_CONSTANT, Ends
 from identification.mismatch.friction import is_friction
 from identification.mismatch.model_file import carried, constants, inputs_for, to_data
 from identification.mismatch.proof import (
+    WINDOW_SAMPLES,
+    WINDOW_TIMES,
     HeldOut,
     Misfit,
     OnOther,
@@ -38,6 +40,13 @@ from identification.mismatch.selection import Candidate, without
 from identification.record import Floats
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
+
+ROUNDS = 3  # Effects named at most: a record seldom shows more
+LEAST_IN_BAND = 0.1
+"""Share of the held-out misfit in the loop's band that a further effect must remove to be named. Source: a
+judgement: a tenth of the mean square is 5 % of the rms, which a trend hardly shows."""
+LEAST_CYCLE = 20
+"""Fewest samples of a window in which the stem is placed again: a line and the place are three numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +99,7 @@ class Explanation:
     def less(self, given_up: Sequence[Candidate]) -> Explanation:
         """The explanation without some of its effects, the others refitted."""
         model = without(self.best.model, (c.row for c in given_up))
-        best = descended(self.p, model, self.p.limits.search.full_steps)
+        best = descended(self.p, model, FULL_STEPS)
         gone = {c.name for c in given_up}
         return replace(self, best=best, accepted=tuple(c for c in self.accepted if c.name not in gone))
 
@@ -130,7 +139,7 @@ def by_cycles(found: Explanation) -> bool:
 def is_stack(found: Explanation) -> bool:
     """Whether a loop has as many effects as the search allows: an effect outside the catalogue is fitted by a stack
     of others. Rigs in open loop can have several effects."""
-    return len(found.accepted) >= found.p.limits.search.rounds and not found.p.by_simulation
+    return len(found.accepted) >= ROUNDS and not found.p.by_simulation
 
 
 def mark(found: Explanation) -> float:
@@ -147,7 +156,7 @@ def carried_over(found: Explanation) -> Explanation:
     """
     names = tuple(r.name for r in found.accepted)
     cycle_s = 0.0 if found.cycles is None else found.cycles.cycle_s
-    cycle = max(round(cycle_s / found.p.inputs.dt_s), found.p.limits.proof.least_cycle)
+    cycle = max(round(cycle_s / found.p.inputs.dt_s), LEAST_CYCLE)
     for count in range(len(names), 0, -1):
         kept = found if count == len(names) else first_effects(found, count)
         cycling = count == 1 and by_cycles(found)
@@ -174,7 +183,7 @@ def adds_in_band(found: Explanation, proof: HeldOut) -> bool:
         return True
     less = first_effects(found, len(found.accepted) - 1)
     before = held_out(less.p, less.plain, less.best, band=found.band).banded
-    least = found.p.limits.proof.least_in_band
+    least = LEAST_IN_BAND
     return before is None or proof.banded[1].rmse ** 2 <= (1.0 - least) * before[1].rmse ** 2
 
 
@@ -190,14 +199,14 @@ def agreed(told: Explanation, by_misfit: Explanation) -> Explanation:
     The nearer one is chosen. Innovations must confirm an explanation by misfit with a gain of one constant's penalty.
     The residual is what both miss: a wandering load is no model error, and innovations show none.
     """
-    limits, left = told.p.limits.search, min(told.left, by_misfit.left)
+    left = min(told.left, by_misfit.left)
     p = replace(by_misfit.p, inputs=replace(by_misfit.p.inputs, step_at=told.p.inputs.step_at))
-    anew = descended(p, told.best.model, limits.full_steps)
+    anew = descended(p, told.best.model, FULL_STEPS)
     other = replace(told, p=p, plain=by_misfit.plain, best=anew, left=left, by_innovations=told)
     other = carried_over(most_telling_first(other))
     inputs = replace(told.p.inputs, step_at=by_misfit.p.inputs.step_at)
-    seen = descended(replace(told.p, inputs=inputs), by_misfit.best.model, limits.full_steps)
-    is_seconded = gain(seen, told.plain) > limits.one_constant
+    seen = descended(replace(told.p, inputs=inputs), by_misfit.best.model, FULL_STEPS)
+    is_seconded = gain(seen, told.plain) > ONE_CONSTANT
     return nearer(other, replace(by_misfit, left=left, by_innovations=told)) if is_seconded else other
 
 
@@ -255,9 +264,9 @@ def window_of(found: Explanation, s: Recording) -> int:
     """Window [samples] for comparing models where the whole shows the load alone, from the proof or the loop."""
     if found.proven.window:
         return max(round(found.proven.window * found.p.inputs.dt_s / s.dt_s), 1)
-    c, limits = found.plain.model.c, found.p.limits.proof
-    memory = limits.window_times * float(c[Slot.T] + c[Slot.L]) / s.dt_s
-    return max(math.ceil(min(memory, 1e9)), limits.window_samples)
+    c = found.plain.model.c
+    memory = WINDOW_TIMES * float(c[Slot.T] + c[Slot.L]) / s.dt_s
+    return max(math.ceil(min(memory, 1e9)), WINDOW_SAMPLES)
 
 
 def compared(found: Explanation, others: Sequence[Recording]) -> tuple[HeldOut, tuple[OnOther, ...]]:
@@ -271,7 +280,7 @@ def compared(found: Explanation, others: Sequence[Recording]) -> tuple[HeldOut, 
         window = round(windows[0] * others[0].dt_s / p.inputs.dt_s)
         plain, better = (misfit(p.y, course(p, c, window, placed), window) for c in drawn)
         seen = plain, better
-        proof = HeldOut(0.0, seen, held, seen, drawn, window, placed, limits=p.limits)
+        proof = HeldOut(0.0, seen, held, seen, drawn, window, placed)
         if proof.carries:
             break
     return proof, each

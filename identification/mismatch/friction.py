@@ -18,9 +18,16 @@ from numba import njit
 from identification.estimation.backlash_stiction import pits
 from identification.estimation.descent import compass
 from identification.estimation.noise import generic_noise
-from identification.estimation.prediction_error import Fitted, Model, Problem, descended, residual_fit
+from identification.estimation.prediction_error import (
+    FULL_STEPS,
+    SCREEN_STEPS,
+    Fitted,
+    Model,
+    Problem,
+    descended,
+    residual_fit,
+)
 from identification.estimation.window import Fit, Window
-from identification.limits import FRICTION
 from identification.mismatch.effect import Friction
 from identification.mismatch.outside import about
 from identification.mismatch.recording import SeenInCycles
@@ -33,11 +40,30 @@ from identification.simulation.parameters import Signal, Slot, Variant, acted, a
 from identification.simulation.valve import StemLaw, moved_stem, sticking
 from identification.simulation.valve_chain import before_stem, behind_stem, friction_of
 
+STARTS = 3  # Starts of a candidate, or of a stem with mass, that are followed to the end: bounds the time
+MASSES_MOVED = 20  # Starts of a stem with mass that are moved by small steps: bounds the time
+MASS_MOVES = 40  # Small steps by which such a start is moved at most: bounds the time
+
+FRICTION_PLACES = 9  # Places of the stem that are tried within its friction band: an eighth of the band apart
+WIDTHS = (0.9, 1.8, 10)
+"""First and last of the stickbands tried for a stem with mass, in widths of the best backlash, and their
+number [of the backlash]: of 18 simulated stems of dry friction they were 1.1 to 1.8."""
+JUMPS = (0.4, 0.6, 0.8)  # Jumps that are tried of a stem with mass [of the stickband]
+TIMES = (0.12, 0.25, 0.5)
+"""Natural times that are tried of a stem with mass [samples]: faster stems move within a sample, slower ones
+are a lag."""
+STEPS = (0.08, 0.04, 0.02, 0.01)
+"""Relative steps of the search of a stem with mass: a pit is a tenth of the stickband wide."""
+DEAD_STEPS = 4.0  # Dead time that a step of one takes [samples]
+FRICTION_CARRIED_ON = 0.9
+"""Sum of squares with another position over that with the continued stem, from which the stem is placed
+again."""
+
 WEARS = (Friction.PLAY, Friction.STICKS)
 """Roles of the effects of a worn valve."""
 OF_CYCLES = (Slot.T, Slot.L, Slot.K, Slot.STICKBAND, Slot.JUMP, Slot.COAST)
 """Parameters that the cycles determine."""
-PLACES, CARRIED_ON = FRICTION.places, FRICTION.carried_on
+PLACES, CARRIED_ON = FRICTION_PLACES, FRICTION_CARRIED_ON
 """Settings of limits.toml for the stem position, in the kernels' type."""
 MOVES = (
     *((1, 0, 0, 0), (-1, 0, 0, 0), (0, 1, 0, 0), (0, -1, 0, 0)),
@@ -57,7 +83,7 @@ def fit_sticking(p: Problem, play: Fitted, row: Variant, rows: tuple[Variant, ..
     model = Model((*rows, row), row.set_in(play.model.c))
     has_mass = any(q.slot == Slot.STEM_T for q in row.params)
     begun = _with_mass(p, model) if has_mass else _as_a_night(p, play, model)
-    return min((descended(p, m, 2 * p.limits.search.screen_steps) for m in begun), key=lambda fit: fit.loss)
+    return min((descended(p, m, 2 * SCREEN_STEPS) for m in begun), key=lambda fit: fit.loss)
 
 
 def _as_a_night(p: Problem, play: Fitted, model: Model) -> list[Model]:
@@ -86,9 +112,9 @@ def _as_a_night(p: Problem, play: Fitted, model: Model) -> list[Model]:
 def _with_mass(p: Problem, model: Model) -> list[Model]:
     """The best starts of stems with mass: a scan of stickbands near the backlash width, jumps and natural times,
     refined by decreasing steps, because slips make narrow optima that a descent misses."""
-    scanned, limits = [], p.limits.search
-    widths = np.geomspace(*FRICTION.widths)
-    for width, share, samples in product(widths, FRICTION.jumps, FRICTION.times):
+    scanned = []
+    widths = np.geomspace(*WIDTHS)
+    for width, share, samples in product(widths, JUMPS, TIMES):
         c = model.c.copy()
         c[Slot.STICKBAND] *= width
         c[Slot.JUMP] = share * c[Slot.STICKBAND]
@@ -96,10 +122,10 @@ def _with_mass(p: Problem, model: Model) -> list[Model]:
         c[Slot.L] = max(c[Slot.L] - c[Slot.STEM_T], 0.0)
         trial = Model(model.added, c)
         scanned.append((residual_fit(p, trial).loss, trial))
-    best = sorted(scanned, key=lambda pair: pair[0])[: limits.masses_moved]
-    most, steps = limits.mass_moves, FRICTION.steps
+    best = sorted(scanned, key=lambda pair: pair[0])[:MASSES_MOVED]
+    most, steps = MASS_MOVES, STEPS
     moved = (compass(p, trial, loss, _heavier, MOVES, steps, most=most) for loss, trial in best)
-    return [trial for trial, _ in sorted(moved, key=lambda pair: pair[1])[: limits.starts]]
+    return [trial for trial, _ in sorted(moved, key=lambda pair: pair[1])[:STARTS]]
 
 
 def _heavier(p: Problem, model: Model, move: tuple[int, ...], step: float) -> tuple[Model, float]:
@@ -107,7 +133,7 @@ def _heavier(p: Problem, model: Model, move: tuple[int, ...], step: float) -> tu
     c = model.c.copy()
     for slot, way in zip((Slot.STICKBAND, Slot.JUMP, Slot.STEM_T), move, strict=False):
         c[slot] *= math.exp(step * way)
-    c[Slot.L] = max(c[Slot.L] + move[3] * step * FRICTION.dead_steps * p.inputs.dt_s, 0.0)
+    c[Slot.L] = max(c[Slot.L] + move[3] * step * DEAD_STEPS * p.inputs.dt_s, 0.0)
     if c[Slot.JUMP] > c[Slot.STICKBAND]:
         return model, math.inf
     trial = Model(model.added, c)
@@ -129,7 +155,7 @@ def from_cycles(x: Round, seen: SeenInCycles, rows: tuple[Variant, ...]) -> list
         valve = _valve_for(row, seen.valve) if is_friction(row.name) else None
         if valve is not None:
             model = Model((*near.model.added, row), _begun(p, near, seen, valve))
-            out.append(descended(p, model, p.limits.search.full_steps))
+            out.append(descended(p, model, FULL_STEPS))
     return out
 
 

@@ -16,9 +16,34 @@ from numba import njit
 from scipy.ndimage import binary_opening
 
 from identification.controller.check import runs
-from identification.limits import LIMITS, LOCATION, SIGNALS
+from identification.limits import LIMITS
 from identification.record import Floats, Mask
-from identification.signals.robust import robust_deviation
+from identification.signals.robust import OUTLIER, robust_deviation
+
+ORDERS = 400
+"""Permutations of the blocks that give the distribution of an independent residual: a p-value of 0.05 is
+known within 0.01, and 20,000 samples take under a second."""
+CHANCE = 0.02
+"""Chance, over all features together, of calling any on a residual that is tied to none: one page in
+fifty."""
+BLOCK_MEMORIES = 3.0
+"""Length of a block in memories of the loop: within it what the loop remembers stays in order."""
+SHORTEST_BLOCK = 30  # Fewest samples of a block [samples]
+MOST_BLOCKS = 150  # Most blocks: more only cost memory
+FEWEST_BLOCKS = 10
+"""Blocks below which no order says anything; a record shorter than this is located by nothing."""
+PIECES = 4
+"""Straight pieces over a level or over time: a step at any place is followed, ten columns are not spent."""
+PROFILE_PARTS = 12  # Parts of a feature's profile, of as many samples each
+TURN_SHARE = 0.01
+"""Least travel back, in terms of OP's range, that counts as a turn: less shows nothing about a valve."""
+OP_LEVELS = 12
+"""Values that OP must take for an end of its own range to be a limit: a test signal between two is at
+none."""
+LIMIT_SAMPLES = 10  # Samples at a limit below which the limit is not tested [samples]
+PAST = 2
+"""Samples by which features are older than the innovation [samples]: one, and one for what looks at a
+neighbour."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,12 +88,12 @@ def least_turn(op: Floats) -> float:
     change = np.diff(op)
     noise = robust_deviation(change - np.median(change)) if change.size else 0.0
     low, high = np.quantile(op, [0.01, 0.99])
-    return max(LOCATION.turn_share * float(high - low), SIGNALS.outlier * noise, 1e-6)
+    return max(TURN_SHARE * float(high - low), OUTLIER * noise, 1e-6)
 
 
 def piecewise_linear_basis(x: Floats) -> Floats:
     """Piecewise linear basis between even quantiles of a signal, shape (n, k), none if it is constant."""
-    knots = np.unique(np.quantile(x, np.linspace(0.02, 0.98, LOCATION.pieces + 1)))
+    knots = np.unique(np.quantile(x, np.linspace(0.02, 0.98, PIECES + 1)))
     if knots.size < 2:
         return np.zeros((x.size, 0))
     return np.stack([np.interp(x, knots, row) for row in np.eye(knots.size)[1:]], axis=1)
@@ -84,7 +109,7 @@ def at_limits(op: Floats) -> Mask:
     """True where OP is at 0 or 100 %, or at an end of its own range for three samples, shape (n,)."""
     least = LIMITS.controller.at_limit
     out = (op <= least) | (op >= 100.0 - least)
-    ends = (op.max(), op.min()) if np.unique(op).size > LOCATION.op_levels else ()
+    ends = (op.max(), op.min()) if np.unique(op).size > OP_LEVELS else ()
     for end in ends:
         out |= binary_opening(op == end, np.ones(3))
     return out
@@ -102,7 +127,7 @@ def groups(pv: Floats, op: Floats, dt_s: float, late: int, memory: int) -> tuple
     `memory` [samples] of the loop. All features are of the past: an innovation is part of its own PV, and through
     feedback of every later OP.
     """
-    o, before = delayed(op, late + LOCATION.past), delayed(pv, LOCATION.past)
+    o, before = delayed(op, late + PAST), delayed(pv, PAST)
     way, since = turns(o, least_turn(o))
     since_s, window = since * dt_s, min(max(memory // 4, 1), pv.size)
     travel = np.abs(o - delayed(o, window)) / (window * dt_s)
@@ -118,7 +143,7 @@ def groups(pv: Floats, op: Floats, dt_s: float, late: int, memory: int) -> tuple
         Group("after_reversals", np.stack([fading, fading * way], axis=1), since_s, way),
         Group("time_in_record", piecewise_linear_basis(index), index),
     ]
-    if limit.sum() >= LOCATION.limit_samples:
+    if limit.sum() >= LIMIT_SAMPLES:
         found.append(Group("at_limits", limit[:, None], limit))
     return tuple(g for g in found if g.columns.shape[1] and float(np.ptp(g.columns)) > 0)
 
@@ -151,7 +176,7 @@ class Feature:
     @property
     def carries(self) -> bool:
         """Whether the misfit depends on this feature in addition to all others."""
-        return self.p <= LOCATION.chance
+        return self.p <= CHANCE
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,8 +197,8 @@ class Located:
 def standardized(e: Floats) -> Floats:
     """Power (cut) and sign of innovations about their mean, standardized, shape (n, 2)."""
     square = float(np.mean(e**2))
-    power = np.minimum(e**2 / max(square, 1e-300), SIGNALS.outlier**2)
-    sign = np.clip(e / max(math.sqrt(square), 1e-300), -SIGNALS.outlier, SIGNALS.outlier)
+    power = np.minimum(e**2 / max(square, 1e-300), OUTLIER**2)
+    sign = np.clip(e / max(math.sqrt(square), 1e-300), -OUTLIER, OUTLIER)
     y = np.stack([power, sign], axis=1)
     y -= y.mean(axis=0)
     return y / np.maximum(y.std(axis=0), 1e-12)
@@ -213,12 +238,12 @@ def chances(bases: list[Floats], y: Floats, blocks: int) -> tuple[Floats, Floats
     pairs = block_products(np.concatenate(bases, axis=1), y, blocks)
     here = np.arange(blocks)
     seen = _scores(pairs[here, here].sum(axis=0), ends)
-    orders = (rng.permutation(blocks) for _ in range(LOCATION.orders))
+    orders = (rng.permutation(blocks) for _ in range(ORDERS))
     null = np.stack([_scores(pairs[here, order].sum(axis=0), ends) for order in orders])
     middle, spread = null.mean(axis=0), np.maximum(null.std(axis=0), 1e-9)
     most, excess = ((null - middle) / spread).max(axis=(1, 2)), (seen - middle) / spread
     above = (most[None, :] >= excess.max(axis=1)[:, None]).sum(axis=1)
-    return (1 + above) / (LOCATION.orders + 1), excess
+    return (1 + above) / (ORDERS + 1), excess
 
 
 def block_products(flat: Floats, y: Floats, blocks: int) -> Floats:
@@ -242,7 +267,7 @@ def _scores(products: Floats, ends: np.ndarray) -> Floats:
 
 def profile(x: Floats, y: Floats) -> Profile:
     """Innovations y, in standard deviations, along a feature x, shape (n,) each, in bins of equal count."""
-    parts, order = LOCATION.profile_parts, np.argsort(x, kind="stable")
+    parts, order = PROFILE_PARTS, np.argsort(x, kind="stable")
     x, y = x[order], y[order]
     levels = np.flatnonzero(np.diff(x, prepend=x[0] - 1.0))
     if levels.size > parts:
@@ -269,10 +294,10 @@ def located(e: Floats, pv: Floats, op: Floats, judged: Mask, dt_s: float, late: 
     late, memory : samples of dead time, and of dead time and time constant together.
     """
     count = int(judged.sum())
-    wanted = max(LOCATION.block_memories * memory, LOCATION.shortest_block)
-    blocks = min(max(int(count / wanted), LOCATION.fewest_blocks), LOCATION.most_blocks)
+    wanted = max(BLOCK_MEMORIES * memory, SHORTEST_BLOCK)
+    blocks = min(max(int(count / wanted), FEWEST_BLOCKS), MOST_BLOCKS)
     found, local, left = groups(pv, op, dt_s, late, memory), np.zeros(e.size), e[judged]
-    if count // blocks < max(memory, LOCATION.shortest_block) or float(np.ptp(left)) == 0.0:
+    if count // blocks < max(memory, SHORTEST_BLOCK) or float(np.ptp(left)) == 0.0:
         return Located((), local, found)
     columns, y = [g.columns[judged] for g in found], standardized(left)
     bases, flat = directions(columns), np.concatenate(columns, axis=1)

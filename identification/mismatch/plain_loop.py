@@ -8,6 +8,7 @@ import numpy as np
 
 from identification.estimation.noise import NO_NOISE
 from identification.estimation.prediction_error import (
+    FULL_STEPS,
     Fitted,
     Model,
     Problem,
@@ -72,7 +73,7 @@ def prepared(
         p = replace(p, weight=np.where(clip.where, 0.0, p.weight))
     first = plain(p, brought, clip)
     calm = replace(p, weight=robust_weights(first.e, p.weight > 0))
-    fit = descended(calm, first.model, p.limits.search.full_steps)
+    fit = descended(calm, first.model, FULL_STEPS)
     if experiment:
         calm = replace(calm, memory=correlated(left_freely(calm, fit)[calm.weight > 0]))
         fit = replace(fit, count=calm.independent(fit.e))
@@ -90,5 +91,5 @@ def plain(p: Problem, brought: Floats | None = None, clip: Clip | None = None) -
     if clip is not None:
         for c in starts:
             c[clip.slot] = clip.value
-    fits = [descended(p, Model((), c), p.limits.search.full_steps) for c in starts]
+    fits = [descended(p, Model((), c), FULL_STEPS) for c in starts]
     return min(fits, key=lambda fit: fit.loss)

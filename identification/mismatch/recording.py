@@ -14,6 +14,13 @@ from identification.limits import LIMITS, ExplainLimits, RecorderLimits
 from identification.models import Backlash, Estimate, Fopdt, Stiction
 from identification.record import Floats, Mask
 
+EXPERIMENT_SAMPLES = 4000
+"""Samples of an experiment beyond which it is judged at a coarser step, if its time constant allows it:
+bounds the time."""
+SAMPLES_A_LAG = 5.0
+"""Samples that a time constant and dead time keep at the coarser step: OP's mean drives a step exactly, and a
+move is placed to a tenth of the lag."""
+
 
 @dataclass(frozen=True, slots=True)
 class SeenInCycles:
@@ -158,9 +165,8 @@ def is_experiment(s: Recording) -> bool:
 
 def coarser_by(s: Recording) -> int:
     """Downsampling factor of an experiment that keeps the information on its process; 1 if every sample is needed."""
-    limits = s.limits.search
-    most = s.pv.size // limits.experiment_samples
+    most = s.pv.size // EXPERIMENT_SAMPLES
     if most < 2:
         return 1
     fast = min(x.time_constant_s + x.dead_time_s for x in plain_processes(s.pv, s.op, s.usable, s.dt_s))
-    return max(min(most, int(fast / (limits.samples_a_lag * s.dt_s))), 1)
+    return max(min(most, int(fast / (SAMPLES_A_LAG * s.dt_s))), 1)

@@ -16,12 +16,37 @@ import numpy as np
 
 from identification.estimation.noise import lag_means, whitened
 from identification.estimation.prediction_error import Fitted, Problem, sensitivities
-from identification.limits import REFERENCE
 from identification.record import Floats
 from identification.simulation.lag import lagged
 from identification.simulation.open_loop import simulate, through_valve
 from identification.simulation.parameters import Slot
 from identification.simulation.vessel import plain_vessel
+
+SETTLES = 0.1  # Share of the record that a time constant may take if the loop is to be seen to settle
+
+BOXES = 32  # Past stretches of OP that may act, each with a weight of its own
+REACH = 8.0  # Their reach into the past, in time constants plus dead times: a recycle of seven is within it
+MOST_REACH = 0.2  # The same at most, in the recording
+LEAST_BOX = 3  # Fewest samples of such a stretch [samples]
+FOLDS = 5  # Parts of a record, each predicted from the others
+CALM = 0.05
+"""Precision of the ridge's prior of a periodic waveform over that of a sample, per sample: .015 and .05 do
+alike."""
+FAST = 0.3  # Time constants over which a move still acts
+OF_RECORD = 0.05  # Largest reach of the loop's history, over the recording: what lasts longer is a drift
+HARMONICS = 16
+"""Harmonics of a periodic waveform: a switched load leaves innovations at the switching and none between;
+with three a periodic pump gained 4 nat in the median of 21, with sixteen 41, and nothing else did."""
+CLOCK_CYCLES = 3  # Cycles of a periodic waveform that a record must contain
+WIDEST = 5.0  # Standard deviations to which a move predicted by the model is clipped: one move is no law
+PRIORS = (0.003, 0.3)
+"""Precisions of the ridge's prior over that of a sample, of which the better counts [per sample]. Source: of
+.003 to 3 unnamed physics that rings is found by the first, all else by the second (proofs/concealed)."""
+MEMORIES = (3.0, 10.0, 30.0, 100.0)  # How far back the loop's history reaches [time constants]
+LEVELS = (0.2, 0.4, 0.6, 0.8)  # Quantiles of possible switching levels
+BANDS = (0.03, 0.15, 0.4)  # Hysteresis of a possible switch [of the range]
+FINER = 8
+"""Lines of a periodic load's spectrum for one of the record's: the last harmonic has to keep step over it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +76,7 @@ class LoopSignals:
         self.through, self.dt_s = through_valve(p.inputs, c), p.inputs.dt_s
         pv = simulate(p.inputs, c) if p.by_simulation else np.concatenate((p.y[:1], p.y[:-1]))
         self.flow, self.pv = self.through - self.through.mean(), pv - pv.mean()
-        self.lag_s = min(max(float(c[Slot.T]), self.dt_s), p.limits.search.settles * pv.size * self.dt_s)
+        self.lag_s = min(max(float(c[Slot.T]), self.dt_s), SETTLES * pv.size * self.dt_s)
         self.c, self.lagging = c, c.copy()
         self.lagging[Slot.T] = self.lag_s
 
@@ -61,7 +86,7 @@ class LoopSignals:
 
     def ahead(self, x: Floats) -> Floats:
         """A signal, shape (n,), less its own lag."""
-        return x - lagged(x, REFERENCE.fast * self.lag_s, self.dt_s)
+        return x - lagged(x, FAST * self.lag_s, self.dt_s)
 
 
 def on_above(x: Floats, at: float, band: float) -> Floats:
@@ -75,16 +100,16 @@ def on_above(x: Floats, at: float, band: float) -> Floats:
 def by_level(o: LoopSignals) -> list[Floats]:
     """Gain and load that depend on PV's level, and loads switched by PV."""
     out = [o.response(o.flow * o.pv), o.response(o.flow * o.pv**2), o.pv**2, o.pv**3]
-    edges, span = np.quantile(o.pv, REFERENCE.levels[:3]), float(np.ptp(o.pv))
-    return out + [o.response(on_above(o.pv, at, band * span)) for at in edges for band in REFERENCE.bands[:2]]
+    edges, span = np.quantile(o.pv, LEVELS[:3]), float(np.ptp(o.pv))
+    return out + [o.response(on_above(o.pv, at, band * span)) for at in edges for band in BANDS[:2]]
 
 
 def by_switch(o: LoopSignals) -> list[Floats]:
     """Load and gain of another flow regime, which ends at another level than it begins."""
     span = float(np.subtract(*np.quantile(o.flow, (0.99, 0.01))))
     out = []
-    for at in np.quantile(o.flow, REFERENCE.levels):
-        for band in REFERENCE.bands:
+    for at in np.quantile(o.flow, LEVELS):
+        for band in BANDS:
             on = on_above(o.flow, at, band * span)
             out += [o.response(on), o.response(on * (o.flow - at))]
     return out
@@ -93,9 +118,9 @@ def by_switch(o: LoopSignals) -> list[Floats]:
 def by_history(o: LoopSignals) -> list[Floats]:
     """Load and gain that depend on past PV and on past travel of the valve."""
     travel = np.abs(np.diff(o.flow, prepend=o.flow[0]))
-    longest_s = REFERENCE.of_record * o.flow.size * o.dt_s
+    longest_s = OF_RECORD * o.flow.size * o.dt_s
     out = []
-    shortest_s, *others_s = (m * o.lag_s for m in REFERENCE.memories)
+    shortest_s, *others_s = (m * o.lag_s for m in MEMORIES)
     for memory_s in (shortest_s, *(m for m in others_s if m <= longest_s)):
         been, gone = (lagged(x - x.mean(), memory_s, o.dt_s) for x in (o.pv, travel))
         out += [o.response(x) for x in (been, gone, o.flow * been, o.flow * gone)]
@@ -121,11 +146,11 @@ def by_sensor(p: Problem, fit: Fitted) -> list[Floats]:
 def past_moves(o: LoopSignals) -> list[Floats]:
     """Means of OP behind the valve over past stretches, each shape (n,)."""
     n, dt_s = o.flow.size, o.dt_s
-    length_s = min(REFERENCE.reach * float(o.c[Slot.T] + o.c[Slot.L]), REFERENCE.most_reach * n * dt_s)
-    width = max(round(length_s / REFERENCE.boxes / dt_s), REFERENCE.least_box)
+    length_s = min(REACH * float(o.c[Slot.T] + o.c[Slot.L]), MOST_REACH * n * dt_s)
+    width = max(round(length_s / BOXES / dt_s), LEAST_BOX)
     total = np.concatenate(([0.0], np.cumsum(o.flow)))
-    at = [np.maximum(np.arange(n) - i * width, 0) for i in range(REFERENCE.boxes + 1)]
-    return [(total[at[i]] - total[at[i + 1]]) / width for i in range(REFERENCE.boxes)]
+    at = [np.maximum(np.arange(n) - i * width, 0) for i in range(BOXES + 1)]
+    return [(total[at[i]] - total[at[i + 1]]) / width for i in range(BOXES)]
 
 
 def bent_moves(o: LoopSignals) -> list[Floats]:
@@ -187,20 +212,20 @@ def best_prediction(p: Problem, fit: Fitted, clock: bool = True) -> Prediction:
         x = rest(np.nan_to_num(np.stack(signals) * root).T)
         size = x.std(axis=0)
         kept = size > 1e-9 * size.max(initial=1e-30)
-        won = max(_gained(fit, e, _by_ridge(e, x[:, kept] / size[kept], prior)) for prior in REFERENCE.priors)
+        won = max(_gained(fit, e, _by_ridge(e, x[:, kept] / size[kept], prior)) for prior in PRIORS)
         best = Prediction(way, won) if won > best.gain else best
     return best
 
 
 def _bounded(x: Floats) -> Floats:
     """A signal, shape (n,), with its largest moves clipped."""
-    most = REFERENCE.widest * np.std(x)
+    most = WIDEST * np.std(x)
     return np.clip(x, -most, most)
 
 
 def _folds(n: int) -> Iterator[slice]:
     """The parts of a record."""
-    ends = np.linspace(0, n, REFERENCE.folds + 1).astype(int)
+    ends = np.linspace(0, n, FOLDS + 1).astype(int)
     return (slice(a, b) for a, b in pairwise(ends))
 
 
@@ -217,21 +242,21 @@ def _by_ridge(e: Floats, x: Floats, prior: float) -> Floats:
 
 def _by_clock(e: Floats, root: Floats) -> Floats:
     """The same with a periodic prediction, of the period with the most power in all harmonics in the other parts."""
-    n, out, each = e.size, np.empty(e.size), np.arange(1, REFERENCE.harmonics + 1)
+    n, out, each = e.size, np.empty(e.size), np.arange(1, HARMONICS + 1)
     bounded = _bounded(e)
     for part in _folds(n):
         known = np.ones(n, dtype=bool)
         known[part] = False
-        power = np.abs(np.fft.rfft(bounded * known, REFERENCE.finer * n)) ** 2
-        lines = np.arange(REFERENCE.finer * REFERENCE.clock_cycles, power.size // (each.size + 1))
+        power = np.abs(np.fft.rfft(bounded * known, FINER * n)) ** 2
+        lines = np.arange(FINER * CLOCK_CYCLES, power.size // (each.size + 1))
         if lines.size == 0:
             return e
         highest = lines[np.argmax(power[np.outer(each, lines)].sum(axis=0))]
-        angle = 2.0 * np.pi * highest / (REFERENCE.finer * n)
+        angle = 2.0 * np.pi * highest / (FINER * n)
         turn = np.outer(np.arange(n) * angle, each)
         wave = np.concatenate((np.cos(turn), np.sin(turn)), axis=1) * root[:, None]
         gram, slope = wave[known].T @ wave[known], wave[known].T @ e[known]
-        ridge = REFERENCE.calm * n * np.eye(2 * each.size)
+        ridge = CALM * n * np.eye(2 * each.size)
         out[part] = e[part] - wave[part] @ np.linalg.solve(gram + ridge, slope)
     return out
 

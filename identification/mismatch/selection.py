@@ -7,15 +7,47 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from identification.estimation.prediction_error import Fitted, Model, Problem, descended, gain
+from identification.estimation.prediction_error import (
+    FULL_STEPS,
+    SCREEN_STEPS,
+    Fitted,
+    Model,
+    Problem,
+    descended,
+    gain,
+)
 from identification.mismatch.catalogue import CANDIDATES
-from identification.mismatch.effect import Friction
-from identification.mismatch.friction import fit_sticking
+from identification.mismatch.effect import PARAMETER_PENALTY, SEARCH_PENALTY, Friction
+from identification.mismatch.friction import STARTS, fit_sticking
 from identification.mismatch.outside import about
 from identification.mismatch.proof import is_one_move
 from identification.mismatch.recording import Recording
+from identification.mismatch.reference import SETTLES
 from identification.mismatch.starts import Round, mode_starts, screened, start_models
 from identification.simulation.parameters import Slot, Variant, neutral
+
+HIDDEN_PENALTY = 1.0
+"""Gain that a constant of an experiment has to bring that is not reported [nat]: a knot of a course, the start of
+a record. Source: Akaike 1974: what chance brings on average."""
+FOLLOWED = 6  # Candidates that are followed to the end from several starts: bounds the time
+WORTH_FOLLOWING = -6.0
+"""Penalised gain from which a candidate of the first round is continued [nat]: of 242 below it on the same
+cases one came to anything, 0.6."""
+MAY_COME_TO = 0.5
+"""Share of the required gain from which a candidate is followed, if that is known: 83 sealed cases and seven
+rigs are answered as where all are followed."""
+SAME = 1.0
+"""Gain by which a model may be below one with one more constant and still count as equally good [nat]: twice
+what chance brings."""
+STICKING_HINT = 6.0
+"""Gain of backlash, or of a coarsely started sticking valve, from which stiction is scanned finely [nat]:
+bounds the time."""
+COURSE_LEAVES = 0.3
+"""Part of an experiment's misfit (mean square) that a supply may leave to be reported without its own gain: a
+heater that failed leaves .18."""
+COURSE_FROM = 0.4
+"""Least misfit of the baseline model in that case, over PV's spread: loads that are no effect move PV less
+than OP does."""
 
 Progress = Callable[[str], None]
 KNOWN_TYPES = ("flow", "pressure", "temperature", "level")
@@ -62,7 +94,7 @@ def compete(
     begun = [first_try(x, row, least, tell) for row in rows if applies(x, row)]
     firsts = counted_alike(x, [first for first, _ in begun])
     tried = sorted(zip(firsts, (models for _, models in begun), strict=True), key=lambda t: -t[0].penalised)
-    most = x.p.limits.search.followed
+    most = FOLLOWED
     ended = [gain_over_opponent(x, followed(x, first, models, least)) for first, models in tried[:most]]
     sticking = sticking_candidates(x, [first for first, _ in tried], rows, tell)
     found = [*ended, *sticking, *(gain_over_opponent(x, first) for first, _ in tried[most:])]
@@ -88,10 +120,9 @@ def applies(x: Round, row: Variant) -> bool:
 
 def penalty(p: Problem, row: Variant) -> float:
     """Penalty of a variant [nat]."""
-    limits = p.limits.search
-    hidden = limits.hidden_penalty if p.by_simulation else limits.parameter_penalty
-    free = sum(hidden if q.hidden else limits.parameter_penalty for q in row.params)
-    return limits.search_penalty + (free or limits.parameter_penalty) + row.penalty
+    hidden = HIDDEN_PENALTY if p.by_simulation else PARAMETER_PENALTY
+    free = sum(hidden if q.hidden else PARAMETER_PENALTY for q in row.params)
+    return SEARCH_PENALTY + (free or PARAMETER_PENALTY) + row.penalty
 
 
 def penalised(x: Round, fit: Fitted) -> Candidate:
@@ -108,32 +139,30 @@ def best_of(x: Round, models: list[Model], steps: int, aim: float = math.inf) ->
 def worth_following(p: Problem, least: float) -> float:
     """Smallest penalised gain of the first round for which a candidate is followed [nat]: below the useful gain by
     the possible improvement, or a share of the useful gain if that is less."""
-    limits = p.limits.search
-    return min(limits.may_come_to * least, least + limits.worth_following)
+    return min(MAY_COME_TO * least, least + WORTH_FOLLOWING)
 
 
 def first_try(x: Round, row: Variant, least: float, tell: Progress) -> tuple[Candidate, list[Model]]:
     """The candidate after a few steps from a row's best start, and all its starts, the best first; a hopeless start
     is stopped."""
     tell(row.name)
-    p, near, limits = x.p, x.near, x.p.limits.search
+    p, near = x.p, x.near
     first = models = start_models(x, row)
     if row.needs != "line":
-        models = screened(x, models)[: limits.starts]
+        models = screened(x, models)[:STARTS]
         first = models[:1]
     if row.modes:
         first = first + mode_starts(p, near, row)
     worth = penalty(p, row) + worth_following(p, least)
     aim = near.loss * math.exp(-2.0 * worth / p.count)
-    return best_of(x, first, limits.screen_steps, aim), models
+    return best_of(x, first, SCREEN_STEPS, aim), models
 
 
 def followed(x: Round, first: Candidate, models: list[Model], least: float) -> Candidate:
     """A candidate of the first round followed to the end, from its result and from its next starts."""
     if first.penalised < worth_following(x.p, least) and (least > 0.0 or not x.p.by_simulation):
         return first
-    limits = x.p.limits.search
-    best = best_of(x, [first.fit.model, *models[1 : limits.starts]], limits.full_steps)
+    best = best_of(x, [first.fit.model, *models[1:STARTS]], FULL_STEPS)
     return best if best.penalised > first.penalised else first
 
 
@@ -154,10 +183,10 @@ def gain_over_opponent(x: Round, first: Candidate) -> Candidate:
     p, near, row = x.p, x.near, first.row.opponent
     if row is None or not p.by_simulation:
         return first
-    model, steps = Model((*near.model.added, row), row.set_in(near.model.c)), p.limits.search.full_steps
+    model, steps = Model((*near.model.added, row), row.set_in(near.model.c)), FULL_STEPS
     added, own = descended(p, model, steps), descended(p, first.fit.model, steps)
-    limits, moves = p.limits.proof, float(p.weight @ p.y**2 / p.weight.sum())
-    if own.loss < limits.course_leaves * near.loss and near.loss > limits.course_from**2 * moves:
+    moves = float(p.weight @ p.y**2 / p.weight.sum())
+    if own.loss < COURSE_LEAVES * near.loss and near.loss > COURSE_FROM**2 * moves:
         return penalised(x, own)
     won = gain(own, added)
     return Candidate(own, won, won - penalty(p, first.row) + first.row.penalty)
@@ -169,7 +198,7 @@ def sticking_candidates(
     """Sticking valves scanned near the best backlash, if backlash or a similar effect gains anything."""
     plays = [c for c in tried if about(c.name).friction is Friction.PLAY]
     hints = [c.gain for c in tried if about(c.name).friction is not None]
-    if not plays or max(hints) < x.p.limits.search.sticking_hint:
+    if not plays or max(hints) < STICKING_HINT:
         return []
     out = []
     for row in rows:
@@ -207,14 +236,14 @@ def integrating_or_first_order(p: Problem, free: Fitted, s: Recording) -> tuple[
     constant fewer fits as well, the baseline model is one that settles within the record.
     """
     row, x = next(v for v in CANDIDATES if v.replaces), Round(p, free, s)
-    longest = p.limits.search.settles * p.inputs.dt_s * p.y.size
+    longest = SETTLES * p.inputs.dt_s * p.y.size
     if float(free.model.c[Slot.T]) <= longest or not applies(x, row):
         return p, free
-    ended = best_of(x, start_models(x, row), p.limits.search.full_steps)
-    if ended.gain < -p.limits.search.same:
+    ended = best_of(x, start_models(x, row), FULL_STEPS)
+    if ended.gain < -SAME:
         return p, free
     held = replace(p, inputs=replace(p.inputs, longest_s=longest))
     c = free.model.c.copy()
     c[Slot.K] *= longest / c[Slot.T]
     c[Slot.T] = longest
-    return held, descended(held, Model((), c), p.limits.search.full_steps)
+    return held, descended(held, Model((), c), FULL_STEPS)

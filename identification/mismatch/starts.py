@@ -15,6 +15,7 @@ from scipy.ndimage import median_filter
 from identification.controller.check import runs
 from identification.estimation.noise import whitened
 from identification.estimation.prediction_error import (
+    SCREEN_STEPS,
     Fitted,
     Model,
     Problem,
@@ -22,23 +23,42 @@ from identification.estimation.prediction_error import (
     scales,
     sensitivities,
 )
-from identification.limits import STARTS
 from identification.mismatch.recording import Recording
 from identification.record import Floats, Mask
 from identification.simulation.open_loop import simulate, through_valve
 from identification.simulation.parameters import STEPS, Slot, Variant, neutral
 from identification.simulation.vessel import plain_vessel
 
+MODES_KEPT = 2  # Starts with two modes that are kept under each noise model: bounds the time
+LINES = 4  # Lines of the spectrum at which an oscillating load is tried: bounds the time
+LINE_SIDE = 25  # Half of the lines whose median is a line's surroundings [lines]
+PV_JUMPS = 2.0
+"""Times that jumps of PV itself must explain more than load steps before they are believed: in steps that
+came through the process up to 1.2, in bursts of a sensor from 4 on."""
+STEP_NEAR = 3  # How far from a step's place its onset is looked for [samples]
+JUMP_LATE = 20  # How much later than a step's place the onset of a jump of PV is looked for [samples]
+GAP_SAMPLES = 5  # Missing samples from which OP may have moved unseen [samples]: an outlier is one or two
+FORGOTTEN = 3.0  # Time constants after which a gap's OP is forgotten: a twentieth is left
+HELD_OUT = 0.35
+"""Last part of the record that is held out when the winner is proven: two thirds to fit, one to prove."""
+
+LEAD = 200  # Rest before a pulse is whitened [samples]: the noise model reaches 117 back
+DELAYS = 40
+"""Largest number of dead times tried for two modes, from none to that of the baseline model: a missing lag or
+zero has lengthened it; a mode that answers at once is found to the sample alone."""
+LONGER = (0.7, 1.0, 1.4, 2.0)  # Time constants tried for the first mode, over that of the baseline model
+LEADING = 0.95  # First coefficient of the uninformed noise model: nearly a difference
+
 
 def early_part(p: Problem) -> tuple[Problem, int]:
     """The problem with only the first part of the record to be fitted, and the first sample held out."""
-    cut = int((1.0 - p.limits.proof.held_out) * p.y.size)
+    cut = int((1.0 - HELD_OUT) * p.y.size)
     return replace(p, weight=np.where(np.arange(p.y.size) < cut, p.weight, 0.0)), cut
 
 
 def fitted_early(p: Problem, fit: Fitted) -> Fitted:
     """A fit's model refitted to the first part of the record; a model's START is of its first sample."""
-    return descended(early_part(p)[0], fit.model, p.limits.search.screen_steps)
+    return descended(early_part(p)[0], fit.model, SCREEN_STEPS)
 
 
 @dataclass(frozen=True)
@@ -116,8 +136,8 @@ def step_pulse(p: Problem, fit: Fitted) -> Floats:
 
 def _pulse(answer: Floats, p: Problem, fit: Fitted) -> Floats:
     """A response whitened after a lead of rest, shape (n - lead,)."""
-    led = np.concatenate((np.zeros(STARTS.lead), answer))[: p.y.size]
-    return whitened(led, fit.ar, p.edges)[STARTS.lead :]
+    led = np.concatenate((np.zeros(LEAD), answer))[: p.y.size]
+    return whitened(led, fit.ar, p.edges)[LEAD:]
 
 
 def _best_place(e: Floats, pulse: Floats, shut: Mask) -> int:
@@ -135,11 +155,10 @@ def _best_place(e: Floats, pulse: Floats, shut: Mask) -> int:
 
 def after_gaps(p: Problem, fit: Fitted) -> Mask:
     """True in gaps and until their OP moves have decayed in PV, shape (n,): no step can be identified there."""
-    limits = p.limits.search
-    held = round(float(fit.model.c[Slot.L] + limits.forgotten * fit.model.c[Slot.T]) / p.inputs.dt_s)
+    held = round(float(fit.model.c[Slot.L] + FORGOTTEN * fit.model.c[Slot.T]) / p.inputs.dt_s)
     out = np.zeros(p.y.size, dtype=bool)
     for first, last in runs(~p.usable):
-        out[max(first - 1, 0) : last + held] |= last - first >= limits.gap_samples
+        out[max(first - 1, 0) : last + held] |= last - first >= GAP_SAMPLES
     return out
 
 
@@ -147,11 +166,11 @@ def at_inlet(p: Problem, fit: Fitted) -> bool:
     """Whether the steps found by step_places came through the process; otherwise PV jumped, as with a sensor."""
     e = fit.e * (p.weight > 0)
     through, jump = step_pulse(p, fit), _pulse(np.ones(p.y.size), p, fit)
-    near, came, jumped = p.limits.search.step_near, 0.0, 0.0
+    near, came, jumped = STEP_NEAR, 0.0, 0.0
     for at in dict.fromkeys(p.inputs.step_at):
         came += max(_share(e, through, at + i) for i in range(-near, near + 1))
-        jumped += max(_share(e, jump, at + i) for i in range(-near, p.limits.search.jump_late))
-    return jumped < p.limits.search.pv_jumps * came
+        jumped += max(_share(e, jump, at + i) for i in range(-near, JUMP_LATE))
+    return jumped < PV_JUMPS * came
 
 
 def _share(e: Floats, pulse: Floats, at: int) -> float:
@@ -165,12 +184,11 @@ def line_frequencies(p: Problem, fit: Fitted) -> tuple[float, ...]:
     """Angular frequencies [rad/s] of the innovations' lines with the highest power over their surroundings."""
     e = fit.e * (p.weight > 0)
     power = np.abs(np.fft.rfft(e, 2 * e.size)) ** 2
-    limits = p.limits.search
-    share = power / np.maximum(median_filter(power, 2 * limits.line_side, mode="nearest"), 1e-30)
+    share = power / np.maximum(median_filter(power, 2 * LINE_SIDE, mode="nearest"), 1e-30)
     share[:8] = 0.0
     share[power.size // 3 :] = 0.0
     found = []
-    for _ in range(limits.lines):
+    for _ in range(LINES):
         k = int(np.argmax(share))
         found.append(math.pi * k / (e.size * p.inputs.dt_s))
         share[max(k - 4, 0) : k + 5] = 0.0
@@ -204,12 +222,12 @@ def screened(x: Round, models: list[Model]) -> list[Model]:
 def mode_starts(p: Problem, near: Fitted, row: Variant) -> list[Model]:
     """Starts of a two-mode row whose second mode has the share of gain that defines the row."""
     blind = np.zeros_like(near.ar)
-    blind[:1] = STARTS.leading
+    blind[:1] = LEADING
     out = []
     for ar in (near.ar, blind) if near.ar.size else (near.ar,):
         models = [model for _, model in sorted(grid_of_modes(p, near, row, ar), key=lambda point: point[0])]
         low, high = row.mode_share
-        out += [model for model in models if low < model.c[Slot.SHARE] < high][: p.limits.search.modes_kept]
+        out += [model for model in models if low < model.c[Slot.SHARE] < high][:MODES_KEPT]
     return out
 
 
@@ -217,10 +235,10 @@ def grid_of_modes(p: Problem, near: Fitted, row: Variant, ar: Floats) -> Iterato
     """Residual of each grid point under one noise model, and its model; both gains are solved linearly."""
     dt_s, t0, dead0 = p.inputs.dt_s, float(near.model.c[Slot.T]), float(near.model.c[Slot.L])
     y, level = whitened(p.y, ar, p.edges), whitened(np.ones(p.y.size), ar, p.edges)
-    firsts, others = [t0 * f for f in STARTS.longer], [t0 * f for f in row.modes]
+    firsts, others = [t0 * f for f in LONGER], [t0 * f for f in row.modes]
     found = responses(p, near, {*firsts, *others}, ar)
     longest = min(math.ceil(dead0 / dt_s), p.y.size - 1)
-    for samples in range(0, longest + 1, longest // STARTS.delays + 1):
+    for samples in range(0, longest + 1, longest // DELAYS + 1):
         late = {t: np.concatenate((np.full(samples, x[0]), x[: x.size - samples])) for t, x in found.items()}
         for first, other in product(firsts, others):
             rows = np.stack([late[first], late[other], level])

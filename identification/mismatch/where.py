@@ -10,7 +10,6 @@ import numpy as np
 from identification.controller.check import runs
 from identification.estimation.noise import whitened
 from identification.estimation.prediction_error import Fitted, Problem
-from identification.limits import LOCATION
 from identification.mismatch import words
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.location import Located, located
@@ -19,17 +18,24 @@ from identification.record import Floats
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
 
+LEAST_MEMORY = 2  # What a loop is taken to remember at least [samples]
+SPAN_PARTS = 40  # Parts of the record that spans are made of
+CARRIED = 0.5  # Share of the gain that the named spans carry together
+ONE_WAY = 3.0
+"""Ratio of the residual in one direction of OP to that in the other, from which that direction is
+reported."""
+
 TOLD = ("name", "p", "carries", "share", "by", "range")
 """Reported fields of a feature."""
 
 
 def carrying(won: Floats, dt_s: float) -> list[list[float]]:
     """Parts that together have a share of a gain, neighbours joined: first and last (excluded) time of each [s]."""
-    edges = np.linspace(0, won.size, LOCATION.span_parts + 1).astype(int)
+    edges = np.linspace(0, won.size, SPAN_PARTS + 1).astype(int)
     parts = np.maximum([won[a:b].sum() for a, b in pairwise(edges)], 0.0)
     order = np.argsort(-parts)
-    count = int(np.searchsorted(np.cumsum(parts[order]), LOCATION.carried * parts.sum())) + 1
-    chosen = np.zeros(LOCATION.span_parts, dtype=bool)
+    count = int(np.searchsorted(np.cumsum(parts[order]), CARRIED * parts.sum())) + 1
+    chosen = np.zeros(SPAN_PARTS, dtype=bool)
     chosen[order[:count]] = True
     return [[int(edges[a]) * dt_s, int(edges[b]) * dt_s] for a, b in runs(chosen)]
 
@@ -48,9 +54,9 @@ def direction(op: Floats, won: Floats) -> str:
     """Whether the gain comes from OP moves up, down, or both."""
     way = np.sign(np.diff(op, prepend=op[0]))
     up, down = float(won[way > 0].sum()), float(won[way < 0].sum())
-    if up > LOCATION.one_way * max(down, 0.0):
+    if up > ONE_WAY * max(down, 0.0):
         return "up"
-    return "down" if down > LOCATION.one_way * max(up, 0.0) else "both"
+    return "down" if down > ONE_WAY * max(up, 0.0) else "both"
 
 
 def half_power_periods(difference: Floats, dt_s: float) -> list[float]:
@@ -68,7 +74,7 @@ def located_in(p: Problem, fit: Fitted, s: Recording) -> Located:
     """Where a fit's innovations are large or keep one sign."""
     late_s, lag_s = float(fit.model.c[Slot.L]), float(fit.model.c[Slot.T])
     late = min(round(late_s / s.dt_s), s.pv.size // 4)
-    memory = max(round((late_s + lag_s) / s.dt_s), LOCATION.least_memory)
+    memory = max(round((late_s + lag_s) / s.dt_s), LEAST_MEMORY)
     return located(fit.e, s.pv, s.op, p.weight > 0, s.dt_s, late, memory)
 
 

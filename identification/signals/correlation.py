@@ -8,8 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
-from identification.limits import SIGNALS
 from identification.record import Floats, Mask
+
+LEVEL = 1.5
+"""Size to which every half-cycle is clipped, in medians of the band's absolute value: a sine is not clipped
+(its peak is 1.41 medians), only what exceeds the loop's usual half-cycles."""
+SMOOTHING = 0.1
+"""Share of the loop's own time over which the error is averaged before its correlation time is computed:
+noise is not swiftness."""
+COARSEST = 0.2
+"""Interval of samples beyond which, in the loop's own time, one sample's noise looks like correlation."""
+HARRIS_LAGS = 15  # Lags of the predictor of minimum variance
+HARRIS_STEP = 6  # Samples per dead time that the error is thinned to: so that the lags span a few dead times
+HARRIS_MOST = 4000  # Samples that the predictor uses at most, the latest [samples]
+HARRIS_LEAST = 200  # Usable samples that it needs [samples]
 
 CONSTANT = 1e-12
 """Share of its mean square below which an error's variance is rounding."""
@@ -101,7 +113,7 @@ def levelled_correlation(x: Floats, dt_s: float, period_s: float) -> float:
     usual = float(np.median(np.abs(x)))
     if usual <= 0.0:
         return 0.0
-    found = rhythm(np.clip(x, -SIGNALS.level * usual, SIGNALS.level * usual), dt_s, period_s)
+    found = rhythm(np.clip(x, -LEVEL * usual, LEVEL * usual), dt_s, period_s)
     return min(found.first, 1.5 * found.trough)
 
 
@@ -125,9 +137,9 @@ def correlation_time(error: Floats, good: Mask, dt_s: float, scale_s: float) -> 
     the result has steps of a tenth of it. None if the record is shorter than ten of `scale_s`, samples are coarser
     than a fifth of it, or nothing moves.
     """
-    if not math.isfinite(scale_s) or dt_s > SIGNALS.coarsest * scale_s:
+    if not math.isfinite(scale_s) or dt_s > COARSEST * scale_s:
         return None
-    width = max(round(SIGNALS.smoothing * scale_s / dt_s), 1)
+    width = max(round(SMOOTHING * scale_s / dt_s), 1)
     blocks = error.size // width
     if blocks * width * dt_s < 10.0 * scale_s:
         return None
@@ -152,23 +164,23 @@ def harris_index(error: Floats, usable: Mask, dt_s: float, dead_time_s: float) -
 
     error, usable : shape (n,). None where fewer than 200 samples are usable or the error is constant.
     """
-    step = max(int(dead_time_s / SIGNALS.harris_step / dt_s), 1)
-    e, use = error[::step][-SIGNALS.harris_most :], usable[::step][-SIGNALS.harris_most :]
+    step = max(int(dead_time_s / HARRIS_STEP / dt_s), 1)
+    e, use = error[::step][-HARRIS_MOST:], usable[::step][-HARRIS_MOST:]
     ahead = max(round(dead_time_s / (step * dt_s)), 1) + 1
-    reach = ahead + SIGNALS.harris_lags
+    reach = ahead + HARRIS_LAGS
     n = e.size - reach
-    if n < SIGNALS.harris_least:
+    if n < HARRIS_LEAST:
         return None
     e = e - e[use].mean() if use.any() else e
-    rows = np.stack([e[reach - ahead - k : reach - ahead - k + n] for k in range(SIGNALS.harris_lags)])
+    rows = np.stack([e[reach - ahead - k : reach - ahead - k + n] for k in range(HARRIS_LAGS)])
     seen = np.concatenate(([0], np.cumsum(~use)))
     whole = seen[reach + 1 : reach + 1 + n] == seen[:n]
     y = e[reach : reach + n][whole]
     power = float(y @ y)
-    if y.size < SIGNALS.harris_least or power <= 0:
+    if y.size < HARRIS_LEAST or power <= 0:
         return None
     x = rows[:, whole]
     gram = x @ x.T
-    beta = np.linalg.solve(gram + 1e-9 * np.trace(gram) * np.eye(SIGNALS.harris_lags), x @ y)
+    beta = np.linalg.solve(gram + 1e-9 * np.trace(gram) * np.eye(HARRIS_LAGS), x @ y)
     left = y - beta @ x
     return float(np.clip(left @ left / power, 0.0, 1.0))

@@ -17,9 +17,18 @@ from numpy.typing import NDArray
 from scipy.fft import ifft, next_fast_len
 from scipy.special import betainccinv
 
-from identification.limits import SIGNALS
 from identification.record import Floats
+from identification.signals.setpoint_response import SIDE_LINES
 from identification.signals.spectrum import Complex
+
+SHARED_BAND = 0.08  # Half width of the band in which two loops are compared, as a share of the frequency
+PIECE = 0.03
+"""Width of the pieces of that band within which the phase may be taken as constant, as a share of the
+frequency: the delay from loop to loop turns it over the whole band."""
+PIECE_LINES = 8  # The same at least [lines]
+UNEVEN = 1.4
+"""Pieces that count as one, because those with more power count more: mean square over squared mean of the
+products."""
 
 HANN_WIDTH = 1.8
 """Lines that a Hann taper combines: neighbours correlate by 2/3, next ones by 1/6, and squares add up."""
@@ -39,8 +48,8 @@ def tapered(lines: Complex) -> Complex:
 
 def band(line: float) -> tuple[int, int, int]:
     """First line, line after the last and width of the sections [lines] of the band about a frequency [lines]."""
-    half = max(SIGNALS.shared_band * line, SIGNALS.side_lines)
-    width = max(SIGNALS.piece_lines, round(SIGNALS.piece * line))
+    half = max(SHARED_BAND * line, SIDE_LINES)
+    width = max(PIECE_LINES, round(PIECE * line))
     return max(round(line - half), 1), round(line + half) + 1, width
 
 
@@ -54,7 +63,7 @@ def chance_coherence(lines: int, width: int, chance: float) -> float:
     lines, width : lines of the band, and of one of its sections.
     """
     free = max(width / HANN_WIDTH, 1.5)
-    pieces = max(lines // width / SIGNALS.uneven, 1.0)
+    pieces = max(lines // width / UNEVEN, 1.0)
     spread = pieces * (free + 1) - 1
     return float(betainccinv(spread / free, spread * (1 - 1 / free), chance))
 

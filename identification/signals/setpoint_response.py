@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.limits import SIGNALS
 from identification.record import Floats, Mask
 from identification.signals.spectrum import Complex
+
+SIDE_LINES = 4  # Fewest lines on each side of a frequency at which two signals are compared [lines]
+RESPONSE_BAND = 0.1
+"""Half width of the band over which the response to the set point is taken as constant, as a share of its
+frequency."""
+DIES = 2.0  # Periods after a move of the set point in which its response decays
 
 SMALLEST = 1e-200
 """Power of a set point that is constant except for rounding."""
@@ -26,7 +31,7 @@ def without_setpoint(error: Complex, sp: Complex) -> Complex:
     error, sp : complex, shape (m,), lines of both signals.
     """
     k = np.arange(error.size)
-    half = np.maximum((SIGNALS.response_band * k).astype(np.int64), SIGNALS.side_lines)
+    half = np.maximum((RESPONSE_BAND * k).astype(np.int64), SIDE_LINES)
     first, last = np.maximum(k - half, 0), np.minimum(k + half, error.size - 1)
     auto = _running((sp.real**2 + sp.imag**2).astype(np.complex128), first, last).real
     cross = _running(error * sp.conj(), first, last)
@@ -44,7 +49,7 @@ def at_rest(sp: Floats, period: float, after: bool = False) -> Mask:
 
     period : [samples].
     """
-    length, k = round(SIGNALS.dies * max(round(period), 4)), np.arange(sp.size)
+    length, k = round(DIES * max(round(period), 4)), np.arange(sp.size)
     moved = np.concatenate(([0], np.cumsum(moves(sp))))
     last = np.minimum(k + 1 + length * after, sp.size)
     return np.asarray(moved[last] == moved[np.maximum(k + 1 - length, 0)])

@@ -13,8 +13,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import ifft, irfft, next_fast_len, rfft
 
-from identification.limits import SIGNALS
 from identification.record import Floats, Mask
+
+PEAK_BAND = 1.2  # Factor about a frequency within which a peak's power is read
+SIDE_FAR = 4.0  # Factor about a frequency up to which its surroundings are read
+WIDE_BAND = 2.5
+"""Factor about a frequency within which correlations are taken: it keeps drift and sensor noise out and
+leaves flat noise without a peak at its own centre."""
+OWN_BAND = 1.6
+"""Factor about a frequency within which a cycle's size is read, and beyond which its surroundings begin."""
+SHAPE_BELOW = 4.0
+"""Factor under a frequency from which on a cycle's shape is read: halves of twice their length keep their
+fundamental."""
+SHAPE_ABOVE = 8.0  # Factor over a frequency up to which a cycle's shape is read: a square keeps its edges
+TURN = 0.6
+"""A half-cycle ends where the signal is beyond this share of its rms on the other side: faster changes are
+noise."""
 
 Complex = NDArray[np.complex128]
 
@@ -87,9 +101,9 @@ def _mean(total: Floats, first: Floats, last: Floats, top: int) -> Floats:
 def _about(power: Floats, line: Floats) -> tuple[Floats, Floats]:
     """Mean power about frequencies [lines], and the geometric mean of that on both sides, shape (b,) each."""
     total, top = np.concatenate(([0.0], np.cumsum(power))), power.size - 2
-    near = _mean(total, line / SIGNALS.peak_band, line * SIGNALS.peak_band, top)
-    low = _mean(total, line / SIGNALS.side_far, line / SIGNALS.own_band, top)
-    high = _mean(total, line * SIGNALS.own_band, np.minimum(line * SIGNALS.side_far, top), top)
+    near = _mean(total, line / PEAK_BAND, line * PEAK_BAND, top)
+    low = _mean(total, line / SIDE_FAR, line / OWN_BAND, top)
+    high = _mean(total, line * OWN_BAND, np.minimum(line * SIDE_FAR, top), top)
     return near, np.sqrt(low * high)
 
 
@@ -98,10 +112,10 @@ def bands(power: Floats, fewest_lines: float) -> Bands:
 
     A power law has prominence 1 everywhere; the knee of a double lag reaches 2.8.
     """
-    highest = (power.size - 2) / SIGNALS.peak_band
+    highest = (power.size - 2) / PEAK_BAND
     count = max(int(math.log2(max(highest / fewest_lines, 1.0)) * PER_OCTAVE), 0) + 1
     line = fewest_lines * 2.0 ** (np.arange(count) / PER_OCTAVE)
-    line = line[line * SIGNALS.peak_band <= power.size - 2]
+    line = line[line * PEAK_BAND <= power.size - 2]
     near, sides = _about(power, line)
     floor = 1e-12 * max(float(power.max(initial=0.0)), 1e-300)
     return Bands(line, near, near / np.maximum(sides, floor))
@@ -129,14 +143,14 @@ def usual_prominence(s: Spectrum, line: float) -> float:
     Like the prominence of `bands`, but one event cannot dominate it: a step in the surroundings, a burst at the peak.
     For Gaussian noise median and mean have the same ratio in every band, so both agree.
     """
-    near = _usual_power(s, line / SIGNALS.peak_band, line * SIGNALS.peak_band)
-    low = _usual_power(s, line / SIGNALS.side_far, line / SIGNALS.own_band)
-    high = _usual_power(s, line * SIGNALS.own_band, min(line * SIGNALS.side_far, s.lines.size - 2))
+    near = _usual_power(s, line / PEAK_BAND, line * PEAK_BAND)
+    low = _usual_power(s, line / SIDE_FAR, line / OWN_BAND)
+    high = _usual_power(s, line * OWN_BAND, min(line * SIDE_FAR, s.lines.size - 2))
     return near / max(math.sqrt(low * high), 1e-12 * near + 1e-300)
 
 
 def band_signal(
-    s: Spectrum, line: float, below: float = SIGNALS.wide_band, above: float | None = None
+    s: Spectrum, line: float, below: float = WIDE_BAND, above: float | None = None
 ) -> tuple[Floats, float]:
     """The signal in a band from a factor below a frequency to one above (the same if not given), at about 24 samples
     a period.
@@ -178,7 +192,7 @@ def locked_harmonic(s: Spectrum, period_s: float, order: int = 3) -> float:
 
 def envelope(s: Spectrum, line: float) -> tuple[Floats, float]:
     """Amplitude of the band about a frequency over time, shape (m,), and its sample interval [s]."""
-    factor = SIGNALS.own_band
+    factor = OWN_BAND
     first, last = math.ceil(line / factor), min(int(line * factor), s.lines.size - 1)
     m = next_fast_len(max(int(line * 8), last + 2, 16))
     cut = np.zeros(m, dtype=np.complex128)
@@ -189,7 +203,7 @@ def envelope(s: Spectrum, line: float) -> tuple[Floats, float]:
 def half_cycles(x: Floats, dt_s: float) -> Floats:
     """Lengths [s], shape (h,), of the half-cycles of a signal without drift, shape (n,), at interval dt_s [s],
     without those at the ends."""
-    beyond = SIGNALS.turn * math.sqrt(float(x @ x) / max(x.size, 1))
+    beyond = TURN * math.sqrt(float(x @ x) / max(x.size, 1))
     side = np.where(x > beyond, 1, np.where(x < -beyond, -1, 0))
     outside = np.flatnonzero(side)
     return np.diff(outside[np.flatnonzero(np.diff(side[outside])) + 1]) * dt_s
@@ -202,7 +216,7 @@ def size_kurtosis(s: Spectrum, line: float, rest: Mask | None = None) -> float:
     Noise through a resonance is Gaussian with a Rayleigh envelope and has 3 (Rice 1945); a load from a machine, a
     limit cycle, or a loop between OP's limits has a constant size.
     """
-    x, _ = band_signal(s, line, SIGNALS.own_band)
+    x, _ = band_signal(s, line, OWN_BAND)
     if rest is not None:
         x = x[rest[np.arange(x.size) * rest.size // x.size]]
     power = float(x @ x) / x.size
@@ -225,7 +239,7 @@ class Shape:
 
 def shape(s: Spectrum, line: float) -> Shape:
     """Shape of the signal about a frequency, wide enough for unequal half-cycles and for edges."""
-    x, dt_s = band_signal(s, line, SIGNALS.shape_below, SIGNALS.shape_above)
+    x, dt_s = band_signal(s, line, SHAPE_BELOW, SHAPE_ABOVE)
     power = float(x @ x) / x.size
     if power <= 0.0:
         return Shape(3.0, 0.0, 0.0)

@@ -8,8 +8,10 @@ from itertools import pairwise
 import numpy as np
 from numba import njit
 
-from identification.limits import FIT
 from identification.record import Floats, Mask
+
+TURN = 0.4  # Least OP reversal, as a share of OP's usual range within a period: noise on OP turns by less
+SMOOTHED = 12  # Parts of a period over which OP is smoothed to find its reversals
 
 POINTS = 40
 """Points of a half-cycle of usual length; ours: enough to show a corner."""
@@ -46,10 +48,10 @@ def _usual_range(x: Floats, length: int) -> float:
 
 def turns_of(op: Floats, period: float) -> np.ndarray:
     """Samples of OP reversals, shape (t,), in a cycle of a period [samples]; op of shape (n,)."""
-    half = max(int(period / (2 * FIT.smoothed)), 1)
+    half = max(int(period / (2 * SMOOTHED)), 1)
     kernel = np.full(2 * half + 1, 1.0 / (2 * half + 1))
     smooth = np.convolve(np.pad(op, half, mode="edge"), kernel, mode="valid")
-    return turning_points(smooth, max(FIT.turn * _usual_range(smooth, max(round(period), 2)), 1e-12))
+    return turning_points(smooth, max(TURN * _usual_range(smooth, max(round(period), 2)), 1e-12))
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from analyzer.api import read
 from analyzer.config import Config
 from analyzer.explain.case import case
 from analyzer.loops.spec import spec_of
-from identification.estimation.prediction_error import descended
+from identification.estimation.prediction_error import FULL_STEPS, descended
 from identification.mismatch.answer import parameters_of
 from identification.mismatch.catalogue import CANDIDATES
 from identification.mismatch.plain_loop import inputs_of, prepared, without_spikes
@@ -55,7 +55,7 @@ def fitted(cases: pathlib.Path, tag: str, effect: str):
     x = round_of(p, plain, s)
     rows = tuple(v for v in CANDIDATES if kin(v.name, effect, KIN))
     best = compete(x, rows)[0]
-    return x.p, descended(x.p, best.fit.model, x.p.limits.search.full_steps)
+    return x.p, descended(x.p, best.fit.model, FULL_STEPS)
 
 
 def said(p, fit) -> dict:

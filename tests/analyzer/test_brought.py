@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from analyzer.explain.models import (
+    AS_GOOD,
     against_plain,
     judged,
     plain_start,
@@ -19,7 +20,6 @@ from analyzer.explain.models import (
 )
 from analyzer.loop.quality import Scale
 from identification.errors import InputError
-from identification.limits import LIMITS
 from identification.mismatch.explanation import Explanation, carried_over
 from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.recording import Recording
@@ -92,7 +92,7 @@ def test_ratios_count_both_ways() -> None:
 
 def test_comparison_has_three_outcomes() -> None:
     """Worse, as well and better are told apart at a twentieth."""
-    said = [against_plain(x, 1.0, LIMITS.proof.as_good).split()[2] for x in (1.06, 1.04, 0.94)]
+    said = [against_plain(x, 1.0, AS_GOOD).split()[2] for x in (1.06, 1.04, 0.94)]
     assert said == ["worse", "as", "better"]
 
 

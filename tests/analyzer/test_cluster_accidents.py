@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -33,8 +32,8 @@ def test_a_cluster_that_does_nothing_is_told_and_left(tmp_path, monkeypatch, cap
     with whole_cluster(tmp_path, workers=0) as (address, parts):
         asked = cluster.Cluster(address, abs)
         with asked:
-            limits = replace(cluster.CLUSTER, quiet_s=0.2, answer_s=1.0, given_up_s=1.0)
-            monkeypatch.setattr(cluster, "CLUSTER", limits)
+            for name, value in (("QUIET_S", 0.2), ("ANSWER_S", 1.0), ("GIVEN_UP_S", 1.0)):
+                monkeypatch.setattr(cluster, name, value)
             asked.submit(-1)
             if hung:
                 os.kill(parts[0].pid, signal.SIGSTOP)

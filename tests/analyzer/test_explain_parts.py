@@ -11,9 +11,8 @@ import pandas as pd
 import pytest
 
 from analyzer.config import Config
-from analyzer.explain.case import asked_cases, parts, parts_said
+from analyzer.explain.case import PART_SAMPLES, asked_cases, parts, parts_said
 from analyzer.history.series import Series
-from analyzer.limits import EXPLAIN
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.asked import Asked
@@ -57,8 +56,8 @@ def test_changes_elsewhere_leave_one_part() -> None:
 
 def test_scrap_is_left_out() -> None:
     """A part too short to be judged is not held out, and the rest keeps its own settings."""
-    found = parts(SPEC, trends(), (changed(N - EXPLAIN.part_samples + 1, 1.0, 2.0),), "UTC")
-    assert [(p.samples, p.spec.kp) for p in found] == [(N - EXPLAIN.part_samples + 1, 1.0)]
+    found = parts(SPEC, trends(), (changed(N - PART_SAMPLES + 1, 1.0, 2.0),), "UTC")
+    assert [(p.samples, p.spec.kp) for p in found] == [(N - PART_SAMPLES + 1, 1.0)]
 
 
 def test_dated_rows_of_loops_part_too() -> None:

@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -160,7 +159,7 @@ def test_a_stopped_run_is_gone_on_with(
 def test_two_runs_on_one_store_at_once(bucket: str, monkeypatch: pytest.MonkeyPatch):
     """A live signature refuses a second run in one line; one that was not renewed for long is a dead run's."""
     store = places.place(f"{bucket}/held")
-    monkeypatch.setattr(store_lock, "STORE", replace(store_lock.STORE, alive_s=0.05))
+    monkeypatch.setattr(store_lock, "ALIVE_S", 0.05)
     with locked(store):
         with (
             pytest.raises(

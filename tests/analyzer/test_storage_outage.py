@@ -10,7 +10,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
@@ -137,7 +136,7 @@ def test_an_outage_is_one_line_and_may_be_gone_on_with(
 ) -> None:
     """A storage that is down from some request on ends the run with 75 and one line with URL and --resume; nothing is
     called damaged, and --resume right after makes the store of an undisturbed run."""
-    monkeypatch.setattr(places, "STORAGE", replace(places.STORAGE, tries=2))
+    monkeypatch.setattr(places, "TRIES", 2)
     store = f"{bucket}/down-{after}"
     with disturbed(lambda count, _: 503 if count > after else None):
         told = ran(export, store)
@@ -159,7 +158,7 @@ def test_a_storage_that_never_answers_holds_no_run_for_ever(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Where requests are accepted and not answered, the run ends with 75 after its tries."""
-    monkeypatch.setattr(places, "STORAGE", replace(places.STORAGE, tries=1))
+    monkeypatch.setattr(places, "TRIES", 1)
     monkeypatch.setattr(s3fs.S3FileSystem, "read_timeout", 1)
     with disturbed(lambda count, _: 0) as proxy:
         told = ran(export, f"{bucket}/silent")

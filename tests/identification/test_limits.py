@@ -45,14 +45,6 @@ def under(s: Recording, table: str, **changed: Any) -> str:
     return answer(explain(s), s).verdict
 
 
-def test_the_search_and_the_proof_take_their_limits():
-    """A valve with play is named; not where a choice costs more than it gains, nor where nothing counts as proof."""
-    s = recording(Plant(play=2.0), 2)
-    assert under(s, "search") == "backlash"
-    assert under(s, "search", search_penalty=1e3) != "backlash"
-    assert under(s, "proof", held_out_loss=1e6) != "backlash"
-
-
 def test_the_recorder_takes_its_limits():
     """A sensor's steps of half a percent are named; not where steps of one percent are a historian's."""
     s = recording(Plant(grid=0.5), 5)

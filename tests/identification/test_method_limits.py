@@ -1,32 +1,36 @@
-"""The limits of a method, which no file changes: each is read by something and stated whole."""
+"""The numbers of a method, which are constants of the modules that use them: each is read by something."""
 
 from __future__ import annotations
 
-from dataclasses import fields
+import ast
+from collections import Counter
+from pathlib import Path
 
-import numpy as np
-import pytest
-
-import analyzer.limits
-import identification.limits
-import tuning.limits
-from analyzer.config import limit_of
-from identification.limits import Limits
-from tests.identification.test_limits import read_names
-
-MODULES = analyzer.limits, identification.limits, tuning.limits
-TABLES = list(
-    {type(x): x for module in MODULES for x in vars(module).values() if isinstance(x, Limits)}.values()
-)
-"""All of them."""
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("identification", "tuning", "analyzer", "reports")
 
 
-@pytest.mark.parametrize("limits", TABLES, ids=lambda x: type(x).__name__)
-def test_every_number_of_a_method_is_read_and_stated_whole(limits: Limits):
-    """None is without unit, meaning and source, each lies in its range, and some line reads it."""
-    assert {f.name for f in fields(limits)} <= read_names()
-    for f in fields(limits):
-        said = limit_of(f)
-        assert all((said.unit, said.meaning, said.source)), f.name
-        numbers = np.ravel(getattr(limits, f.name))
-        assert said.least <= numbers.min() <= numbers.max() <= said.most, f.name
+def stored(tree: ast.Module) -> set[str]:
+    """Names in capitals that a module sets at its top level."""
+    sets = [n.targets for n in tree.body if isinstance(n, ast.Assign)]
+    sets += [[n.target] for n in tree.body if isinstance(n, ast.AnnAssign)]
+    names = {n.id for targets in sets for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)}
+    return {name for name in names if name.isupper()}
+
+
+def loaded(tree: ast.Module) -> Counter[str]:
+    """Names that a module reads, as names, attributes or imports."""
+    nodes = list(ast.walk(tree))
+    names = [n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)]
+    names += [n.attr for n in nodes if isinstance(n, ast.Attribute)]
+    return Counter(names + [a.name for n in nodes if isinstance(n, ast.ImportFrom) for a in n.names])
+
+
+def test_every_constant_of_a_module_is_read():
+    """A constant that no line of the packages reads decides nothing."""
+    trees = {
+        f: ast.parse(f.read_text("utf-8")) for part in PACKAGES for f in sorted((ROOT / part).rglob("*.py"))
+    }
+    read = sum((loaded(tree) for tree in trees.values()), Counter[str]())
+    unread = [f"{f.relative_to(ROOT)}: {n}" for f, tree in trees.items() for n in stored(tree) if not read[n]]
+    assert unread == []

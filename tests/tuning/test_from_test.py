@@ -6,8 +6,7 @@ import pytest
 
 from identification.models import Estimate, Fopdt, Loop
 from tuning.frequency_response import maximum_sensitivity
-from tuning.from_test import corners, settings_from
-from tuning.limits import METHOD
+from tuning.from_test import TEST_MS, corners, settings_from
 
 
 def told(wide):
@@ -29,7 +28,7 @@ def test_settings_are_robust_at_every_corner(wide):
     process = Fopdt(2.0, 100.0, 20.0)
     among = corners(process, told(wide))
     pid = settings_from(process, among, 1.0).robust
-    assert max(float(maximum_sensitivity(Loop(p, pid))) for p in among) <= METHOD.test_ms + 1e-6
+    assert max(float(maximum_sensitivity(Loop(p, pid))) for p in among) <= TEST_MS + 1e-6
 
 
 def test_wider_intervals_ask_for_less_gain():

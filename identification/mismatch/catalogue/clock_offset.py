@@ -3,8 +3,7 @@
 import numpy as np
 
 from identification.controller.check import LATE_SAMPLES
-from identification.controller.pi_regression import shifted
-from identification.limits import LAW
+from identification.controller.pi_regression import LATE_STEP, shifted
 from identification.mismatch.effect import Block, Fault, Finding, Floats, Recording, exact
 from identification.mismatch.pictures import WINDOW, Picture, biggest_move, rebuilt_course
 
@@ -25,9 +24,7 @@ EFFECT = Fault(
     sentence="PV is stamped {shift_s} later than OP: the two clocks differ.",
     check="Record PV and OP from one source or synchronize the clocks.",
     caption="OP recorded, and rebuilt with PV's clock set right (found) and as stamped.",
-    numbers=lambda found, s: {
-        "shift_s": exact(found.values[LATE_SAMPLES] * s.dt_s, "s", LAW.late_step * s.dt_s)
-    },
+    numbers=lambda found, s: {"shift_s": exact(found.values[LATE_SAMPLES] * s.dt_s, "s", LATE_STEP * s.dt_s)},
     titles={"shift_s": "PV late by"},
     drawn=other_clock,
 )

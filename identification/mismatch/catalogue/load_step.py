@@ -1,7 +1,6 @@
 """A load of up to three steps at the inlet of the process."""
 
-from identification.limits import LIMITS
-from identification.mismatch.effect import Block, Effect, Param, Slot, Variant
+from identification.mismatch.effect import SEARCH_PENALTY, Block, Effect, Param, Slot, Variant
 from identification.mismatch.pictures import LOAD, Drawing, Picture, course_picture
 from identification.simulation.open_loop import load
 from identification.simulation.parameters import STEPS
@@ -36,7 +35,7 @@ EFFECT = Effect(
             FREE[:count],
             (dict.fromkeys((p.slot for p in FREE[:count]), 0.0),),
             label=f"{count}",
-            penalty=LIMITS.search.search_penalty * count,
+            penalty=SEARCH_PENALTY * count,
         )
         for count in (1, 2, 3)
     ),

@@ -1,7 +1,6 @@
 """A vessel whose outflow is proportional to the square root of its level."""
 
-from identification.limits import LIMITS
-from identification.mismatch.effect import Block, Effect, Param, Slot, Variant, each
+from identification.mismatch.effect import TIE, Block, Effect, Param, Slot, Variant, each
 from identification.mismatch.pictures import gain_over_pv
 
 EFFECT = Effect(
@@ -16,7 +15,7 @@ EFFECT = Effect(
         Variant(
             (Param(Slot.ROOT, "root", "", 0.05, 3.0, title="Root"),),
             each(Slot.ROOT, 0.3, 1.0),
-            penalty=-LIMITS.search.tie,
+            penalty=-TIE,
         ),
     ),
 )

@@ -1,7 +1,6 @@
 """Stiction: the stem holds through the stickband, then jumps; after the jump it rests, halts, slides or swings."""
 
-from identification.estimation.descent import reaching
-from identification.limits import INTERVALS
+from identification.estimation.descent import LEAST_BAND, LEAST_JUMP, reaching
 from identification.mismatch.effect import Block, Effect, Estimate, Friction, Param, Parameters, Slot, Variant
 from identification.mismatch.pictures import stem_over_op
 from identification.models import Motion
@@ -18,13 +17,13 @@ def as_friction_leaves_it(own: Parameters) -> dict[str, Estimate]:
     """Widen all intervals by the scatter of real friction. It differs from slip to slip, and one slip more or less
     changes all later ones, so the likelihood's optimum is much narrower than the true uncertainty."""
     band, jump, time = own[BAND.name], own[JUMP.name], own.get(TIME.name)
-    most = band.value * INTERVALS.least_band
+    most = band.value * LEAST_BAND
     told = {
-        BAND.name: reaching(band, band.value / INTERVALS.least_band, most),
-        JUMP.name: reaching(jump, jump.value / INTERVALS.least_jump, most),
+        BAND.name: reaching(band, band.value / LEAST_BAND, most),
+        JUMP.name: reaching(jump, jump.value / LEAST_JUMP, most),
     }
     if time is not None:
-        told[TIME.name] = reaching(time, time.value / INTERVALS.least_jump, time.value * INTERVALS.least_jump)
+        told[TIME.name] = reaching(time, time.value / LEAST_JUMP, time.value * LEAST_JUMP)
     return told
 
 

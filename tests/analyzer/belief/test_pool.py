@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analyzer.belief.pool import Pool
-from identification.limits import INTERVALS
+from identification.estimation.descent import INTERVALS_WIDER
 
 LEAST = 0.01
 
@@ -25,8 +25,8 @@ def test_sums_give_the_moments_of_dersimonian_and_laird() -> None:
     """The spread between nights is their method-of-moments estimate, worked out from all nights at once."""
     rng = np.random.default_rng(4)
     deviation = rng.uniform(0.02, 0.2, 30)
-    x = math.log(3.0) + 0.3 * rng.standard_normal(30) + INTERVALS.wider * deviation * rng.standard_normal(30)
-    w = 1.0 / (INTERVALS.wider * deviation) ** 2
+    x = math.log(3.0) + 0.3 * rng.standard_normal(30) + INTERVALS_WIDER * deviation * rng.standard_normal(30)
+    w = 1.0 / (INTERVALS_WIDER * deviation) ** 2
     mean = (w * x).sum() / w.sum()
     q = (w * (x - mean) ** 2).sum()
     expected = (q - 29) / (w.sum() - (w**2).sum() / w.sum())
@@ -40,7 +40,7 @@ def test_intervals_hold_the_truth() -> None:
     rng, held = np.random.default_rng(5), 0
     for _ in range(200):
         deviation = rng.uniform(0.03, 0.1, 8)
-        x = 0.2 * rng.standard_normal(8) + INTERVALS.wider * deviation * rng.standard_normal(8)
+        x = 0.2 * rng.standard_normal(8) + INTERVALS_WIDER * deviation * rng.standard_normal(8)
         found = pooled(np.exp(x), deviation).pooled
         assert found is not None
         held += found.low <= 1.0 <= found.high

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analyzer.finder.bag import ANSWERS, HELD_ALONE
 from analyzer.finder.held import (
     answers,
     apart,
@@ -16,9 +17,8 @@ from analyzer.finder.held import (
     nearness,
     resting_level,
 )
-from analyzer.finder.pair import FoundPair
+from analyzer.finder.pair import SURE_PCT, FoundPair
 from analyzer.finder.pairs import found_pairs
-from analyzer.limits import FINDER
 from tests.analyzer.finder.test_finder_pairs import pi_loop, strangers
 
 
@@ -38,7 +38,7 @@ def p_loop(moves: int, n: int = 20000, seed: int = 1) -> np.ndarray:
 def test_a_controller_whose_noise_is_not_recorded_is_found_by_its_set_point() -> None:
     """PV and OP share no noise, and OP leads PV: that OP moves at once with the set point of PV makes them a loop."""
     values = np.column_stack([strangers(20000, 10, 3), p_loop(60), p_loop(60, seed=2)])
-    sure = {(p.sp, p.pv, p.op) for p in found_pairs(values) if p.sure_pct >= FINDER.sure_pct}
+    sure = {(p.sp, p.pv, p.op) for p in found_pairs(values) if p.sure_pct >= SURE_PCT}
     assert sure == {(10, 11, 12), (13, 14, 15)}
 
 
@@ -67,29 +67,29 @@ def test_op_answers_a_set_point_at_once_and_pv_does_not() -> None:
     sp, pv, op = pi_loop(2.0, 60.0, 0.5).T
     values = np.column_stack([pv, op, sp])
     size = answers(values, (0, 1), (2,))[:, 0]
-    assert size[1] > FINDER.answers > size[0]
+    assert size[1] > ANSWERS > size[0]
     near = nearness(values, (0, 1), (2,))[:, 0]
-    assert near[0] > near[1] + FINDER.held_alone
+    assert near[0] > near[1] + HELD_ALONE
 
 
 def test_a_tag_that_repeats_a_set_point_does_not_answer_it() -> None:
     """The output of a master in another unit is its slave's set point, and no output of the slave."""
     op = np.cumsum(np.random.default_rng(5).normal(size=3000))
-    assert answers(np.column_stack([0.5 * op + 3.0, op]), (0,), (1,))[0, 0] < FINDER.answers
+    assert answers(np.column_stack([0.5 * op + 3.0, op]), (0,), (1,))[0, 0] < ANSWERS
 
 
 def test_op_that_answers_is_no_proof_of_pv() -> None:
     """A pair whose OP answers the set point is not sure where another tag explains more of OP with that SP."""
     answering = FoundPair(0, 1, 2, 0.4, 0.6, 1, 0.04, 0.0, freer=4.0, answers=True, other=0.43)
-    assert answering.sure_pct >= FINDER.sure_pct
-    assert replace(answering, other=0.46).sure_pct < FINDER.sure_pct
+    assert answering.sure_pct >= SURE_PCT
+    assert replace(answering, other=0.46).sure_pct < SURE_PCT
 
 
 def test_a_sensor_that_follows_pv_is_not_taken_for_it() -> None:
     """A pair of which the law leaves a sixth is not sure where another tag with its SP leaves a three-hundredth."""
     follower = FoundPair(0, 1, 2, 0.82, 0.4, 4, 0.5, 0.04, towards=2.0, nearer=1.0, other=0.997)
-    assert follower.sure_pct < FINDER.sure_pct
-    assert replace(follower, other=0.5).sure_pct >= FINDER.sure_pct
+    assert follower.sure_pct < SURE_PCT
+    assert replace(follower, other=0.5).sure_pct >= SURE_PCT
 
 
 def test_a_mean_that_drifts_is_known_to_its_standard_error() -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from analyzer.finder.pair import LAW_TOLD, SURE_PCT
 from analyzer.finder.pairs import found_pairs
-from analyzer.limits import FINDER
 from analyzer.loops.spec import read_loops
 from analyzer.loops.tags import controller
 from benchmarks.world.draw import drawn, run
@@ -64,7 +64,7 @@ def test_the_loops_of_a_renamed_mill_are_found(mill: pd.DataFrame) -> None:
     names = np.array([*mill.columns, *(f"M{k}.X" for k in range(20))])
     order = rng.permutation(len(names))
     names, pairs = names[order], found_pairs(values[:, order])
-    sure = [p for p in pairs if p.sure_pct >= FINDER.sure_pct]
+    sure = [p for p in pairs if p.sure_pct >= SURE_PCT]
     loops = {names[p.op].rpartition(".")[0]: p for p in sure}
     wrong = [(names[p.pv], names[p.op]) for loop, p in loops.items() if names[p.pv] != f"{loop}.PV"]
     assert wrong == []
@@ -77,7 +77,7 @@ def test_the_loops_of_a_renamed_mill_are_found(mill: pd.DataFrame) -> None:
         spec = stated[loop]
         span = (spec.pv_hi or 0.0) - (spec.pv_lo or 0.0)
         pid = controller(spec, span)
-        if pair.told < FINDER.law_told or pid is None:
+        if pair.told < LAW_TOLD or pid is None:
             continue
         assert pair.kp * span / 100.0 == pytest.approx(pid.kp, rel=0.2), loop
         if pair.ti_samples is not None:
@@ -87,13 +87,13 @@ def test_the_loops_of_a_renamed_mill_are_found(mill: pd.DataFrame) -> None:
 @pytest.mark.parametrize("seed", range(25))
 def test_nothing_is_found_where_nothing_is(seed: int) -> None:
     """Of forty tags of noise, drift and waves no two are a loop: of 1,000 tags none."""
-    assert [p for p in found_pairs(strangers(3000, 40, seed)) if p.sure_pct >= FINDER.sure_pct] == []
+    assert [p for p in found_pairs(strangers(3000, 40, seed)) if p.sure_pct >= SURE_PCT] == []
 
 
 def test_recordings_without_op_have_no_loop(mill: pd.DataFrame) -> None:
     """Measurements of a plant that swings together are no loops where no output is among them."""
     pvs = mill[[c for c in mill if c.endswith(".PV")]].to_numpy(float)
-    assert [p for p in found_pairs(pvs) if p.sure_pct >= FINDER.sure_pct] == []
+    assert [p for p in found_pairs(pvs) if p.sure_pct >= SURE_PCT] == []
 
 
 @pytest.mark.parametrize(("kp", "ti_s", "slope"), [(2.0, 60.0, 0.5), (-2.0, 60.0, -0.5), (0.8, 200.0, 1.5)])
@@ -102,7 +102,7 @@ def test_settings_and_sign_come_from_the_law(kp: float, ti_s: float, slope: floa
     values = np.column_stack([strangers(6000, 8, 3), pi_loop(kp, ti_s, slope)])
     best = found_pairs(values)[0]
     assert (best.sp, best.pv, best.op) == (8, 9, 10)
-    assert best.sure_pct >= FINDER.sure_pct
+    assert best.sure_pct >= SURE_PCT
     assert best.kp == pytest.approx(kp, rel=0.1)
     assert best.ti_samples == pytest.approx(ti_s, rel=0.1)
 
@@ -127,6 +127,6 @@ def test_loops_sampled_far_slower_than_they_act_are_not_turned_round() -> None:
     """At a sample a minute the law of a load's loops holds both ways by chance: none is sure of the wrong way."""
     trends = {(seed, d.name): run(d) for seed in (533, 523) for d in drawn(seed, 4, ("load",))}
     values = np.column_stack([getattr(t, role)[::60] for t in trends.values() for role in ("sp", "pv", "op")])
-    sure = [p for p in found_pairs(np.round(values, 3)) if p.sure_pct >= FINDER.sure_pct]
+    sure = [p for p in found_pairs(np.round(values, 3)) if p.sure_pct >= SURE_PCT]
     assert sure
     assert {(p.pv % 3, p.op % 3) for p in sure} == {(1, 2)}

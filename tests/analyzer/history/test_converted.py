@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,6 @@ from analyzer.history.export import Export, open_export
 from analyzer.history.parquet import ParquetTable
 from analyzer.history.series import Series
 from analyzer.history.table import ReadOptions
-from analyzer.limits import HISTORY
 from analyzer.store.lock import scratch
 
 TAGS = [f"FIC{k:03d}.{role}" for k in range(40) for role in ("PV", "OP")]
@@ -61,7 +59,7 @@ def long(path: Path, umlaut: bool = False) -> Path:
 def both(path: Path, monkeypatch: pytest.MonkeyPatch, scratch: Path) -> tuple[Export, Export]:
     """The export read whole, and streamed."""
     whole = open_export([path])
-    monkeypatch.setattr("analyzer.history.export.HISTORY", replace(HISTORY, whole_bytes=100))
+    monkeypatch.setattr("analyzer.history.export.WHOLE_BYTES", 100)
     monkeypatch.setattr("analyzer.history.sheet.BLOCK_BYTES", 1 << 14)
     streamed = open_export([path], ReadOptions(scratch=scratch))
     table = streamed.sources[0].table
@@ -133,7 +131,7 @@ def test_a_long_parquet_is_parted_once(tmp_path: Path, monkeypatch: pytest.Monke
     )
     pq.write_table(table, tmp_path / "x.parquet", row_group_size=1000)
     whole = open_export([tmp_path / "x.parquet"])
-    monkeypatch.setattr("analyzer.history.export.HISTORY", replace(HISTORY, whole_rows=100))
+    monkeypatch.setattr("analyzer.history.export.WHOLE_ROWS", 100)
     parted = open_export([tmp_path / "x.parquet"], ReadOptions(scratch=tmp_path))
     table = parted.sources[0].table
     assert isinstance(table, ParquetTable)
@@ -159,7 +157,7 @@ def test_an_open_quote_costs_no_rows(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_a_stopped_run_s_copy_is_taken_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run that goes on streams a big export no second time, reads the same, and streams anew what changed."""
     path, store = long(tmp_path / "x.csv", umlaut=True), tmp_path / "store"
-    monkeypatch.setattr("analyzer.history.export.HISTORY", replace(HISTORY, whole_bytes=100))
+    monkeypatch.setattr("analyzer.history.export.WHOLE_BYTES", 100)
     first: dict[str, Series] = {}
 
     def stop() -> None:
@@ -204,10 +202,9 @@ def test_copies_of_a_living_run_are_nobody_else_s(tmp_path: Path) -> None:
 
 MEASURE = """
 import json, resource, sys
-from dataclasses import replace
 from pathlib import Path
 import analyzer.history.export as export
-export.HISTORY = replace(export.HISTORY, whole_bytes=1)
+export.WHOLE_BYTES = 1
 from analyzer.history.table import ReadOptions
 found = export.open_export([Path(sys.argv[1])], ReadOptions(scratch=Path(sys.argv[2])))
 found.read(list(found.tags[:4]))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,6 @@ from hypothesis import strategies as st
 
 from analyzer.history import sheet
 from analyzer.history.export import ReadOptions, open_export
-from analyzer.limits import HISTORY
 
 STAMP_FORMATS = (
     "%Y-%m-%d %H:%M:%S",
@@ -218,7 +216,7 @@ def test_lines_that_do_not_fit_are_told(tmp_path: Path) -> None:
 
 def test_a_file_too_big_to_keep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A file above the limit is opened by its first rows, with the same result."""
-    monkeypatch.setattr("analyzer.history.sheet.HISTORY", replace(HISTORY, whole_bytes=100))
+    monkeypatch.setattr("analyzer.history.sheet.WHOLE_BYTES", 100)
     table = day(n=70_000)
     (tmp_path / "x.csv").write_text(as_text(table, "%d.%m.%Y %H:%M:%S", ";", ",", ""))
     assert_read(tmp_path / "x.csv", table)

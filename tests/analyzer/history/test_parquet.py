@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import decimal
 import threading
-from dataclasses import replace
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 
@@ -16,7 +15,6 @@ import pytest
 
 from analyzer.history import parquet
 from analyzer.history.export import Export, open_export
-from analyzer.limits import HISTORY
 from identification.errors import InputError
 
 STAMPS = [datetime(2024, 11, 21, 8, 0, i) for i in range(4)]
@@ -111,7 +109,7 @@ def test_pages_without_end_are_refused(tmp_path, monkeypatch):
     pq.write_table(pa.table({"time": pa.array([0, 1], pa.timestamp("s")), "a.PV": [1.0, 2.0]}), path)
     stop, ended = threading.Event(), []
     monkeypatch.setattr(parquet, "_read_through", lambda _: ended.append(stop.wait(60.0)))
-    monkeypatch.setattr(parquet, "HISTORY", replace(HISTORY, probe_s=0.2))
+    monkeypatch.setattr(parquet, "PROBE_S", 0.2)
     with pytest.raises(InputError, match=r"x\.parquet: its pages take longer than 0\.2 s to read"):
         open_export([path])
     assert not ended

@@ -15,8 +15,7 @@ from identification.estimation.noise import (
     lag_means,
     whitened,
 )
-from identification.limits import SIGNALS
-from identification.signals.robust import clipped_gain, robust_weights
+from identification.signals.robust import OUTLIER, clipped_gain, robust_weights
 
 
 def test_single_lags_whiten_as_a_filter_does():
@@ -70,9 +69,9 @@ def test_one_spike_decides_nothing():
     mine = rng.normal(size=5000)
     other = mine.copy()
     other[7] = 1e6
-    assert 0 < clipped_gain(mine, other).sum() < 0.5 * SIGNALS.outlier**2 * 1.1
+    assert 0 < clipped_gain(mine, other).sum() < 0.5 * OUTLIER**2 * 1.1
     weights = robust_weights(other, np.ones(other.size, dtype=bool))
-    assert weights[7] * 1e6 == pytest.approx(SIGNALS.outlier, rel=0.05)
+    assert weights[7] * 1e6 == pytest.approx(OUTLIER, rel=0.05)
     assert np.all(weights[np.abs(other) < 3] == 1.0)
 
 

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.limits import LIMITS
-from identification.mismatch.answer import answer, brings, too_short, unanswered
+from identification.mismatch.answer import ANSWERS, answer, brings, too_short, unanswered
 from identification.mismatch.explanation import Explanation, carried_over
 from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.recording import Recording
@@ -48,7 +47,7 @@ def test_slow_level_answers_although_its_gain_is_open() -> None:
     """A near integrator, whose gain and time constant are known by their ratio alone, answers OP all the same."""
     s = recording(5)
     found = plainly(s)
-    assert brings(found.p, found.plain) > 10 * LIMITS.proof.answers
+    assert brings(found.p, found.plain) > 10 * ANSWERS
 
 
 @pytest.mark.parametrize(("kind", "told"), [("temperature", True), ("level", False)])

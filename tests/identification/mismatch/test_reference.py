@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.limits import LIMITS
+from identification.mismatch.diagnosis import LEFT_OVER
 from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.reference import Prediction, best_prediction, on_above
 from proofs.concealed.plant import Plant
@@ -24,7 +24,7 @@ def left_of(plant: Plant, seed: int, **acting: np.ndarray) -> Prediction:
 
 def test_load_and_noise_are_not_foretold() -> None:
     """Of twelve plain loops under load and noise nothing is left, by less than half of what would be told."""
-    assert max(left_of(PLANT, seed).gain for seed in range(12)) < 0.5 * LIMITS.search.left_over
+    assert max(left_of(PLANT, seed).gain for seed in range(12)) < 0.5 * LEFT_OVER
 
 
 @pytest.mark.parametrize(
@@ -38,7 +38,7 @@ def test_load_and_noise_are_not_foretold() -> None:
 )
 def test_physics_without_a_name_is_left(changes: dict[str, float]) -> None:
     """Four kinds of physics that no effect has are foretold, past what is told of."""
-    assert left_of(PLANT._replace(**changes), 21).gain > LIMITS.search.left_over
+    assert left_of(PLANT._replace(**changes), 21).gain > LEFT_OVER
 
 
 @pytest.mark.parametrize(
@@ -61,8 +61,8 @@ def test_a_pump_by_the_clock_is_left_to_the_clock(seed: int) -> None:
     for size in (0.7, 1.5):
         told = left_of(PLANT, seed, act=size * (CLOCK % 600 < 200))
         assert told.way == "clock"
-        assert told.gain > LIMITS.search.left_over
-    assert left_of(PLANT, seed, act=0.4 * (CLOCK % 600 < 200)).gain < LIMITS.search.left_over
+        assert told.gain > LEFT_OVER
+    assert left_of(PLANT, seed, act=0.4 * (CLOCK % 600 < 200)).gain < LEFT_OVER
 
 
 def test_the_errors_of_an_experiment_s_simulation_are_not_foretold() -> None:
@@ -71,7 +71,7 @@ def test_the_errors_of_an_experiment_s_simulation_are_not_foretold() -> None:
     for seed in range(6):
         s, _ = drawn("plain", seed)
         p, fit = prepared(inputs_of(s), s.pv - s.pv.mean(), s.usable, experiment=True)
-        assert best_prediction(p, fit).gain < LIMITS.search.left_over
+        assert best_prediction(p, fit).gain < LEFT_OVER
 
 
 def test_a_switch_remembers_where_it_was_last() -> None:
