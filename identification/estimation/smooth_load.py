@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from identification.estimation.descent import Descent, down, nats
@@ -62,6 +63,8 @@ of both zeros; of a line: log frequency relative to the expected one, log of the
 its height; of a load that is no sine: log of the height of each of its HARMONICS."""
 HARMONICS = (3, 5)
 """Harmonics of a line whose load is no sine, but symmetric; their phase wanders with the line's."""
+ORDERS = np.array((1.0, *HARMONICS))
+"""A line and its harmonics, in the kernel's type."""
 STEPS = np.array([0.01, 0.02, 0.02, 0.02, 0.02, 0.001, 0.02, 0.02, 0.02, 0.02])
 """Steps of the constants for numeric derivatives."""
 LONGEST = np.array([1.0, 4.0, 1.5, 1.0, 1.0, 0.05, 1.5, 1.5, 1.5, 1.5])
@@ -151,20 +154,7 @@ def _whitened(y: Floats, stem: Floats, lag: Lag, noise: Noise, lines: Floats) ->
     return yw, xw
 
 
-def _noise(theta: Floats, pole: float, case: _Case) -> tuple[Noise, Floats]:
-    """The load model of the constants in the kernel's form."""
-    slow = math.exp(-case.dt_s / math.exp(theta[2]))
-    z1, z2 = math.tanh(theta[3]), math.tanh(theta[4])
-    noise = -(pole + slow), pole * slow, -(z1 + z2), z1 * z2
-    if theta.size == LOAD:
-        return noise, np.empty((0, 4))
-    angle = 2.0 * math.pi * case.dt_s / case.period_s * math.exp(theta[5])
-    rate = case.dt_s / (case.period_s * math.exp(theta[6]))
-    orders = (1, *HARMONICS[: theta.size - LINE])
-    lines = [_line(h * angle, h * h * rate, height) for h, height in zip(orders, theta[7:], strict=True)]
-    return noise, np.array(lines)
-
-
+@njit(cache=True)
 def _line(angle: float, rate: float, height: float) -> tuple[float, float, float, float]:
     """Coefficients of a line of this angle [rad/block], rate of decay [1/block] and log of its height."""
     r, v = math.exp(-rate), math.exp(-rate * (1.0 + math.exp(height)))
@@ -172,36 +162,60 @@ def _line(angle: float, rate: float, height: float) -> tuple[float, float, float
     return -turn * r, r * r, -turn * v, v * v
 
 
+@njit(cache=True)
+def _noise(theta: Floats, pole: float, case: _Case) -> tuple[Noise, Floats]:
+    """The load model of the constants in the kernel's form."""
+    slow = math.exp(-case.dt_s / math.exp(theta[2]))
+    z1, z2 = math.tanh(theta[3]), math.tanh(theta[4])
+    lines = np.empty((max(theta.size - LINE + 1, 0), 4))
+    if theta.size > LOAD:
+        angle = 2.0 * math.pi * case.dt_s / case.period_s * math.exp(theta[5])
+        rate = case.dt_s / (case.period_s * math.exp(theta[6]))
+        for i in range(lines.shape[0]):
+            lines[i] = _line(ORDERS[i] * angle, ORDERS[i] ** 2 * rate, theta[7 + i])
+    return (-(pole + slow), pole * slow, -(z1 + z2), z1 * z2), lines
+
+
+@njit(cache=True)
+def _at(case: _Case, theta: Floats, gain: float) -> _Point:
+    """The innovations of the constants with a gain, or with the best one where it is NaN; the offset is the best."""
+    lag = unit_lag(math.exp(theta[0]), theta[1] * case.dt_s, case.dt_s)
+    noise, lines = _noise(theta, lag.pole, case)
+    yw, xw = _whitened(case.y, case.stem, lag, noise, lines)
+    y, x = yw[case.at], xw[case.at]
+    y, x = y - y.mean(), x - x.mean()
+    k = np.dot(x, y) / max(np.dot(x, x), 1e-300) if math.isnan(gain) else gain
+    e = y - k * x
+    return _Point(theta, e, k, np.dot(e, e) / e.size)
+
+
 def _point(case: _Case, theta: Floats, gain: float | None = None) -> _Point:
     """The innovations of the constants, with gain and offset solved for, or with the given gain."""
-    lag = unit_lag(math.exp(theta[0]), theta[1] * case.dt_s, case.dt_s)
-    yw, xw = (w[case.at] for w in _whitened(case.y, case.stem, lag, *_noise(theta, lag.pole, case)))
-    x, y = xw - xw.mean(), yw - yw.mean()
-    k = float(x @ y) / max(float(x @ x), 1e-300) if gain is None else gain
-    e = y - k * x
-    return _Point(theta, e, k, float(e @ e) / e.size)
+    return _at(case, theta, math.nan if gain is None else gain)  # type: ignore[no-any-return]
 
 
-def _slopes(case: _Case, p: _Point) -> Floats:
-    """Derivatives of the innovations by the constants, shape (m, n)."""
-    rows = []
+@register_jitable  # type: ignore[untyped-decorator]
+def _curved(case: _Case, p: _Point, taken: int) -> tuple[bool, Floats, Floats]:
+    """The Gauss-Newton matrix and the gradient, from differences in each constant."""
+    rows = np.empty((p.theta.size, p.e.size))
     for i in range(p.theta.size):
         moved = p.theta.copy()
         step = STEPS[i] if moved[i] + STEPS[i] <= case.ranges[1, i] else -STEPS[i]
         moved[i] += step
-        rows.append((_point(case, moved).e - p.e) / step)
-    return np.array(rows)
-
-
-def _curved(case: _Case, p: _Point, taken: int) -> tuple[bool, Floats, Floats]:
-    rows = _slopes(case, p)
+        rows[i] = (_at(case, moved, math.nan).e - p.e) / step
     return True, rows @ rows.T, -rows @ p.e
 
 
+@register_jitable  # type: ignore[untyped-decorator]
 def _stepped(case: _Case, p: _Point, step: Floats) -> _Point:
-    longest = LONGEST[: step.size]
-    short = step / max(float(np.max(np.abs(step) / longest)), 1.0)
-    return _point(case, np.clip(p.theta + short, case.ranges[0], case.ranges[1]))
+    short = step / max(np.max(np.abs(step) / LONGEST[: step.size]), 1.0)
+    return _at(case, np.minimum(np.maximum(p.theta + short, case.ranges[0]), case.ranges[1]), math.nan)
+
+
+@njit(cache=True)
+def _down(case: _Case, begun: _Point, rule: Descent) -> _Point:
+    """The end of a descent."""
+    return down(case, begun, _curved, _stepped, rule)  # type: ignore[no-any-return]
 
 
 def _judged(usable: Mask) -> NDArray[np.int64]:
@@ -233,7 +247,7 @@ def _descended(case: _Case, starts: Sequence[Floats]) -> _Point:
 
     def went(begun: _Point, steps: int) -> _Point:
         rule = Descent(steps, 2 * steps, case.at.size, SETTLED, 10.0, 5.0, steps)
-        return down(case, begun, _curved, _stepped, rule)
+        return _down(case, begun, rule)  # type: ignore[no-any-return]
 
     begun = (_point(case, np.clip(s, case.ranges[0], case.ranges[1])) for s in starts)
     near = sorted((went(p, FIRST_STEPS) for p in begun), key=lambda p: p.loss)
