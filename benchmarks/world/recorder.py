@@ -10,10 +10,12 @@ Recording = dict[str, Floats]
 """stamp_s [s from the start], sp, pv, op, shape (m,) each."""
 WAYS = (
     *("plain", "every 5 s", "every 10 s", "rounded", "rows missing", "late stamps", "averages"),
-    *("by exception", "gaps"),
+    *("by exception", "gaps", "daylight saving"),
 )
 EXCEPTION = 0.05
 """Change of PV or OP from which a historian by exception keeps a new value [% of span]."""
+HOUR_BACK = 0.4
+"""When the clock of a historian in local time goes back by an hour, as a share of the day."""
 GAPS = ((0.2, 0.215), (0.55, 0.58), (0.8, 0.8035))
 """Holes of 22, 43 and 5 minutes in a day, as shares of it: two outages of the recorder and a restart."""
 
@@ -50,6 +52,8 @@ def recorded(t: Trends, way: str, seed: int) -> Recording:
         at = np.arange(r["pv"].size) / r["pv"].size
         keep = ~np.any([(at >= a) & (at < b) for a, b in GAPS], axis=0)
         return {name: x[keep] for name, x in r.items()}
+    if way == "daylight saving":
+        return {**r, "stamp_s": r["stamp_s"] - 3600.0 * (np.arange(r["pv"].size) >= HOUR_BACK * r["pv"].size)}
     if way == "late stamps":
         late = rng.random(r["pv"].size) < 0.12
         return {**r, "stamp_s": r["stamp_s"] + 0.6 * late}
