@@ -113,20 +113,28 @@ def bench(
     return Bench(loops, loads, results[:, 0], results[:, 1], most_ms(loops, limits), limits)
 
 
-def try_out(table: Bench, controller: Pid, ms: float | None = None, loops: int | None = None) -> Candidate:
-    """Score a candidate, with its Ms on the first loop if known, on the first `loops` of the bench (None: all)."""
-    if ms is None:
-        ms = maximum_sensitivity(replace(table.loops[0], controller=controller))
-    some = table.loops[:loops]
-    cases = zip(some, table.loads, strict=False)
-    results = np.array([figures(replace(one, controller=controller), load) for one, load in cases])
-    travel = results[:, 0] / np.maximum(table.travel[: len(some)], 1e-9)
-    error = results[:, 1] / np.maximum(table.error[: len(some)], 1e-9)
+def _ratios(table: Bench, controller: Pid, k: int) -> tuple[float, float]:
+    """Travel and error of a candidate on one loop, over the present ones [-]."""
+    travel, error = figures(replace(table.loops[k], controller=controller), table.loads[k])
+    return travel / max(float(table.travel[k]), 1e-9), error / max(float(table.error[k]), 1e-9)
+
+
+def _scored(table: Bench, controller: Pid, ms: float, ratios: Sequence[tuple[float, float]]) -> Candidate:
+    """A candidate from its results on the loops."""
+    travel, error = np.array(ratios).T
     limits = table.limits
     aim = limits.error_aim if is_play(table.loops[0].valve) else limits.error_aim_stick
     score = _score(travel, error, aim, limits)
     worst = float(travel.max()), float(error.max())
     return Candidate(controller, ms, float(travel.mean()), float(error.mean()), *worst, score)
+
+
+def try_out(table: Bench, controller: Pid, ms: float | None = None, loops: int | None = None) -> Candidate:
+    """Score a candidate, with its Ms on the first loop if known, on the first `loops` of the bench (None: all)."""
+    if ms is None:
+        ms = maximum_sensitivity(replace(table.loops[0], controller=controller))
+    count = len(table.loops[:loops])
+    return _scored(table, controller, ms, [_ratios(table, controller, k) for k in range(count)])
 
 
 def _score(travel: Floats, error: Floats, aim: float, limits: TuningLimits) -> float:
@@ -137,15 +145,20 @@ def _score(travel: Floats, error: Floats, aim: float, limits: TuningLimits) -> f
     return math.log(mean_travel) + limits.error_weight * math.log(mean_error) + limits.error_beyond * above
 
 
-def is_harmless(c: Candidate, table: Bench) -> bool:
-    """Whether a candidate is worse on none of the loops consistent with the data."""
-    limits = table.limits
+def _harmless(table: Bench, controller: Pid, ms: float) -> Candidate | None:
+    """A candidate that raises the error neither on the first loop nor in the mean, and is worse on none of the loops
+    consistent with the data; it is dropped at the first loop on which it is."""
+    limits, ratios = table.limits, list[tuple[float, float]]()
     most = limits.error_growth_play if is_play(table.loops[0].valve) else limits.error_growth_sample
-    return (
-        c.worst_error <= most
-        and c.worst_travel <= limits.travel_growth_sample
-        and c.error <= limits.error_growth
-    )
+    for k in range(len(table.loops)):
+        travel, error = _ratios(table, controller, k)
+        if k == 0 and not error <= limits.error_growth:
+            return None
+        if not (travel <= limits.travel_growth_sample and error <= most):
+            return None
+        ratios.append((travel, error))
+    found = _scored(table, controller, ms, ratios)
+    return found if found.error <= limits.error_growth else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,16 +249,15 @@ def most_ms(loops: Sequence[Loop], limits: TuningLimits) -> tuple[float, ...]:
 
 def _kept(table: Bench, most: Rejection, settings: list[Pid]) -> list[Candidate]:
     """The settings that keep robustness, load rejection and error, tested on every loop."""
-    process, found = table.loops[0].process, []
+    process, found = table.loops[0].process, list[Candidate | None]()
     for pid in settings:
         if most.integral < rejects_s(pid) < math.inf:
             continue
         ms = robust(table.loops, pid, table.most_ms)
         if ms is None or rejection(process, pid).peak > most.peak:
             continue
-        if try_out(table, pid, ms, 1).error <= table.limits.error_growth:
-            found.append(try_out(table, pid, ms))
-    return [c for c in found if is_harmless(c, table)]
+        found.append(_harmless(table, pid, ms))
+    return [c for c in found if c is not None]
 
 
 def _grid(loop: Loop, most: Rejection, limits: TuningLimits) -> tuple[Floats, Floats]:

@@ -332,7 +332,7 @@ def _proposed(
         return _for_tuning(verdict, loop, period_s, config, record)
     if not is_stable(loop):
         return Proposed(Proposal(Action.UNDECIDED, SAID["unstable"]))
-    return _for_valve(verdict, loop, period_s, config)
+    return _for_valve(verdict, loop, period_s, config, record)
 
 
 def _for_tuning(
@@ -358,7 +358,11 @@ def _for_tuning(
     return Proposed(found, loop, load, others) if found.ms is not None else Proposed(found)
 
 
-def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Config) -> Proposed:
+def _for_valve(
+    verdict: Verdict, loop: Loop, period_s: float | None, config: Config, record: LoopRecord | None
+) -> Proposed:
+    """The proposal for a worn valve. The motion of a stem that jumps depends on the exact load, and a stretch has few
+    of its cycles: its settings are tested under the load of the whole record."""
     told_nat, least_nat = verdict.require_measured.evidence, config.advice.valve_nat
     if told_nat < least_nat:
         return Proposed(Proposal(Action.UNDECIDED, SAID["hardly_told"].format(told_nat, least_nat)))
@@ -376,7 +380,11 @@ def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Con
             return Proposed(Proposal(Action.UNDECIDED, SAID["disagrees"].format(differs)))
     none = period_s is None or loop.controller.kp == 0.0  # an integral alone rings before these
     same = () if none else indistinguishable(fit, sought, period_s or 0.0)
-    found = recommend(sought, verdict.cause, others, load, config.tuning, indistinguishable=same)
+    tested, alike = load, same
+    if record is not None and not none and fit.valve.slip_jump > 0.0:
+        tested = load_of_night(fit, loop.controller, record, period_s or 0.0)
+        alike = indistinguishable(fit, sought, period_s or 0.0, record)
+    found = recommend(sought, verdict.cause, others, tested, config.tuning, indistinguishable=alike)
     return Proposed(found, sought, load, others, same)
 
 

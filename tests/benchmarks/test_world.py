@@ -169,3 +169,22 @@ def test_a_clock_is_no_valve(way: str) -> None:
     assert (verdict.cause, verdict.fault) == ("load", "none")
     assert verdict.measured is not None
     assert verdict.measured.kept.share > 0.99
+
+
+@pytest.mark.parametrize(("number", "helped"), [(4, False), (5, True)], ids=["none help", "some help"])
+def test_settings_of_a_sticking_valve_are_tested_under_a_whole_day(number: int, helped: bool) -> None:
+    """A sticking loop of 20 minutes gets no settings, since those that a stretch of it promises raise the travel of
+    the true plant; one of 7 minutes gets settings that halve it."""
+    d = drawn(701, 6, ("stiction",))[number]
+    spec, made = spec_of(d), recorded(run(d), "plain", d.seed)
+    stamp, good = START_S + made["stamp_s"], np.zeros(made["pv"].size, dtype=bool)
+    series = {f"{d.name}.{r.upper()}": Series(stamp, made[r], good) for r in ("sp", "pv", "op")}
+    one = prepare(spec, series, Config().quality)
+    found = assess(one, controller_of(spec, one), Config())
+    assert found.verdict.cause == "valve"
+    said = advise(found, spec, controller_of(spec, one), 100.0, Config(), record=one.record)
+    assert (said.kp_new is not None) == helped
+    if said.kp_new is not None and said.ti_new is not None:
+        error, travel, *_ = outcome(d, replace(d.controller, kp=said.kp_new, ti_s=said.ti_new))
+        assert error <= 1.0
+        assert travel <= 0.5
