@@ -245,6 +245,7 @@ def test_a_loop_in_manual_is_told_so_with_its_trend(walked: Walked) -> None:
     assert "2026-03-02 02:30" in walked.page(MANUAL)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loop", EXPLAINED)
 def test_an_explanation_adds_to_the_night(loop: str, walked: Walked) -> None:
     """`explain` begins with the night's cells; a model that is no better on held-out data claims nothing, and what

@@ -17,6 +17,8 @@ from analyzer.pages.before_after import ChangeCase, change_cases, detected
 from analyzer.store.store import Store
 from reports.markdown import render
 
+pytestmark = pytest.mark.slow
+
 MILL = Path(__file__).parents[2] / "sample_data"
 RETUNED = ("LIC2101", "LIC2102", "LIC2103", "TIC2104", "LIC2105", "TIC2106", "LIC2107")
 OTHERS = ("FIC2110", "FIC2113", "PIC2116")

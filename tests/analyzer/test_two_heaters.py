@@ -43,7 +43,7 @@ def two_heaters(seed: int, drift: float) -> pd.DataFrame:
     return pd.DataFrame({"timestamp": stamp, **columns})
 
 
-@pytest.mark.parametrize("drift", [0.0, 0.4])
+@pytest.mark.parametrize("drift", [pytest.param(0.0, marks=pytest.mark.slow), 0.4])
 def test_the_recorded_neighbour_is_named_and_not_the_room(drift: float, tmp_path: Path) -> None:
     """PV of the first heater follows the second one's OP too: that coupling is named, with its gain, and explains
     most of what the baseline model leaves."""

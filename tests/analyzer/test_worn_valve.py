@@ -51,7 +51,7 @@ def test_a_worn_valve_under_a_sine_is_told_with_its_width() -> None:
         assert m.play.valve.stickband == pytest.approx(d.valve.band, rel=0.2)
 
 
-@pytest.mark.parametrize("kind", ["load", "tight"])
+@pytest.mark.parametrize("kind", ["tight", pytest.param("load", marks=pytest.mark.slow)])
 def test_a_sound_valve_is_at_fault_beside_nothing(kind: str) -> None:
     """Of sound valves under a load that cycles, or in a loop tuned too tight, none is called worn."""
     assert {str(judged(d).verdict.fault) for d in drawn(37, 6, (kind,))} <= {"none"}

@@ -105,8 +105,7 @@ def test_a_store_has_one_clock(kept: Path, tmp_path: Path) -> None:
     assert Store(alone).zone() == "Europe/Helsinki"
 
 
-@pytest.mark.parametrize("more", [["--replace"], []])
-@pytest.mark.parametrize("at", [0, 1, 2])
+@pytest.mark.parametrize(("at", "more"), [(0, ["--replace"]), (1, []), (2, ["--replace"])])
 def test_a_disk_that_is_full_at_the_end_leaves_the_night_as_it_was(
     kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at: int, more: list[str]
 ) -> None:

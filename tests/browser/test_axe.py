@@ -29,8 +29,7 @@ def kinds(folder: Path) -> list[Path]:
     return [*(here / f"{name}.html" for name in names), loop]
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [390, 1280])
+@pytest.mark.parametrize(("width", "scheme"), [(390, "light"), (1280, "dark")])
 def test_nothing_serious(browser: Any, folder: Path, scheme: str, width: int) -> None:
     """No serious or critical violation on any page."""
     size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
@@ -59,8 +58,7 @@ def test_nothing_serious_in_an_explanation(browser: Any, explained: list[Path]) 
     assert browser.execute_async_script(RUN) == []
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [390, 1280])
+@pytest.mark.parametrize(("width", "scheme"), [(390, "dark"), (1280, "light")])
 def test_nothing_serious_where_settings_are_tried(
     browser: Any, settings: Path, scheme: str, width: int
 ) -> None:

@@ -212,7 +212,7 @@ def test_zooming(browser: Any, folder: Path) -> None:
     assert width() == pytest.approx(whole)
 
 
-@pytest.mark.parametrize("width", [390, 1280, 1920])
+@pytest.mark.parametrize("width", [390, pytest.param(1280, marks=pytest.mark.slow), 1920])
 def test_nothing_overflows(browser: Any, folder: Path, width: int) -> None:
     """No page is wider than a phone, a laptop or a wide screen; wide tables scroll in a box of their own."""
     size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}

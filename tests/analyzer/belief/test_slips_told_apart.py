@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from analyzer.config import Config
 from analyzer.history.export import open_export
 from analyzer.history.stamps import parse_time
@@ -16,6 +18,7 @@ from analyzer.store.store import Store
 MILL = Path(__file__).parents[3] / "sample_data"
 
 
+@pytest.mark.slow
 def test_a_valve_whose_friction_scatters_sticks_by_all_nights(tmp_path: Path) -> None:
     """FIC2110 of the sample mill sticks over 6 % and jumps 5 %: two nights say so alone and together."""
     export = open_export([MILL / "mill.parquet"])
