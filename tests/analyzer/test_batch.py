@@ -39,6 +39,12 @@ def quiet(seed: int, n: int) -> Trends:
     return Trends(np.full(n, 50.0), pv, 50 - 0.5 * (pv - 50), np.full(n, 50.0))
 
 
+def at_rest(seed: int, n: int) -> Trends:
+    """A loop in noise whose OP is at rest, which costs no fit, shape (n,) each."""
+    made = quiet(seed, n)
+    return Trends(made.sp, made.pv, np.full(n, 50.0), made.stem)
+
+
 def cycling(seed: int) -> Trends:
     """A quarter of an hour of a fast level loop with play."""
     return simulate(Sketch("valve", (80.0, 200.0, 1.0), 1.0, 10.0, backlash=1.0, load_std=0.1), 0.25, seed)
@@ -47,7 +53,8 @@ def cycling(seed: int) -> Trends:
 @pytest.fixture(scope="module")
 def night(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An export of 24 loops, two of them cycling, one without a single good PV."""
-    loops = {f"L{k:02d}": cycling(k) if k in CYCLING else quiet(k, 900) for k in range(LOOPS)}
+    made = {k: cycling(k) if k in CYCLING else (at_rest if k % 4 else quiet)(k, 900) for k in range(LOOPS)}
+    loops = {f"L{k:02d}": trends for k, trends in made.items()}
     broken = loops[BROKEN]
     loops[BROKEN] = Trends(broken.sp, np.full(900, np.nan), broken.op, broken.stem)
     return write_export(tmp_path_factory.mktemp("night") / "night.parquet", loops)

@@ -11,7 +11,7 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner, Result
-from test_batch import quiet, tables
+from test_batch import at_rest, tables
 
 from analyzer.cli import main
 from analyzer.night import chunk
@@ -24,8 +24,8 @@ NIGHT = "2026-03-02"
 
 @pytest.fixture(scope="module")
 def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An export of quiet loops, a quarter of an hour at 1 s."""
-    loops = {f"L{k:02d}": quiet(k, 900) for k in range(LOOPS)}
+    """An export of loops at rest, a quarter of an hour at 1 s."""
+    loops = {f"L{k:02d}": at_rest(k, 900) for k in range(LOOPS)}
     return write_export(tmp_path_factory.mktemp("lost") / "night.parquet", loops)
 
 
@@ -133,12 +133,12 @@ def test_pieces_that_go_in_mid_run_are_an_error(export, kept, tmp_path, what, af
 
 def other_day(path: Path) -> None:
     """The next day's export under the same name."""
-    write_export(path, {f"L{k:02d}": quiet(100 + k, 900) for k in range(LOOPS)}, 1772496000.0 + 86400.0)
+    write_export(path, {f"L{k:02d}": at_rest(100 + k, 900) for k in range(LOOPS)}, 1772496000.0 + 86400.0)
 
 
 def other_tags(path: Path) -> None:
     """Another unit's export under the same name."""
-    write_export(path, {f"M{k:02d}": quiet(k, 900) for k in range(LOOPS)})
+    write_export(path, {f"M{k:02d}": at_rest(k, 900) for k in range(LOOPS)})
 
 
 def same_size(path: Path) -> None:

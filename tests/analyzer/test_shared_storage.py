@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
-from test_batch import cycling, quiet, tables
+from test_batch import at_rest, cycling, tables
 from test_cluster import cluster  # noqa: F401
 
 from analyzer import places
@@ -64,7 +64,7 @@ def bucket() -> Iterator[str]:
 @pytest.fixture(scope="module")
 def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Four quiet loops and two that cycle, a quarter of an hour at 1 s."""
-    loops = {f"L{k:02d}": quiet(k, 900) if k < 4 else cycling(k) for k in range(6)}
+    loops = {f"L{k:02d}": at_rest(k, 900) if k < 4 else cycling(k) for k in range(6)}
     return write_export(tmp_path_factory.mktemp("shared") / "night.parquet", loops)
 
 

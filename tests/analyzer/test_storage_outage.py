@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
-from test_batch import quiet, tables
+from test_batch import at_rest, tables
 from test_shared_storage import bucket  # noqa: F401
 
 from analyzer import places
@@ -91,7 +91,7 @@ def disturbed(answer: Callable[[int, str], int | None]) -> Iterator[Disturbing]:
 def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Four quiet loops."""
     return write_export(
-        tmp_path_factory.mktemp("outage") / "night.parquet", {f"L{k}": quiet(k, 900) for k in range(4)}
+        tmp_path_factory.mktemp("outage") / "night.parquet", {f"L{k}": at_rest(k, 900) for k in range(4)}
     )
 
 

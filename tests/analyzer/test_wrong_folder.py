@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
-from test_batch import quiet, tables
+from test_batch import at_rest, tables
 
 from analyzer.cli import main
 from analyzer.store import draft
@@ -22,7 +22,7 @@ LOOPS = 4
 
 @pytest.fixture(scope="module")
 def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Four quiet loops, a quarter of an hour at 1 s."""
+    """Four loops at rest, a quarter of an hour at 1 s."""
     return written(tmp_path_factory.mktemp("folder") / "night.parquet", 0)
 
 
@@ -35,8 +35,8 @@ def kept(export: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def written(path: Path, seed: int, start_s: float = START_S) -> Path:
-    """An export of four quiet loops."""
-    return write_export(path, {f"L{k}": quiet(seed + k, 900) for k in range(LOOPS)}, start_s)
+    """An export of four loops at rest."""
+    return write_export(path, {f"L{k}": at_rest(seed + k, 900) for k in range(LOOPS)}, start_s)
 
 
 def asked(*words: object) -> Result:
