@@ -148,7 +148,7 @@ def held(case: tuple[str, int]) -> list[Held] | str:
     ]
     if told != wanted or verdict.measured is None:
         return told
-    found = intervals(verdict.fit, family != FAMILIES[2], AdviceLimits())
+    found = intervals(verdict.fit, family != FAMILIES[2], AdviceLimits(), verdict.measured.controller)
     return [compared(family, name, found[name], true) for name, true in m.truth.items() if name in found]
 
 

@@ -47,7 +47,7 @@ def judged(name: str, export: Path, loops: Path, truth: dict[str, float], every:
         return Counter()
     fit = found.verdict.fit if found.verdict.cause is Cause.VALVE else m.play
     width, slope = truth.get("backlash") or truth["stick_S"], truth["K"] / truth["T"]
-    said = intervals(fit, True, api.Config().advice)
+    said = intervals(fit, True, api.Config().advice, m.controller)
     held = said.get("stickband_pct") or said.get("backlash_pct")
     return Counter(
         {

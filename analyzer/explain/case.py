@@ -130,7 +130,7 @@ def seen_in_cycles(verdict: Verdict, limits: AdviceLimits) -> SeenInCycles | Non
     if valve is None or shown is None:
         return None
     cycle_s = 2.0 * m.window.duration_s / shown.count
-    known = intervals(fit, True, limits)
+    known = intervals(fit, True, limits, m.controller)
     told = {name: known[name] for name in VALVE_FIGURES if name in known}
     return SeenInCycles(fit.process, valve, shown.count, shown.agreeing, cycle_s, m.trials is not None, told)
 

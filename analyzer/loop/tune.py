@@ -100,7 +100,8 @@ def identified(found: Assessment, limits: AdviceLimits) -> tuple[Process, Valve,
     verdict = found.verdict
     fit, at_fault = verdict.fit, verdict.cause is Cause.VALVE
     valve = fit.valve.valve if at_fault else None
-    return tuned(fit, at_fault, limits), valve, intervals(fit, at_fault, limits)
+    law = None if verdict.measured is None else verdict.measured.controller
+    return tuned(fit, at_fault, limits), valve, intervals(fit, at_fault, limits, law)
 
 
 def tune(
@@ -135,7 +136,7 @@ def tune(
         model, fit, others = (model, fit, others) if slow is None else (slow.loop, slow.fit, slow.others)
     forecast = None if new is None else _forecast(model, new, fit, others, prepared.record, first, config)
     return Tuning(
-        intervals(verdict.fit, verdict.cause is Cause.VALVE, config.advice),
+        intervals(verdict.fit, verdict.cause is Cause.VALVE, config.advice, controller),
         model,
         period,
         first.amplitude_pct if first else None,

@@ -13,7 +13,7 @@ from analyzer.loop.advice import advise, sought_for, withheld
 from analyzer.loop.agreement import agreement
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.decisions import SignKind
-from analyzer.loop.identified import load_of
+from analyzer.loop.identified import intervals, load_of
 from analyzer.loop.judged_stretch import controller_of
 from analyzer.loop.quality import prepare
 from benchmarks.world.__main__ import spec_of
@@ -112,6 +112,26 @@ def test_a_scan_that_is_stated_replaces_close_rows() -> None:
     kept = withheld(blind, replace(spec, scan_s=None), replace(pid, scan_s=10.0), 100.0, Config())
     assert kept is not None
     assert "a sample every 9 s" in kept.reason
+
+
+def test_intervals_in_slow_rows_hold_the_truth() -> None:
+    """Of a worn valve recorded every 10 s width, slope, gain, lag and dead time lie in their intervals, though
+    OP between the rows is unknown; in rows of every scan the same intervals are narrower."""
+    slow, fast = (assessed(WORN, way, HOURS) for way in ("every 10 s", "plain"))
+    p = WORN.process
+    true = {
+        "backlash_pct": WORN.valve.band,
+        "gain": p.gain,
+        "time_constant_s": p.lag_s,
+        "dead_time_s": p.dead_s,
+    }
+    true["slope_pct_per_s"] = p.gain / p.lag_s
+    limits = Config().advice
+    told, close = (intervals(found.verdict.fit, True, limits, pid) for found, pid in (slow, fast))
+    assert set(true) <= set(told)
+    for name, value in true.items():
+        assert told[name].low <= value <= told[name].high, name
+        assert told[name].high - told[name].low > close[name].high - close[name].low, name
 
 
 def test_a_worn_valve_is_told_beside_a_load_that_makes_the_cycle() -> None:
