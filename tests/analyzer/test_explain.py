@@ -17,7 +17,7 @@ from identification.simulation.closed_loop import closed_loop
 pytestmark = pytest.mark.slow
 
 RIGS = Path(__file__).parents[2].parent / "shared" / "recordings" / "rigs"
-KEYS = {"loop", "verdict", "block", "effects", "where", "fit", "moved", "remaining", "reason"}
+KEYS = {"loop", "verdict", "block", "effects", "where", "fit", "moved", "remaining", "reason", "night"}
 N = 4000
 rigs = pytest.mark.skipif(not RIGS.exists(), reason="the real recordings lie outside the repository")
 
