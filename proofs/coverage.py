@@ -17,7 +17,7 @@ import numpy as np
 
 from analyzer.config import AdviceLimits, QualityLimits
 from analyzer.loop.assess import Assessment, assess
-from analyzer.loop.identified import intervals
+from analyzer.loop.intervals import intervals
 from analyzer.loop.quality import prepare
 from identification.errors import NotAssessedError
 from identification.models import Estimate, Pid

@@ -25,7 +25,7 @@ from analyzer.loop.cycling_span import detect_where_it_cycles
 from analyzer.loop.decisions import Cause, Fault
 from analyzer.loop.experiments import Learned, learned
 from analyzer.loop.fitness import at_limits, pv_that_jumps
-from analyzer.loop.identified import intervals
+from analyzer.loop.intervals import intervals
 from analyzer.loop.judged_stretch import differing
 from analyzer.loop.measure import time_scale
 from analyzer.loop.oscillation import counting

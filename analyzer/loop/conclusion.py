@@ -15,7 +15,8 @@ from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
 from analyzer.loop.cost import RECORDED, STATED, loss
 from analyzer.loop.decisions import Action, Cause, Cell, Fault, Finding, Remedy, Requirement, Status, Swing
-from analyzer.loop.identified import gain_room, intervals, is_known
+from analyzer.loop.identified import gain_room
+from analyzer.loop.intervals import intervals, is_known
 from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillations
 from analyzer.loop.setpoint_moves import as_row

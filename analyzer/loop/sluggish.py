@@ -20,7 +20,8 @@ import numpy as np
 from analyzer.config import Config
 from analyzer.lanes.standing import AVERAGING
 from analyzer.loop.fit_window import window_of
-from analyzer.loop.identified import error_of_night, intervals, load_of, load_of_night, tuned
+from analyzer.loop.identified import error_of_night, load_of, load_of_night, tuned
+from analyzer.loop.intervals import intervals
 from analyzer.loop.measure import time_scale
 from analyzer.loop.ringing import between_samples
 from identification.errors import NotAssessedError

@@ -19,11 +19,11 @@ from analyzer.loop.fitness import at_limits, unfit_for_cause
 from analyzer.loop.identified import (
     error_of_night,
     indistinguishable,
-    intervals,
     load_of,
     load_of_night,
     tuned,
 )
+from analyzer.loop.intervals import intervals
 from analyzer.loop.judged_stretch import controller_of
 from analyzer.loop.measure import time_scale
 from analyzer.loop.oscillation import Oscillation

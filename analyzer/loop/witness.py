@@ -13,7 +13,7 @@ import numpy as np
 from analyzer.config import CauseLimits, Config
 from analyzer.loop.cause import Verdict, agrees, fault_of, hidden_by_grid, jump_evidence, needed
 from analyzer.loop.decisions import Cause, Fault
-from analyzer.loop.identified import DECODED, slope_deviation
+from analyzer.loop.intervals import DECODED, slope_deviation
 from analyzer.loop.measure import Measured
 from analyzer.loop.quality import Prepared
 from identification.estimation.backlash_stiction import WIDTHS, width_profile

@@ -15,7 +15,8 @@ from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.cause import NO_CAUSE, not_assessed
 from analyzer.loop.conclusion import concluded
 from analyzer.loop.decisions import MissingData, Requirement, RequirementKind
-from analyzer.loop.identified import indistinguishable, lag_factor, load_of, scan_noise, tuned, uncertain
+from analyzer.loop.identified import indistinguishable, load_of, scan_noise, tuned, uncertain
+from analyzer.loop.intervals import lag_factor
 from analyzer.loop.oscillation import Oscillations
 from analyzer.loop.quality import prepare
 from analyzer.loop.witness import witness

@@ -13,7 +13,8 @@ from analyzer.loop.advice import advise, sought_for, withheld
 from analyzer.loop.agreement import agreement
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.decisions import SignKind
-from analyzer.loop.identified import intervals, load_of
+from analyzer.loop.identified import load_of
+from analyzer.loop.intervals import intervals
 from analyzer.loop.judged_stretch import controller_of
 from analyzer.loop.quality import prepare
 from benchmarks.world.__main__ import spec_of
