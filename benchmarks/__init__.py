@@ -15,21 +15,32 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 
+_OWN: set[int] = set()
+"""Children that this process had when it began to adopt, which may outlive it."""
+
+
 def adopt() -> None:
     """Become the parent of processes whose own ends before them, such as a run's server of workers: what they spend
     counts once they are waited for. Linux alone; elsewhere a run's workers are its children."""
     if sys.platform == "linux":
         become_subreaper = 36
         ctypes.CDLL(None).prctl(become_subreaper, 1)
+        _OWN.update(_children())
+
+
+def _children() -> set[int]:
+    """Processes whose parent is this one."""
+    lists = Path("/proc/self/task").glob("*/children")
+    return {int(pid) for one in lists for pid in one.read_text().split()}
 
 
 def spent() -> resource.struct_rusage:
     """What all descendants that have ended have spent, those among them that were adopted; waits for these."""
-    while True:
-        try:
-            os.waitpid(-1, 0)
-        except ChildProcessError:
-            return resource.getrusage(resource.RUSAGE_CHILDREN)
+    while left := _children() - _OWN if sys.platform == "linux" else set():
+        for pid in left:
+            with suppress(ChildProcessError):
+                os.waitpid(pid, 0)
+    return resource.getrusage(resource.RUSAGE_CHILDREN)
 
 
 @dataclass(frozen=True)
