@@ -92,10 +92,10 @@ def test_pieces_too_short_to_stand_for_the_record_are_not_picked():
 @pytest.fixture(scope="module")
 def retuned(tmp_path_factory):
     """Rows by loop of the night in which seven loops of the sample mill were retuned, as changes.csv tells, beside
-    two that nobody touched."""
+    three that nobody touched."""
     export = open_export([SAMPLE_DATA / "mill.parquet"])
     changes = read_changes(SAMPLE_DATA / "changes.csv")
-    wanted = {"FIC2110", "FIC2113", *(c.loop for c in changes)}
+    wanted = {"FIC2110", "FIC2113", "PIC2116", *(c.loop for c in changes)}
     matched, _ = match(read_loops(SAMPLE_DATA / "loops.csv"), export.tags)
     specs = tuple(s for s in matched if s.loop in wanted)
     first = START_S + 7 * DAY_S

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import shutil
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from analyzer.night import chunk
 from analyzer.store import table as store_table
 from proofs.plant import write_export
 
+slow = partial(pytest.param, marks=pytest.mark.slow)
 LOOPS = 6
 NIGHT = "2026-03-02"
 
@@ -49,7 +51,9 @@ def half(export: Path, out: Path, loops: range) -> Path:
     return out
 
 
-@pytest.mark.parametrize("number", [errno.EACCES, errno.ESTALE])
+@pytest.mark.parametrize(
+    "number", [errno.EACCES, errno.ESTALE, slow(errno.EIO), slow(errno.EMFILE), slow(errno.ETIMEDOUT)]
+)
 def test_a_table_that_cannot_be_read_now_is_left_alone(export, tmp_path, monkeypatch, number):
     """Where the system refuses a table of the night, a second export of it ends with exit 2 and one line that names
     --resume; nothing is renamed, and read again the table has all its loops."""
@@ -116,7 +120,14 @@ LOSSES = {
 
 
 @pytest.mark.usefixtures("in_this_process")
-@pytest.mark.parametrize(("what", "after"), [*((what, 1) for what in LOSSES), ("the last piece", 2)])
+@pytest.mark.parametrize(
+    ("what", "after"),
+    [
+        *((w, 1) for w in LOSSES),
+        ("the last piece", 2),
+        *(slow(w, 2) for w in LOSSES if w != "the last piece"),
+    ],
+)
 def test_pieces_that_go_in_mid_run_are_an_error(export, kept, tmp_path, what, after):
     """Store, pieces or one table's piece removed in mid-run: exit 2, one line with --resume, and so gone on with the
     store is that of an undisturbed run."""

@@ -18,8 +18,8 @@ MILL, STATED = "sample_data/mill.parquet", Path("sample_data/loops.csv")
 NIGHT = ("--since", "2026-03-03", "--until", "2026-03-04")
 FOLLOWER, WORN, CALM = "LIC2103", "TIC2106", "FIC2113"
 WALKED = (FOLLOWER, WORN, CALM)
-OTHERS = ("FIC2110", "FIC2122", "TIC2118")
-"""The source of a group, a worn valve and a loop at its limit."""
+OTHERS = ("FIC2110", "LIC2107", "TIC2111", "FIC2122", "TIC2121", "TIC2118", "PIC2116")
+"""A source, a level, a cascade with its worn slave, a loop at its limit and a healthy one."""
 """Loops that `tune` is asked of; tests/proofs/test_walk.py asks it of the whole mill and of two plants."""
 
 
@@ -32,7 +32,7 @@ def said(*words: str) -> str:
 
 @pytest.fixture(scope="module")
 def asked(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, ...]:
-    """Six loops of a night of the mill, as commands take them."""
+    """Ten loops of a night of the mill, as commands take them."""
     path = tmp_path_factory.mktemp("stated") / "loops.csv"
     head, *rows = STATED.read_text("utf-8").splitlines()
     kept = [row for row in rows if row.split(",")[0] in (*WALKED, *OTHERS)]

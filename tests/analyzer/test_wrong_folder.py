@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import shutil
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from analyzer.store import draft
 from analyzer.store.store import Store
 from proofs.plant import START_S, write_export
 
+slow = partial(pytest.param, marks=pytest.mark.slow)
 LOOPS = 4
 
 
@@ -105,7 +107,13 @@ def test_a_store_has_one_clock(kept: Path, tmp_path: Path) -> None:
     assert Store(alone).zone() == "Europe/Helsinki"
 
 
-@pytest.mark.parametrize(("at", "more"), [(0, ["--replace"]), (1, []), (2, ["--replace"])])
+@pytest.mark.parametrize(
+    ("at", "more"),
+    [
+        *((0, ["--replace"]), (1, []), (2, ["--replace"])),
+        *(slow(0, []), slow(1, ["--replace"]), slow(2, [])),
+    ],
+)
 def test_a_disk_that_is_full_at_the_end_leaves_the_night_as_it_was(
     kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at: int, more: list[str]
 ) -> None:

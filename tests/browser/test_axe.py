@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from tests.browser.test_pages import browser, folder, opened, pytestmark, wait
 from tests.browser.test_settings_page import settings
 
 __all__ = ["browser", "explained", "folder", "pytestmark", "settings"]
+slow = partial(pytest.param, marks=pytest.mark.slow)
 axe = pytest.importorskip("axe_core_python", reason="needs axe-core-python, of the test extra")
 SCRIPT = (files("axe_core_python") / "axe.min.js").read_text(encoding="utf-8")
 RUN = """const done = arguments[arguments.length - 1];
@@ -29,7 +31,9 @@ def kinds(folder: Path) -> list[Path]:
     return [*(here / f"{name}.html" for name in names), loop]
 
 
-@pytest.mark.parametrize(("width", "scheme"), [(390, "light"), (1280, "dark")])
+@pytest.mark.parametrize(
+    ("width", "scheme"), [(390, "light"), (1280, "dark"), slow(390, "dark"), slow(1280, "light")]
+)
 def test_nothing_serious(browser: Any, folder: Path, scheme: str, width: int) -> None:
     """No serious or critical violation on any page."""
     size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
@@ -58,7 +62,9 @@ def test_nothing_serious_in_an_explanation(browser: Any, explained: list[Path]) 
     assert browser.execute_async_script(RUN) == []
 
 
-@pytest.mark.parametrize(("width", "scheme"), [(390, "dark"), (1280, "light")])
+@pytest.mark.parametrize(
+    ("width", "scheme"), [(390, "dark"), (1280, "light"), slow(390, "light"), slow(1280, "dark")]
+)
 def test_nothing_serious_where_settings_are_tried(
     browser: Any, settings: Path, scheme: str, width: int
 ) -> None:
