@@ -204,8 +204,7 @@ def simulated(c: Case, data: dict[str, Any], stamps: Floats, closed: bool) -> tu
             pv = carried(data, op, pv, r.dt_s)
     except (ZeroDivisionError, OverflowError, FloatingPointError) as error:
         raise InputError(f"{c.spec.loop}: {error}", RUNS, "save the model again") from error
-    most = RUNAWAY_PCT
-    if not (np.abs(pv).max() <= most and np.abs(op).max() <= most):  # false of NaN
+    if not (np.abs(pv).max() <= RUNAWAY_PCT and np.abs(op).max() <= RUNAWAY_PCT):  # false of NaN
         raise InputError(f"{c.spec.loop}: PV or OP runs away", RUNS, "save the model again")
     at = r.start_s + r.time_s
     pv_at = np.interp(stamps, at, scale.low + pv * scale.span / 100.0)

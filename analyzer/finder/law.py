@@ -154,10 +154,9 @@ def _unit(columns: Matrix) -> Matrix:
 
 def innovations(value: Matrix) -> Matrix:
     """Residual of moves, shape (n, tags), not explained by each tag's own past; shape (n - past, tags)."""
-    past = PAST
-    out = np.empty((len(value) - past, value.shape[1]))
+    out = np.empty((len(value) - PAST, value.shape[1]))
     for k in range(value.shape[1]):
-        lagged = np.column_stack([value[past - 1 - i : len(value) - 1 - i, k] for i in range(past)])
-        slope, *_ = np.linalg.lstsq(lagged.T @ lagged, lagged.T @ value[past:, k], rcond=None)
-        out[:, k] = value[past:, k] - lagged @ slope
+        lagged = np.column_stack([value[PAST - 1 - i : len(value) - 1 - i, k] for i in range(PAST)])
+        slope, *_ = np.linalg.lstsq(lagged.T @ lagged, lagged.T @ value[PAST:, k], rcond=None)
+        out[:, k] = value[PAST:, k] - lagged @ slope
     return out

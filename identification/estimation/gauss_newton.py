@@ -24,10 +24,8 @@ from identification.simulation.valve import StemLaw, sticking
 
 ITERATIONS = 25  # Largest number of Gauss-Newton steps: nine in ten fits stop before the fifteenth
 SETTLED = 0.01  # Gain in log likelihood below which the steps stop [nat]
-FIT_NARROWEST = 0.2  # Stickband after a step, in terms of that before, that is tried no more
+NARROWEST = 0.2  # Stickband after a step, in terms of that before, that is tried no more
 
-NARROWEST = FIT_NARROWEST
-"""Smallest ratio of a stickband after a step to that before, in the kernels' type."""
 BASE = 8
 """Number of constants before the noise model."""
 STEP_T = 1.01
@@ -243,8 +241,7 @@ def descend(fit: Fit, free_width: bool = False) -> Fit:
     because their optimum lies in narrow valleys.
     """
     b, theta, valve = _at(fit, free_width)
-    steps = ITERATIONS
-    rule = Descent(steps, steps, b.at.size, SETTLED, 10.0, 5.0, steps)
+    rule = Descent(ITERATIONS, ITERATIONS, b.at.size, SETTLED, 10.0, 5.0, ITERATIONS)
     best = _descend(b, theta, valve, rule)
     head, base, ar = np.split(best.theta, (4, BASE))
     gain, t, dead = float(head[3]), math.exp(head[0]), float(head[1])

@@ -26,14 +26,12 @@ SHORTEST = 1.5  # Shortest time constant tried [samples]
 APART = 2.5  # Ratio of neighbouring time constants tried: the descent covers a factor of three either way
 DELAYS = (0.0, 0.1, 0.3, 0.8)  # Dead times tried [of the time constant]
 LONGEST_DELAY = 0.1  # Longest dead time tried at first, as a share of the record; the descent may exceed it
-FIT_PIT_STEPS = (0.02, 0.007, 0.0025)  # Relative steps of the search within a minimum of stickband and jump
+PIT_STEPS = (0.02, 0.007, 0.0025)  # Relative steps of the search within a minimum of stickband and jump
 
 FADED = 1e-17
 """A decay below this share of its start is treated as zero; numbers have sixteen digits."""
 MOVES = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, -1.0))
 """Compass moves in log time constant and dead time."""
-PIT_STEPS = FIT_PIT_STEPS
-"""Step sizes of the local search in stickband and jump, in the kernels' type."""
 PIT_MOVES = ((1, 0), (-1, 0), (0, 1), (0, -1))
 """Compass moves in stickband and jump."""
 NO_WHITENING = np.zeros(1)

@@ -12,31 +12,26 @@ from numpy.typing import NDArray
 from identification.record import Floats, Mask
 from identification.simulation.lag import Lag, stepped
 
-SLIPS_SCATTER = 0.05
+SCATTER = 0.05
 """Standard deviation of the distance at which a stem lets go, in that distance [of the distance]: the one
 value tried: on six simulated stems of dry friction OP, which comes in samples, goes 2 to 5 % beyond it
 (median)."""
-SLIPS_FAR = 3.5
+FAR = 3.5
 """Standard deviations below the mean distance from which a slip is possible [deviations]: about rare."""
-SLIPS_RARE = 1e-4  # Probability of a slip under which no path is begun for it: 9 nat, what an outlier costs
-SLIPS_STUCK = 100.0
+RARE = 1e-4  # Probability of a slip under which no path is begun for it: 9 nat, what an outlier costs
+STUCK = 100.0
 """Log-probability penalty for a stem at rest for longer than required [nat]: on simulated stems parking for
 good cost less than the wrong dead time did at first, and cost three of six their slips."""
-SLIPS_WAITING = 12
+WAITING = 12
 """Largest number of a path's slips without a response of PV yet: a dead time of six cycles is no dead
 time."""
-SLIPS_MOST_EVENTS = 60_000  # Stored slips of all paths; beyond it no path divides: 8,400 were seen
-SLIPS_PLACES = 13  # Places of the stem that a path may begin at, across what it may be behind OP
-SLIPS_SAME = 0.01
+MOST_EVENTS = 60_000  # Stored slips of all paths; beyond it no path divides: 8,400 were seen
+PLACES = 13  # Places of the stem that a path may begin at, across what it may be behind OP
+SAME = 0.01
 """Distance of two stems, in the mean distance at which they let go, under which their paths are one [of the
 distance]."""
-SLIPS_LOOKED = 8
+LOOKED = 8
 """Blocks after which paths are compared, if they do not become too many before [blocks]: bounds the time."""
-
-SCATTER, FAR, RARE, STUCK = SLIPS_SCATTER, SLIPS_FAR, SLIPS_RARE, SLIPS_STUCK
-WAITING, MOST_EVENTS = SLIPS_WAITING, SLIPS_MOST_EVENTS
-PLACES, SAME, LOOKED = SLIPS_PLACES, SLIPS_SAME, SLIPS_LOOKED
-"""Path settings of limits.toml in the kernels' type."""
 
 
 class Response(NamedTuple):

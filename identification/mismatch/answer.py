@@ -142,11 +142,10 @@ def unanswered(found: Explanation) -> str:
 
 def too_short(found: Explanation, s: Recording) -> str:
     """Requirement where the record is short compared with the time constant; empty where it is not."""
-    enough = TIME_CONSTANTS
     lag, length = float(found.plain.model.c[Slot.T]), s.pv.size * s.dt_s
     if s.kind in INTEGRATING or any(v.replaces for v in found.best.model.added):
         return ""
-    return "" if length >= enough * lag else words.too_short_told(enough, length, lag)
+    return "" if length >= TIME_CONSTANTS * lag else words.too_short_told(TIME_CONSTANTS, length, lag)
 
 
 def open_gain_note(found: Explanation, effects: tuple[EffectFound, ...]) -> str:

@@ -183,8 +183,7 @@ def adds_in_band(found: Explanation, proof: HeldOut) -> bool:
         return True
     less = first_effects(found, len(found.accepted) - 1)
     before = held_out(less.p, less.plain, less.best, band=found.band).banded
-    least = LEAST_IN_BAND
-    return before is None or proof.banded[1].rmse ** 2 <= (1.0 - least) * before[1].rmse ** 2
+    return before is None or proof.banded[1].rmse ** 2 <= (1.0 - LEAST_IN_BAND) * before[1].rmse ** 2
 
 
 def first_effects(found: Explanation, count: int) -> Explanation:

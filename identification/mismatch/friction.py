@@ -44,7 +44,7 @@ STARTS = 3  # Starts of a candidate, or of a stem with mass, that are followed t
 MASSES_MOVED = 20  # Starts of a stem with mass that are moved by small steps: bounds the time
 MASS_MOVES = 40  # Small steps by which such a start is moved at most: bounds the time
 
-FRICTION_PLACES = 9  # Places of the stem that are tried within its friction band: an eighth of the band apart
+PLACES = 9  # Places of the stem that are tried within its friction band: an eighth of the band apart
 WIDTHS = (0.9, 1.8, 10)
 """First and last of the stickbands tried for a stem with mass, in widths of the best backlash, and their
 number [of the backlash]: of 18 simulated stems of dry friction they were 1.1 to 1.8."""
@@ -55,7 +55,7 @@ are a lag."""
 STEPS = (0.08, 0.04, 0.02, 0.01)
 """Relative steps of the search of a stem with mass: a pit is a tenth of the stickband wide."""
 DEAD_STEPS = 4.0  # Dead time that a step of one takes [samples]
-FRICTION_CARRIED_ON = 0.9
+CARRIED_ON = 0.9
 """Sum of squares with another position over that with the continued stem, from which the stem is placed
 again."""
 
@@ -63,8 +63,6 @@ WEARS = (Friction.PLAY, Friction.STICKS)
 """Roles of the effects of a worn valve."""
 OF_CYCLES = (Slot.T, Slot.L, Slot.K, Slot.STICKBAND, Slot.JUMP, Slot.COAST)
 """Parameters that the cycles determine."""
-PLACES, CARRIED_ON = FRICTION_PLACES, FRICTION_CARRIED_ON
-"""Settings of limits.toml for the stem position, in the kernels' type."""
 MOVES = (
     *((1, 0, 0, 0), (-1, 0, 0, 0), (0, 1, 0, 0), (0, -1, 0, 0)),
     *((0, 0, 1, 0), (0, 0, -1, 0), (0, 0, 0, 1), (0, 0, 0, -1), (1, 1, 0, 0), (-1, -1, 0, 0)),

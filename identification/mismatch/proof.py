@@ -95,13 +95,12 @@ def runs_out(p: Problem, fit: Fitted) -> bool:
 
     A bound at zero, or at an end of a signal's range, is where an effect begins, not a far end.
     """
-    edge = BOUND_SHARE
     for q in fit.model.added[-1].params:
         if q.scale in ENDS_OF_SIGNAL:
             continue
         value, (low, high) = float(fit.model.c[q.slot]), bounds(p.inputs, fit.model.c, q)
-        near = edge * (high - low)
-        at_high = high != 0.0 and value > (high * (1.0 - edge) if q.log else high - near)
+        near = BOUND_SHARE * (high - low)
+        at_high = high != 0.0 and value > (high * (1.0 - BOUND_SHARE) if q.log else high - near)
         at_low = not q.log and low != 0.0 and value < low + near
         if at_high or at_low:
             return True

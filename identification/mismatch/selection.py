@@ -94,10 +94,9 @@ def compete(
     begun = [first_try(x, row, least, tell) for row in rows if applies(x, row)]
     firsts = counted_alike(x, [first for first, _ in begun])
     tried = sorted(zip(firsts, (models for _, models in begun), strict=True), key=lambda t: -t[0].penalised)
-    most = FOLLOWED
-    ended = [gain_over_opponent(x, followed(x, first, models, least)) for first, models in tried[:most]]
+    ended = [gain_over_opponent(x, followed(x, first, models, least)) for first, models in tried[:FOLLOWED]]
     sticking = sticking_candidates(x, [first for first, _ in tried], rows, tell)
-    found = [*ended, *sticking, *(gain_over_opponent(x, first) for first, _ in tried[most:])]
+    found = [*ended, *sticking, *(gain_over_opponent(x, first) for first, _ in tried[FOLLOWED:])]
     return sorted(counted_alike(x, found), key=lambda c: -c.penalised)
 
 

@@ -192,8 +192,7 @@ def locked_harmonic(s: Spectrum, period_s: float, order: int = 3) -> float:
 
 def envelope(s: Spectrum, line: float) -> tuple[Floats, float]:
     """Amplitude of the band about a frequency over time, shape (m,), and its sample interval [s]."""
-    factor = OWN_BAND
-    first, last = math.ceil(line / factor), min(int(line * factor), s.lines.size - 1)
+    first, last = math.ceil(line / OWN_BAND), min(int(line * OWN_BAND), s.lines.size - 1)
     m = next_fast_len(max(int(line * 8), last + 2, 16))
     cut = np.zeros(m, dtype=np.complex128)
     cut[first : last + 1] = 2 * s.lines[first : last + 1]
