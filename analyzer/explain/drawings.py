@@ -7,7 +7,7 @@ import numpy as np
 from analyzer.explain.explained import Explained
 from analyzer.explain.words import CURVES, FEATURES, NOTES, ROWS, TOLD
 from analyzer.pages.words import number
-from identification.estimation.prediction_error import Fitted
+from identification.estimation.model import Fitted
 from identification.mismatch.catalogue import fault
 from identification.mismatch.location import Feature, Group, profile
 from identification.mismatch.outside import about

@@ -34,7 +34,8 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import sentences
 from analyzer.words.units import beside_settings, intervals_of, number, of_controller, schedule_shown
-from identification.estimation.window import LONGEST_DEAD_TIME, Fit
+from identification.estimation.model import Fitted
+from identification.estimation.problem import LONGEST_DEAD_TIME
 from identification.models import Loop, Pid
 from identification.record import Floats, LoopRecord
 from tuning.frequency_response import integral_s, is_stable
@@ -85,7 +86,7 @@ def model_of(verdict: Verdict, controller: Pid) -> Loop:
     fit = verdict.fit
     if verdict.cause is Cause.VALVE:
         return Loop(fit.process, controller, fit.valve.valve)
-    return Loop(between_samples(fit.process, fit.window, controller), controller)
+    return Loop(between_samples(fit.process, fit.p, controller), controller)
 
 
 def advise(
@@ -288,7 +289,9 @@ def _too_thin(found: Assessment, controller: Pid | None, config: Config) -> Advi
     return None if thin is None else _or_repair(found.verdict, _lacking(thin))
 
 
-def sought_for(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loop, Fit, tuple[Loop, ...]]:
+def sought_for(
+    verdict: Verdict, controller: Pid, limits: AdviceLimits
+) -> tuple[Loop, Fitted, tuple[Loop, ...]]:
     """The loop for the search of settings, its fit, and other possible loops: with the identified fault, also if a
     load sustains its cycle."""
     verdict = verdict.for_settings
@@ -324,7 +327,7 @@ def _proposed(
     right_way = loop.controller.sign * loop.process.slope > 0.0
     if not right_way or verdict.cause not in (Cause.VALVE, Cause.TUNING):
         return Proposed(recommend(loop, verdict.cause, limits=config.tuning))
-    duration_s, dead_time_s = verdict.fit.window.duration_s, loop.process.dead_time_s
+    duration_s, dead_time_s = verdict.fit.p.duration_s, loop.process.dead_time_s
     if dead_time_s > LONGEST_DEAD_TIME * duration_s:
         shown = SAID["beyond_record"].format(number(dead_time_s), duration_s / 3600.0)
         return Proposed(Proposal(Action.UNDECIDED, shown))
@@ -352,7 +355,7 @@ def _for_tuning(
         tested, error = night, error_of_night(record, loop.controller)
         if float(np.ptp(record.sp)) > 0.0 and not record.sp_estimated:
             unmoved = load_of_night(fit, loop.controller, record, period_s or 0.0, moved=False)
-    thin = too_thin(fit.window.row_s, loop.controller, config) is not None
+    thin = too_thin(fit.p.row_s, loop.controller, config) is not None
     seen = verdict.require_measured.observed
     found = recommend(slow, verdict.cause, others, tested, config.tuning, error, thin, seen, unmoved=unmoved)
     return Proposed(found, loop, load, others) if found.ms is not None else Proposed(found)

@@ -15,7 +15,8 @@ import numpy as np
 from analyzer.config import AdviceLimits
 from analyzer.loop.identified import load_of, recorded_error, tuned
 from identification.controller.check import op_step
-from identification.estimation.window import Fit, Stems, stem_of
+from identification.estimation.model import Fitted
+from identification.estimation.problem import Stems, stem_of
 from identification.models import Loop, Pid
 from identification.record import Floats
 from identification.simulation.closed_loop import scan_step
@@ -65,37 +66,37 @@ class Agreement:
         return None if beyond[name] <= 1.0 else (name, allowed[name][0])
 
 
-def agreement(loop: Loop, fit: Fit, load: Floats) -> Agreement:
+def agreement(loop: Loop, fit: Fitted, load: Floats) -> Agreement:
     """Compare the loop at its present settings under a load on its scan [% PV], shape (n,), with the same stretch of
     a fit's record.
 
     Stem and OP are compared by their samples at the longer of both intervals, OP rounded as recorded and without
     moves within a digit: at a coarse digit OP's noise is not in the record.
     """
-    sim, window = settled(run(loop_in_digits(loop), in_digits(load))), fit.window
+    sim, window = settled(run(loop_in_digits(loop), in_digits(load))), fit.p
     dt_s, scan_s = window.step_s, scan_step(loop)
-    last = min(window.op.size, math.ceil(len(sim) * scan_s / dt_s))
-    own = window.op[None]
-    modelled = stem_of(Stems(own, own, own, window.op, np.empty(0), 1), fit.valve)
-    stem = modelled if window.position is None else window.position
+    last = min(window.blocks.op.size, math.ceil(len(sim) * scan_s / dt_s))
+    own = window.blocks.op[None]
+    modelled = stem_of(Stems(own, own, own, window.blocks.op, np.empty(0), 1), fit.valve)
+    stem = modelled if window.blocks.position is None else window.blocks.position
     every = max(round(dt_s / scan_s), 1)
-    digit = op_step(window.op)
-    recorded = [_travel(x[-last:], dt_s) for x in (play(window.op, digit), stem)]
+    digit = op_step(window.blocks.op)
+    recorded = [_travel(x[-last:], dt_s) for x in (play(window.blocks.op, digit), stem)]
     rounded = digit * np.round(sim.op[::every] / digit) if digit > 0.0 else sim.op[::every]
     simulated = [_travel(x, every * scan_s) for x in (play(rounded, digit), sim.stem[::every])]
     op, moved = (s / max(r, 1e-9) for s, r in zip(simulated, recorded, strict=True))
     error = recorded_error(fit, loop.controller, math.ceil(len(sim) * scan_s / window.dt_s))
-    moved_on = stem if window.decoded else modelled  # a recorded stem has the noise of its transmitter
+    moved_on = stem if window.blocks.decoded else modelled  # a recorded stem has the noise of its transmitter
     counted = reversals(moved_on[-last:]), reversals(sim.stem[::every])
     rate = counted[1] / max(counted[0], LEAST) * last * dt_s / (len(sim) * scan_s)
     ratio = float(np.mean(np.abs(sim.error))) / max(error, 1e-9) if math.isfinite(error) else 0.0
     return Agreement(rate, ratio, op, moved, counted)
 
 
-def closest(fits: Sequence[Fit], controller: Pid, limits: AdviceLimits) -> Fit:
+def closest(fits: Sequence[Fitted], controller: Pid, limits: AdviceLimits) -> Fitted:
     """The fit behind a faulty valve whose simulation at the present settings is closest to the record."""
 
-    def distance(fit: Fit) -> float:
+    def distance(fit: Fitted) -> float:
         process = tuned(fit, True, limits) if controller.kp else fit.process
         loop = Loop(process, controller, fit.valve.valve)
         return agreement(loop, fit, load_of(fit, controller)).distance

@@ -18,14 +18,15 @@ from identification.estimation.backlash_stiction import (
 from identification.estimation.between_samples import Scans, settled, with_scans
 from identification.estimation.evidence import evidence, with_load_step, with_second_lag
 from identification.estimation.gauss_newton import descend
+from identification.estimation.model import Fitted
 from identification.estimation.noise import AR_ORDER, judged
+from identification.estimation.problem import Problem
 from identification.estimation.stem_position import Seen, seen
-from identification.estimation.window import Fit, Window
 from identification.record import Mask
 
-Candidates = tuple[Fit, Fit, Fit | None]
+Candidates = tuple[Fitted, Fitted, Fitted | None]
 """Fits with an ideal valve, with backlash, and with stick-slip if that was tried."""
-Fits = tuple[Fit, Fit, Fit | None, Fit, float, float]
+Fits = tuple[Fitted, Fitted, Fitted | None, Fitted, float, float]
 """Fits: no fault, backlash, stick-slip if tried, the better valve; its evidence and the jump's [nat]."""
 
 
@@ -44,24 +45,24 @@ class Question(NamedTuple):
     limits: CauseLimits
 
 
-def fits_of(window: Window, q: Question) -> Fits:
+def fits_of(window: Problem, q: Question) -> Fits:
     """The candidates' fits, by a recorded stem if it shows a fault; with OP at the controller's scan if its scans
     within a row are known."""
-    shown = None if window.position is None else seen(window.op, window.position)
+    shown = None if window.blocks.position is None else seen(window.blocks.op, window.blocks.position)
     if shown is not None:
         return _stem_shown(window, shown, q)
-    window = replace(window, position=None)
+    window = window.with_blocks(position=None)
     found = None if q.scans is None or q.calm else _at_scans(window, q, q.scans)
     found = found or _candidates(window, q)
     return *found, *_compared(found, q)
 
 
-def judged_count(window: Window) -> int:
+def judged_count(window: Problem) -> int:
     """Number of blocks that follow as many good ones as the noise model's order."""
     return int(judged(window.usable, AR_ORDER).sum())
 
 
-def check_judged(window: Window, limits: CauseLimits) -> None:
+def check_judged(window: Problem, limits: CauseLimits) -> None:
     """Raise NotAssessedError if too few blocks follow as many good ones as the noise model's order."""
     count = judged_count(window)
     if count < limits.judged:
@@ -70,33 +71,33 @@ def check_judged(window: Window, limits: CauseLimits) -> None:
         )
 
 
-def refined(fits: Candidates, best: Fit, hopeless: bool) -> Candidates:
+def refined(fits: Candidates, best: Fitted, hopeless: bool) -> Candidates:
     """Fits at the record's own interval, if the dead time is no shorter than a block; the valve's are not refined if
     a search for its fault is `hopeless`."""
-    if best.window.factor == 1 or best.dead_time_s + best.window.half_block_s < best.window.dt_s:
+    if best.p.blocks.factor == 1 or best.dead_time_s + best.p.half_block_s < best.p.dt_s:
         return fits
-    linear, play = (replace(f, window=replace(f.window, fine=True)) for f in fits[:2])
-    stick = None if fits[2] is None else replace(fits[2], window=replace(fits[2].window, fine=True))
+    linear, play = (f.within(fine=True) for f in fits[:2])
+    stick = None if fits[2] is None else fits[2].within(fine=True)
     if not hopeless:
-        play = descend(play, free_width=best.window.position is None)
+        play = descend(play, free_width=best.p.blocks.position is None)
         stick = None if stick is None else descend(stick)
     return descend(linear), play, stick
 
 
-def hopeful(window: Window, q: Question) -> float:
+def hopeful(window: Problem, q: Question) -> float:
     """Evidence [nat] from which a search for a valve fault is worthwhile in a loop that does not oscillate."""
     return q.limits.hopeless * q.limits.needed(judged_count(window), bool(q.due.any()), False)
 
 
-def _is_searched(linear: Fit, play: Fit, q: Question) -> bool:
+def _is_searched(linear: Fitted, play: Fitted, q: Question) -> bool:
     """Whether the complete search for a valve fault is worthwhile: in a loop that oscillates always, because a stem
     that jumps by nearly its stickband resembles no backlash; in a calm one if backlash explains enough."""
-    if not q.calm or play.window.y.size < SHORT:
+    if not q.calm or play.p.y.size < SHORT:
         return True
-    return play.log_likelihood - linear.log_likelihood >= hopeful(play.window, q)
+    return play.log_likelihood - linear.log_likelihood >= hopeful(play.p, q)
 
 
-def _candidates(window: Window, q: Question) -> Candidates:
+def _candidates(window: Problem, q: Question) -> Candidates:
     """The fits of one window."""
     linear = fit_linear(window, q.scale_s)
     short = q.calm and window.y.size < SHORT
@@ -109,12 +110,12 @@ def _candidates(window: Window, q: Question) -> Candidates:
     return better_linear(linear, play), play, fit_stick_slip(play, q.scale_s) if sticks else None
 
 
-def _at_scans(window: Window, q: Question, scans: Scans) -> Candidates | None:
+def _at_scans(window: Problem, q: Question, scans: Scans) -> Candidates | None:
     """The fits with OP at the controller's scan, each computed by its own model; None if those with OP at the rows
     are clearly more likely: a controller with no faster scan holds OP between rows."""
     linear = fit_linear(window, q.scale_s)
     rows = _likeliest((linear, fit_play(linear, q.scale_s), None))
-    within = with_scans(settled(rows, scans), scans, SEARCHED).window
+    within = with_scans(settled(rows, scans), scans, SEARCHED).p
     linear, play, stick = _candidates(within, q)
     stick = None if stick is None else settled(stick, scans)
     found = settled(linear, scans), settled(play, scans), stick
@@ -122,11 +123,11 @@ def _at_scans(window: Window, q: Question, scans: Scans) -> Candidates | None:
     return found if gained > -q.limits.evidence else None
 
 
-def _likeliest(fits: Candidates) -> Fit:
+def _likeliest(fits: Candidates) -> Fitted:
     return max((f for f in fits if f is not None), key=lambda f: f.log_likelihood)
 
 
-def _compared(found: Candidates, q: Question) -> tuple[Fit, float, float]:
+def _compared(found: Candidates, q: Question) -> tuple[Fitted, float, float]:
     """The better valve, its evidence over an ideal one, and that of the jump over backlash [nat]."""
     linear, play, stick = found
     if stick is None and not _is_searched(linear, play, q):
@@ -141,12 +142,12 @@ def _compared(found: Candidates, q: Question) -> tuple[Fit, float, float]:
     return best, gained - (q.limits.evidence_jump if best is stick else 0.0), jump
 
 
-def _stem_shown(window: Window, shown: Seen, q: Question) -> Fits:
+def _stem_shown(window: Problem, shown: Seen, q: Question) -> Fits:
     """The same with a recorded stem: its fault is visible, and PV responds to the stem itself."""
     linear = fit_linear(window, q.scale_s)
-    behind = window if window.position is None else replace(window, op=window.position)
-    play = descend(replace(fit_linear(behind, q.scale_s), window=window, valve=shown.play))
-    stick = None if shown.jumping is None else replace(play, valve=shown.jumping)
+    behind = window if window.blocks.position is None else window.with_blocks(op=window.blocks.position)
+    play = descend(replace(fit_linear(behind, q.scale_s), p=window).moved(valve=shown.play))
+    stick = None if shown.jumping is None else play.moved(valve=shown.jumping)
     best = play if stick is None else stick
     gained = evidence(best, with_load_step(linear, q.due, best.ar))
     return linear, play, stick, best, gained, 0.0 if stick is None else math.inf

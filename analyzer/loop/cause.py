@@ -44,9 +44,9 @@ from identification.estimation.backlash_stiction import SHORT, refined
 from identification.estimation.between_samples import scans_per_row
 from identification.estimation.gauss_newton import descend
 from identification.estimation.irregular_slips import SlipPath, fit_irregular, near_path, path_evidence
+from identification.estimation.model import Fitted
 from identification.estimation.noise import generic_noise
 from identification.estimation.smooth_load import as_fit
-from identification.estimation.window import Fit
 from identification.models import Backlash, Loop
 from identification.record import LoopRecord
 from identification.simulation.valve import HALTS, RESTS
@@ -87,7 +87,7 @@ class Verdict:
         return self.measured
 
     @property
-    def fit(self) -> Fit:
+    def fit(self) -> Fitted:
         """The fit of the verdict, the valve's if that is at fault; NotAssessedError if there is none."""
         m = self.require_measured
         if self.cause is not Cause.VALVE:
@@ -99,7 +99,7 @@ class Verdict:
         """Whether the loop is identified at any sampling: its ringing causes the cycle, or the valve does, fitted
         with OP between the rows from control law and scan."""
         if self.cause is Cause.VALVE and self.measured is not None:
-            return scans_per_row(self.measured.controller, self.fit.window.row_s) > 1
+            return scans_per_row(self.measured.controller, self.fit.p.row_s) > 1
         return self.cause is Cause.TUNING and any(s.kind is SignKind.RINGING for s in self.signs)
 
     @property
@@ -131,7 +131,9 @@ def _crossed(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
     a cycle; over its usual range in a calm loop, whose tails are kicks of its set point. OP of a valve that rarely
     slips stays within its stickband, so the whole range counts there too."""
     whole = oscillating or fault_of(m, limits) is Fault.STICTION
-    return m.play.valve.stickband <= limits.widest * float(np.ptp(m.window.op)) and (whole or m.size <= 1.0)
+    return m.play.valve.stickband <= limits.widest * float(np.ptp(m.window.blocks.op)) and (
+        whole or m.size <= 1.0
+    )
 
 
 def speaks(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
@@ -302,7 +304,7 @@ def _quiet(m: Measured, limits: CauseLimits, beside: WornValve | None) -> Verdic
 def hidden_by_grid(m: Measured, pv_step: float, oscillates: bool, limits: CauseLimits) -> bool:
     """Whether the valve's stickband moves PV by so few steps of its grid, pv_step [% of span], or PV of a calm loop
     covers so few, that the grid itself keeps PV constant as the valve would."""
-    if m.window.position is not None and not m.window.decoded:
+    if m.window.blocks.position is not None and not m.window.blocks.decoded:
         return False
     best = m.stick_slip if m.stick_slip is not None and m.jump > limits.evidence_jump else m.play
     covered = float(np.ptp(m.window.y[m.window.usable]))
@@ -431,13 +433,13 @@ def refine_stick_slip(verdict: Verdict, period_s: float, config: Config) -> Verd
     if (
         verdict.cause is not Cause.VALVE
         or m is None
-        or m.window.position is not None
+        or m.window.blocks.position is not None
         or m.window.y.size < SHORT
     ):
         return verdict
-    window = m.play.window
-    blocks = replace(m.play, window=replace(window.of_rows, fine=False))
-    play = descend(blocks, free_width=True) if window.fine or window.steps > 1 else m.play
+    window = m.play.p
+    blocks = replace(m.play, p=window.of_rows.with_blocks(fine=False))
+    play = descend(blocks, free_width=True) if window.blocks.fine or window.blocks.steps > 1 else m.play
     path = fit_irregular(play, generic_noise(), period_s, verdict.fault is not Fault.STICTION)
     if path is None:
         return verdict
@@ -454,19 +456,19 @@ def refine_stick_slip(verdict: Verdict, period_s: float, config: Config) -> Verd
     slips = told.stick_slip
     if m.controller is not None and slips is not None:
         laws = (slips.valve._replace(tolerance=motion) for motion in (RESTS, HALTS))
-        fits = (best, *(replace(slips, valve=law) for law in laws))
+        fits = (best, *(slips.moved(valve=law) for law in laws))
         best = closest(fits, m.controller, config.advice)
     steady = replace(verdict, measured=replace(m, stick_slip=best), fault=fault)
     return replace(verdict, measured=told, fault=fault, steady=steady)
 
 
-def _finely(fit: Fit, m: Measured) -> Fit:
+def _finely(fit: Fitted, m: Measured) -> Fitted:
     """A fit in blocks, refined at the resolution of the measures."""
-    return descend(replace(fit, window=replace(fit.window, fine=True))) if m.window.fine else fit
+    return descend(fit.within(fine=True)) if m.window.blocks.fine else fit
 
 
 def _with_path(m: Measured, path: SlipPath, jump: float, more: float) -> Measured:
     """The measures, with the path's stem and the friction and process of its fit."""
     fit = _finely(path.fit, m)
-    linear, play = (replace(x, window=fit.window) for x in (m.linear, m.play))
+    linear, play = (replace(x, p=fit.p) for x in (m.linear, m.play))
     return replace(m, linear=linear, play=play, stick_slip=fit, jump=jump, evidence=m.evidence + more)

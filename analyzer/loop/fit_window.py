@@ -10,7 +10,7 @@ from scipy.ndimage import uniform_filter1d
 from analyzer.config import CauseLimits
 from analyzer.loop.assessments import noise_band
 from identification.estimation.between_samples import Rows, Scans, scans_per_row
-from identification.estimation.window import Window, block_means
+from identification.estimation.problem import Problem, block_means, in_blocks
 from identification.models import Pid
 from identification.record import Floats, LoopRecord, Mask
 
@@ -78,7 +78,7 @@ def across(x: Floats, hole: Mask) -> Floats:
 
 def window_of(
     record: LoopRecord, scale_s: float, limits: CauseLimits, kind: str = "", calm: bool = False
-) -> Window:
+) -> Problem:
     """The stretch that is fitted, in blocks of a fraction of the period."""
     factor = max(round(scale_s / limits.blocks_per_period / record.dt_s), 1)
     n = min(len(record) // factor, limits.window) * factor
@@ -97,19 +97,20 @@ def _cut(
     scale_s: float,
     most: tuple[float, float],
     turn: int,
-) -> Window:
+) -> Problem:
     """The window of n samples that begins at `first`."""
     part = record.span(first, first + n)
     whole = bridged(part.usable, scale_s / record.dt_s)
     usable = block_means(whole.astype(np.float64), factor) > 0.99
     stem = None if part.position is None else np.ascontiguousarray(part.position)
-    return Window(
+    return in_blocks(
         block_means(across(part.pv, whole & ~part.usable), factor),
         np.ascontiguousarray(part.op),
         usable,
         record.dt_s * factor,
         factor,
-        *most,
+        most_time_constant_s=most[0],
+        most_dead_time_s=most[1],
         position=stem,
         first=first,
         sp=None if part.sp_estimated or not np.ptp(part.sp) else block_means(part.sp, factor),
@@ -117,37 +118,37 @@ def _cut(
     )
 
 
-def whole_window(record: LoopRecord, window: Window, most: int, scale_s: float) -> Window:
+def whole_window(record: LoopRecord, window: Problem, most: int, scale_s: float) -> Problem:
     """The whole record in at most so many blocks, none shorter than those of a window of it; its cycles, of a period
     [s], are not distinguished from slower moves of OP."""
-    factor = max(math.ceil(len(record) / most), window.factor)
-    longest = window.most_time_constant_s, window.most_dead_time_s
+    factor = max(math.ceil(len(record) / most), window.blocks.factor)
+    longest = window.blocks.most_time_constant_s, window.blocks.most_dead_time_s
     return _cut(record, 0, len(record) // factor * factor, factor, scale_s, longest, 0)
 
 
-def scans_of(record: LoopRecord, window: Window, law: Pid | None) -> Scans | None:
+def scans_of(record: LoopRecord, window: Problem, law: Pid | None) -> Scans | None:
     """The controller's scans within the rows of a window; None if they are no faster than the rows, or the signal
     that it acts on is not known."""
     count = scans_per_row(law, record.dt_s)
     if law is None or count == 1 or record.sp_estimated:
         return None
-    part = record.span(window.first, window.first + window.y.size * window.factor)
+    part = record.span(window.blocks.first, window.blocks.first + window.y.size * window.blocks.factor)
     pv, sp, op = across(part.pv, ~part.usable), np.ascontiguousarray(part.sp), np.ascontiguousarray(part.op)
     return Scans(Rows(pv, sp, op), law, count)
 
 
-def due_to_answer(record: LoopRecord, window: Window, scale_s: float) -> Mask:
+def due_to_answer(record: LoopRecord, window: Problem, scale_s: float) -> Mask:
     """True while a response of PV to a set point move is expected, shape of the window.
 
     From a move for scale_s [s], and on until PV has reached the set point, regardless of the valve's delay.
     """
-    sp = record.sp[window.first :: window.factor][: window.y.size]
+    sp = record.sp[window.blocks.first :: window.blocks.factor][: window.y.size]
     moves = np.flatnonzero(np.abs(np.diff(sp)) > 1e-6) + 1
     out = np.zeros(window.y.size, dtype=bool)
     if record.sp_estimated or not 0 < moves.size <= window.y.size / 10:
         return out
     reach = max(round(scale_s / window.dt_s), 1)
-    error = np.abs(sp - window.y)
+    error = np.abs(sp - window.pv)
     near = error <= 3 * noise_band(window.y)
     for at, end in zip(moves, [*moves[1:], window.y.size], strict=True):
         there = np.flatnonzero(near[at + 1 : end])

@@ -17,7 +17,8 @@ from analyzer.loop.measure import Measured
 from identification.controller.check import op_step
 from identification.estimation.between_samples import scans_per_row, with_scans, without_noise
 from identification.estimation.gauss_newton import covariance, residual
-from identification.estimation.window import Fit, Window
+from identification.estimation.model import Fitted
+from identification.estimation.problem import Problem
 from identification.models import Fopdt, Integrator, Loop, Pid, Process
 from identification.record import Floats, LoopRecord, Mask
 from identification.signals.robust import robust_deviation
@@ -48,7 +49,7 @@ COARSE = 2.0
 """Digits of OP within which the median of its jumps is that of whole digits."""
 
 
-def tuned(fit: Fit, valve: bool, limits: AdviceLimits) -> Process:
+def tuned(fit: Fitted, valve: bool, limits: AdviceLimits) -> Process:
     """The process for the search of settings: an integrator if the time constant is unknown."""
     process = fit.process
     if lag_factor(fit, valve, limits) is None:
@@ -75,7 +76,7 @@ def gain_room(m: Measured) -> float | None:
     return abs(simc(process, scan_s=controller.scan_s).kp / controller.kp)
 
 
-def load_of(fit: Fit, controller: Pid) -> Floats:
+def load_of(fit: Fitted, controller: Pid) -> Floats:
     """Residual load and noise of the model [% PV], on the scan's clock, the latest scans, shape (m,).
 
     Moves of the set point are subtracted: a PI at a constant set point responds to such a load as to the moves.
@@ -83,32 +84,32 @@ def load_of(fit: Fit, controller: Pid) -> Floats:
     Blocks do not contain the noise from scan to scan, rows contain it at their own interval only. OP still contains
     it, times the gain, and it dithers the stem; white noise of that size is added.
     """
-    _, load = _on_scans(_load_left(fit), fit.window, controller)
-    return _with_noise(load[-LOAD_SCANS:], fit.window, controller)
+    _, load = _on_scans(_load_left(fit), fit.p, controller)
+    return _with_noise(load[-LOAD_SCANS:], fit.p, controller)
 
 
 def load_of_night(
-    fit: Fit, controller: Pid, record: LoopRecord, period_s: float, moved: bool = True
+    fit: Fitted, controller: Pid, record: LoopRecord, period_s: float, moved: bool = True
 ) -> Floats:
     """As `load_of`, of the whole record [% PV] instead of the stretch that is fitted, shape (m,); its unusable parts
     are left out. moved, whether moves of the set point are in it."""
-    window = whole_window(record, fit.window, NIGHT_BLOCKS, period_s)
+    window = whole_window(record, fit.p, NIGHT_BLOCKS, period_s)
     dead_s = max(fit.process.dead_time_s - window.half_block_s, 0.0)
-    whole = replace(fit, window=window, dead_time_s=dead_s)
-    scans = None if fit.window.steps == 1 else scans_of(record, window, controller)
+    whole = replace(fit, p=window).moved(dead_time_s=dead_s)
+    scans = None if fit.p.blocks.steps == 1 else scans_of(record, window, controller)
     if scans is not None:
         whole = with_scans(whole, scans, SEARCHED)
-    window = whole.window if moved else replace(whole.window, sp=None)
+    window = whole.p if moved else whole.p.with_blocks(sp=None)
     clock, load = _on_scans(across(_load_left(whole), ~window.usable), window, controller)
     usable = window.usable[np.minimum((clock / window.dt_s).astype(int), window.y.size - 1)]
     return _with_noise(joined(load, usable)[-NIGHT_SCANS:], window, controller)
 
 
-def _load_left(fit: Fit) -> Floats:
+def _load_left(fit: Fitted) -> Floats:
     """PV less the response to the stem [% PV], shape (n,), less offset, drift and the decay of the model's start on
     the usable blocks: a working loop has compensated them. With a noise model that is nearly an integrator the fit
     does not determine its own offset, which can be far beyond what OP can compensate."""
-    window = fit.window
+    window = fit.p
     t = np.linspace(-1.0, 1.0, window.y.size)
     faded = np.exp(-0.5 * (1.0 + t) * window.duration_s / fit.time_constant_s)
     return regressed(residual(fit), np.column_stack([np.ones(t.size), t, faded]), window.usable)
@@ -127,37 +128,37 @@ def regressed(y: Floats, terms: Floats, usable: Mask) -> Floats:
     return np.asarray(y - terms @ slope)
 
 
-def _on_scans(left: Floats, window: Window, controller: Pid) -> tuple[Floats, Floats]:
+def _on_scans(left: Floats, window: Problem, controller: Pid) -> tuple[Floats, Floats]:
     """Clock of the controller's scans [s] and the smooth part of a load on it [% PV], the set point subtracted."""
     scan_s = controller.scan_s or window.dt_s
-    if window.factor == 1 and _loses_noise(window, controller):
+    if window.blocks.factor == 1 and _loses_noise(window, controller):
         left = without_noise(left)
-    if window.sp is not None:
-        left = left - (window.sp - window.sp.mean())
+    if window.blocks.sp is not None:
+        left = left - (window.blocks.sp - window.blocks.sp.mean())
     clock: Floats = scan_s * np.arange(int(window.duration_s / scan_s), dtype=np.float64)
     return clock, np.asarray(np.interp(clock, np.arange(left.size) * window.dt_s, left), dtype=np.float64)
 
 
-def _loses_noise(window: Window, controller: Pid) -> bool:
+def _loses_noise(window: Problem, controller: Pid) -> bool:
     """Whether blocks, or rows of several scans, hide the noise from scan to scan."""
-    return window.factor > 1 or scans_per_row(controller, window.row_s) > 1
+    return window.blocks.factor > 1 or scans_per_row(controller, window.row_s) > 1
 
 
-def _with_noise(load: Floats, window: Window, controller: Pid) -> Floats:
+def _with_noise(load: Floats, window: Problem, controller: Pid) -> Floats:
     """A load with the noise that its window does not contain [% PV], shape (m,)."""
     if _loses_noise(window, controller):
         load = load + scan_noise(window, controller) * np.random.default_rng(SEED).normal(size=load.size)
     return np.asarray(load, dtype=np.float64)
 
 
-def recorded_error(fit: Fit, controller: Pid, last: int = 0) -> float:
+def recorded_error(fit: Fitted, controller: Pid, last: int = 0) -> float:
     """Average absolute error of the data of a fit [% PV], of its last samples if a number is given; about PV's mean
     if the set point is constant. The noise missing in blocks is added as in `load_of`."""
-    window = fit.window
-    sp = 0.0 if window.sp is None else window.sp - window.y.mean()
+    window = fit.p
+    sp = 0.0 if window.blocks.sp is None else window.blocks.sp - window.inputs.level
     error, usable = (window.centred - sp)[-last:], window.usable[-last:]
     slow = float(np.mean(np.abs(error[usable]))) if usable.any() else math.nan
-    fast = scan_noise(window, controller) if window.factor > 1 else 0.0
+    fast = scan_noise(window, controller) if window.blocks.factor > 1 else 0.0
     return math.hypot(slow, math.sqrt(2.0 / math.pi) * fast)
 
 
@@ -170,13 +171,13 @@ def error_of_night(record: LoopRecord, controller: Pid) -> float:
     return float(np.mean(np.abs(error - bias)))
 
 
-def scan_noise(window: Window, controller: Pid) -> float:
+def scan_noise(window: Problem, controller: Pid) -> float:
     """Standard deviation of PV's noise from sample to sample [% PV], from OP's differences where OP is free: the
     smaller of second and fourth ones, because a fast cycle adds to both, to the fourth ones far less."""
     found = []
     for one in (window, window.of_rows):  # simulated between the rows, and recorded alone
         held = max(round(controller.scan_s / one.step_s), 1)  # OP is constant between two scans
-        op, scan_s = one.op[::held], controller.scan_s or one.step_s
+        op, scan_s = one.blocks.op[::held], controller.scan_s or one.step_s
         shared = from_noise(controller, scan_s, HIGHEST + 1, max(round(one.step_s / scan_s), 1))
         free = (op > controller.op_lo) & (op < controller.op_hi)  # at a limit OP does not follow PV
         found += [_noise_of(op, free, order, shared) for order in (2, HIGHEST)]
@@ -207,7 +208,7 @@ def _noise_of(op: Floats, free: Mask, order: int, shared: Floats) -> float | Non
     return math.sqrt(max(spread**2 - rounding, 0.0) / share)
 
 
-def uncertain(fit: Fit, loop: Loop, samples: int = 6) -> tuple[Loop, ...]:
+def uncertain(fit: Fitted, loop: Loop, samples: int = 6) -> tuple[Loop, ...]:
     """Loops drawn from the fit's covariance, of the same controller and the same kind of process."""
     lag, gain = math.log(fit.time_constant_s), math.log(abs(fit.gain))
     mean = np.array([lag, fit.process.dead_time_s, fit.valve.stickband, gain])
@@ -222,7 +223,7 @@ def uncertain(fit: Fit, loop: Loop, samples: int = 6) -> tuple[Loop, ...]:
 
 
 def indistinguishable(
-    fit: Fit, loop: Loop, period_s: float, record: LoopRecord | None = None
+    fit: Fitted, loop: Loop, period_s: float, record: LoopRecord | None = None
 ) -> tuple[LoadedLoop, ...]:
     """Loops that the cycle of a period [s] cannot distinguish from the fitted one, each with its residual load [% PV]
     of the stretch, as `load_of`, or of a whole record.
@@ -235,9 +236,9 @@ def indistinguishable(
     product then differs in phase.
     """
     omega, lag_s = 2.0 * math.pi / period_s, fit.time_constant_s
-    slow_s, swing = INTEGRATING * max(lag_s, period_s), 0.5 * fit.window.cycle_range
+    slow_s, swing = INTEGRATING * max(lag_s, period_s), 0.5 * fit.p.cycle_range
     found = []
-    widest = MOST_OF_SWING * fit.window.cycle_range / max(fit.valve.stickband, 1e-9)
+    widest = MOST_OF_SWING * fit.p.cycle_range / max(fit.valve.stickband, 1e-9)
     widths = (1.0, min(WIDER, widest), widest if fit.valve.slip_jump > 0.0 else 1.0)
     for wider in dict.fromkeys(widths):
         valve = scaled_valve(loop.valve, wider)
@@ -249,7 +250,7 @@ def indistinguishable(
         gain = fit.gain * abs(more) * math.hypot(1.0, omega * slow_s) / math.hypot(1.0, omega * lag_s)
         law = fit.valve._replace(breakaway=wider * fit.valve.breakaway, sliding=wider * fit.valve.sliding)
         dead_s = max(fit.dead_time_s - later_s, 0.0)
-        other = replace(fit, gain=gain, time_constant_s=slow_s, dead_time_s=dead_s, valve=law)
+        other = fit.moved(gain=gain, time_constant_s=slow_s, dead_time_s=dead_s, valve=law)
         process = Fopdt(gain, slow_s, max(loop.process.dead_time_s - later_s, 0.0))
         pid = loop.controller
         load = load_of(other, pid) if record is None else load_of_night(other, pid, record, period_s)
@@ -257,7 +258,7 @@ def indistinguishable(
     return tuple(found)
 
 
-def _drawn(draw: Floats, fit: Fit, loop: Loop) -> Loop:
+def _drawn(draw: Floats, fit: Fitted, loop: Loop) -> Loop:
     """The loop at one draw of log time constant, dead time, stickband and log gain.
 
     The lag stays within a factor of ten, slope and dead time within three. The draw of gain over time constant is

@@ -18,7 +18,8 @@ from identification.estimation.descent import (
     reaching,
 )
 from identification.estimation.gauss_newton import covariance
-from identification.estimation.window import Fit, Window
+from identification.estimation.model import Fitted
+from identification.estimation.problem import Problem
 from identification.models import Estimate, Pid
 from identification.record import Floats
 from identification.simulation.valve import StemLaw
@@ -68,19 +69,19 @@ DECODED = 0.05
 (slip_beam.py)."""
 
 
-def is_known(fit: Fit, limits: AdviceLimits) -> bool:
+def is_known(fit: Fitted, limits: AdviceLimits) -> bool:
     """Whether the time constant is well inside the window, so that it differs from an integrator's."""
-    return fit.time_constant_s < limits.longest_share * fit.window.duration_s
+    return fit.time_constant_s < limits.longest_share * fit.p.duration_s
 
 
-def lag_factor(fit: Fit, valve: bool, limits: AdviceLimits) -> float | None:
+def lag_factor(fit: Fitted, valve: bool, limits: AdviceLimits) -> float | None:
     """Factor from the time constant to its 90 % limits [-]; None if the record gives only gain over time constant."""
     spread = math.sqrt(max(float(covariance(fit, free_width=valve)[0, 0]), 0.0))
     factor = math.exp(min(NINETY * spread, 20.0))
     return factor if is_known(fit, limits) and factor < limits.most_factor else None
 
 
-def intervals(fit: Fit, valve: bool, limits: AdviceLimits, law: Pid | None = None) -> dict[str, Estimate]:
+def intervals(fit: Fitted, valve: bool, limits: AdviceLimits, law: Pid | None = None) -> dict[str, Estimate]:
     """Estimates of a fit with 90 % intervals from the curvature of the likelihood and the scatter of its scores.
 
     law, the controller, whose moves between the rows of a record are unknown; None: its scan is not faster than they
@@ -89,7 +90,7 @@ def intervals(fit: Fit, valve: bool, limits: AdviceLimits, law: Pid | None = Non
     intervals. proofs/coverage.md gives the coverage of the intervals, proofs/sampling.md that in slow rows.
     """
     whole = covariance(fit, free_width=valve)
-    t, window, unseen = fit.time_constant_s, fit.window, _between_rows(fit, valve, law)
+    t, window, unseen = fit.time_constant_s, fit.p, _between_rows(fit, valve, law)
     factor = lag_factor(fit, valve, limits)
     wider = SLOPE_ALONE if valve and factor is None else 1.0
     spread = wider * np.sqrt(np.maximum(np.diag(whole), 0.0))
@@ -108,7 +109,7 @@ def intervals(fit: Fit, valve: bool, limits: AdviceLimits, law: Pid | None = Non
     late = half_width(late, LEAST_BLOCK * window.dt_s)
     out["dead_time_s"] = _around(fit.process.dead_time_s, late, "s", least=0.0)
     if valve:
-        known = DECODED * fit.valve.stickband if window.decoded else spread[2]
+        known = DECODED * fit.valve.stickband if window.blocks.decoded else spread[2]
         name = "backlash_pct" if fit.valve.slip_jump == 0 else "stickband_pct"
         half = half_width(math.hypot(known, unseen_pct))
         out[name] = _around(fit.valve.stickband, half, "% of OP", least=0.0)
@@ -117,29 +118,29 @@ def intervals(fit: Fit, valve: bool, limits: AdviceLimits, law: Pid | None = Non
     return out
 
 
-def _between_rows(fit: Fit, valve: bool, law: Pid | None) -> BetweenRows:
+def _between_rows(fit: Fitted, valve: bool, law: Pid | None) -> BetweenRows:
     """What OP between the rows of a record adds to the deviations of a fit behind a faulty valve."""
-    if not valve or (fit.window.steps == 1 and scans_per_row(law, fit.window.row_s) == 1):
+    if not valve or (fit.p.blocks.steps == 1 and scans_per_row(law, fit.p.row_s) == 1):
         return BetweenRows(0.0, 0.0, 0.0, 0.0)
     if fit.valve.slip_jump > 0:
         return JUMPS
-    return DRAWN if fit.window.steps > 1 else ALONE
+    return DRAWN if fit.p.blocks.steps > 1 else ALONE
 
 
-def _time_of(width: float, window: Window) -> float:
+def _time_of(width: float, window: Problem) -> float:
     """Time in which OP travels a width [% of OP]: a wider backlash responds later by it [s]."""
-    travel = float(np.abs(np.diff(window.op_blocks)).sum())
+    travel = float(np.abs(np.diff(window.inputs.op)).sum())
     return width * window.duration_s / max(travel, 1e-9)
 
 
-def _lag_wider(fit: Fit, valve: bool) -> float:
+def _lag_wider(fit: Fitted, valve: bool) -> float:
     """Factor on the interval of a time constant; with backlash the deviations are those of its errors."""
     if not valve:
         return INTERVALS_WIDER
     return INTERVALS_WIDER * JUMPING if fit.valve.slip_jump > 0 else 1.0
 
 
-def _jumping(window: Window, valve: StemLaw, found: dict[str, Estimate]) -> dict[str, Estimate]:
+def _jumping(window: Problem, valve: StemLaw, found: dict[str, Estimate]) -> dict[str, Estimate]:
     """Intervals of a valve that jumps, from the uncertainty that PV leaves.
 
     Slip jump from half of the found one to the whole stickband, slope and gain from their product with the jump; a
@@ -161,7 +162,7 @@ def _jumping(window: Window, valve: StemLaw, found: dict[str, Estimate]) -> dict
     return out
 
 
-def slope_deviation(fit: Fit, spread: Floats) -> float:
+def slope_deviation(fit: Fitted, spread: Floats) -> float:
     """Relative deviation of gain over time constant [-], whose errors are correlated; spread, covariance of (log T,
     L, stickband, gain), shape (4, 4)."""
     relative = spread[3, 3] / fit.gain**2 + spread[0, 0] - 2.0 * spread[0, 3] / fit.gain

@@ -21,7 +21,8 @@ from identification.estimation.evidence import (
     trials,
     trials_between_moves,
 )
-from identification.estimation.window import Fit, Window
+from identification.estimation.model import Fitted
+from identification.estimation.problem import Problem
 from identification.models import Fopdt, Loop, Pid
 from identification.record import LoopRecord, Mask
 from identification.signals.phase import UNKNOWN, KeptPhase, kept_phase
@@ -47,9 +48,9 @@ class Measured:
     the period or another time scale of the loop [s].
     """
 
-    linear: Fit
-    play: Fit
-    stick_slip: Fit | None
+    linear: Fitted
+    play: Fitted
+    stick_slip: Fitted | None
     evidence: float
     size: float
     jump: float
@@ -69,9 +70,9 @@ class Measured:
     scale_s: float = 60.0
 
     @property
-    def window(self) -> Window:
+    def window(self) -> Problem:
         """The data of all the fits."""
-        return self.linear.window
+        return self.linear.p
 
     def has_clock(self, limits: CauseLimits) -> bool:
         """Whether a clock outside the loop times the cycle: it keeps its phase over many periods, while OP does not
@@ -117,7 +118,7 @@ def measure(
         scale_s=scale,
     )
     if oscillation is None:
-        if window.position is not None:
+        if window.blocks.position is not None:
             return replace(seen_alone, steady=math.inf)
         alone = not record.mask("idle").any()  # else another loop moves PV too
         return _without_a_cycle(seen_alone, best, linear, due if alone else None)
@@ -132,7 +133,7 @@ def ringing_period(m: Measured, limits: CauseLimits) -> float | None:
     return period_s if ms >= limits.ringing_ms else None
 
 
-def _without_a_cycle(m: Measured, best: Fit, linear: Fit, due: Mask | None) -> Measured:
+def _without_a_cycle(m: Measured, best: Fitted, linear: Fitted, due: Mask | None) -> Measured:
     """Further measures of the stretches between moves of the stem, and of PV's set point responses."""
     shown = trials_between_moves(best, linear)
     asked = 0.0 if due is None else float(gains(best, linear)[due].sum())
@@ -149,7 +150,9 @@ def _kurtosis(record: LoopRecord, error: Spectrum, scale_s: float) -> float:
     return size_kurtosis(whole, whole.duration_s / scale_s, rest[-whole.n :])
 
 
-def _of_a_cycle(m: Measured, best: Fit, linear: Fit, law: Pid | None, error: Spectrum | None) -> Measured:
+def _of_a_cycle(
+    m: Measured, best: Fitted, linear: Fitted, law: Pid | None, error: Spectrum | None
+) -> Measured:
     """Further measures of a cycle of this period: its models under a smooth load, and its regularity in the error."""
     scale = m.scale_s
     found = replace(m, ringing=ringing_of(linear, (best,) if m.evidence > 0.0 else (), law, scale))

@@ -11,7 +11,7 @@ import numpy as np
 from analyzer.loop.decisions import Cause
 from analyzer.loop.oscillation import Oscillations, counting
 from analyzer.loop.quality import Prepared
-from identification.estimation.window import Fit
+from identification.estimation.model import Fitted
 from identification.record import LoopRecord
 from identification.signals.turns import StemMarks, halves, turns_of
 
@@ -97,7 +97,7 @@ def thinned(
     return out | {name: np.logical_and.reduceat(x, edges) for name, x in masks.items()}
 
 
-def _marks(faulty: Fit | None, fit: Fit | None, period_s: float) -> StemMarks:
+def _marks(faulty: Fitted | None, fit: Fitted | None, period_s: float) -> StemMarks:
     """Data for the marks: PV of a slow process does not settle, and the mark begins at the OP reversal."""
     if fit is None:
         return StemMarks(0.0, 0.0, 0.0)

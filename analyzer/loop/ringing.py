@@ -14,8 +14,9 @@ import numpy as np
 
 from analyzer.config import CauseLimits
 from analyzer.loop.decisions import Cause
+from identification.estimation.model import Fitted
+from identification.estimation.problem import Problem
 from identification.estimation.smooth_load import Dynamics, SmoothFit, fit_line, fit_smooth, resonant_starts
-from identification.estimation.window import Fit, Window
 from identification.models import Loop, Pid, Process
 from tuning.frequency_response import controller_response, maximum_sensitivity, resonance_s
 
@@ -164,30 +165,32 @@ def same_period(predicted_s: float, seen_s: float, row_s: float, limits: CauseLi
     return abs(math.log(predicted_s / seen_s)) <= math.log(limits.ringing_period) + row_s / seen_s
 
 
-def between_samples(process: Process, window: Window, controller: Pid) -> Process:
+def between_samples(process: Process, window: Problem, controller: Pid) -> Process:
     """The process as the controller acts on it. The fit holds OP from one sample of the record to the next, while the
     controller moves it between them: half an interval of that hold belongs to the dead time."""
     hold_s = max(window.step_s - controller.scan_s, 0.0)
     return replace(process, dead_time_s=process.dead_time_s + 0.5 * hold_s)
 
 
-def calm_resonance(linear: Fit, controller: Pid | None, scale_s: float) -> tuple[float, float]:
+def calm_resonance(linear: Fitted, controller: Pid | None, scale_s: float) -> tuple[float, float]:
     """Maximum sensitivity [-] of the identified loop of a record without a cycle, and the period [s] of its peak; 1
     without settings, or if they act the wrong way."""
     if controller is None:
         return 1.0, scale_s
-    window, dead_s = linear.window, max(linear.dead_time_s, 0.0)
+    window, dead_s = linear.p, max(linear.dead_time_s, 0.0)
     begins = [(linear.time_constant_s, dead_s), *((f * scale_s, 0.05 * scale_s) for f in (0.05, 0.5, 3.0))]
     smooth = fit_smooth(window, scale_s, [(b, None) for b in begins])
     return _peak(smooth, window, controller, scale_s)
 
 
-def ringing_of(linear: Fit, valves: tuple[Fit, ...], controller: Pid | None, period_s: float) -> Ringing:
+def ringing_of(
+    linear: Fitted, valves: tuple[Fitted, ...], controller: Pid | None, period_s: float
+) -> Ringing:
     """Fits under a smooth load of a loop that cycles at a period [s]; without settings it is not known to ring.
 
     linear, the night's fit with an ideal valve; valves, those with faulty ones that explain PV better.
     """
-    window = linear.window
+    window = linear.p
     law = controller
     begins = [(x.time_constant_s, max(x.dead_time_s, 0.0)) for x in (linear, *valves)]
     begins += [(share * period_s, 0.05 * period_s) for share in (0.3, 2.0)]
@@ -203,7 +206,7 @@ def ringing_of(linear: Fit, valves: tuple[Fit, ...], controller: Pid | None, per
     return Ringing(smooth, lined, ms, rings_s, period_s, line_nat, valve_nat, both_nat, window.row_s)
 
 
-def _resonant(window: Window, period_s: float, law: Pid | None) -> list[tuple[Dynamics, float]]:
+def _resonant(window: Problem, period_s: float, law: Pid | None) -> list[tuple[Dynamics, float]]:
     """Starts at which a loop under a known law rings at the period."""
     if law is None:
         return []
@@ -211,7 +214,7 @@ def _resonant(window: Window, period_s: float, law: Pid | None) -> list[tuple[Dy
     return resonant_starts(window, period_s, complex(controller_response(law, omega)[0]))
 
 
-def _peak(smooth: SmoothFit, window: Window, law: Pid | None, scale_s: float) -> tuple[float, float]:
+def _peak(smooth: SmoothFit, window: Problem, law: Pid | None, scale_s: float) -> tuple[float, float]:
     """Maximum sensitivity [-] of the loop of a fit, and the period [s] of its peak; 1 without a law, or if it acts
     the wrong way."""
     if law is None or law.sign * smooth.process.gain <= 0.0:

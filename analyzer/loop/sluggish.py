@@ -27,7 +27,7 @@ from analyzer.loop.ringing import between_samples
 from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import fit_linear
 from identification.estimation.descent import reaching
-from identification.estimation.window import Fit
+from identification.estimation.model import Fitted
 from identification.models import Estimate, Integrator, Loop, Pid, Process
 from identification.record import LoopRecord
 from tuning.forecast import in_digits
@@ -45,7 +45,7 @@ process: ours, benchmarks/world (seed 635, every 10 s) has 1.4."""
 CLOCKS = (4.0, 16.0)
 """Factors by which the process is identified on a finer clock than the present settings require: SIMC's integral
 times of sluggish loops are that much shorter."""
-Known = tuple[Fit, dict[str, Estimate]]
+Known = tuple[Fitted, dict[str, Estimate]]
 """A fit with the intervals of its constants."""
 
 
@@ -60,7 +60,7 @@ class FasterSettings:
     change: float | None
     travel: float | None
     loop: Loop
-    fit: Fit
+    fit: Fitted
     others: tuple[Loop, ...]
 
 
@@ -125,7 +125,7 @@ def _possible(
     else:
         slope = replace(slope, low=biased * slope.low)
     dead = reaching(known["dead_time_s"], *(other.dead_time_s for other, _ in precise[1:]))
-    process = between_samples(tuned(fit, False, config.advice), fit.window, controller)
+    process = between_samples(tuned(fit, False, config.advice), fit.p, controller)
     return _allowed(process, {"slope_pct_per_s": slope, "dead_time_s": dead})
 
 
@@ -145,7 +145,7 @@ def _fits(record: LoopRecord, controller: Pid | None, kind: str, config: Config)
             fit = fit_linear(window, scale_s / finer)
         except (NotAssessedError, ArithmeticError, ValueError):
             continue
-        if window.sp is not None and fit.slope * controller.kp > 0.0:
+        if window.blocks.sp is not None and fit.slope * controller.kp > 0.0:
             found.append((fit, intervals(fit, False, config.advice)))
     slopes = [known["slope_pct_per_s"] for _, known in found]
     agree = all(a.low <= b.high and b.low <= a.high for a, b in combinations(slopes, 2))
@@ -157,7 +157,7 @@ def _is_precise(x: Known, config: Config) -> bool:
     fit, known = x
     slope, dead, limits = known["slope_pct_per_s"], known["dead_time_s"], config.lanes
     sure = 0.5 * abs(slope.high - slope.low) <= limits.sluggish_unsure * abs(slope.value)
-    return sure and dead.high <= dead.low * limits.sluggish_late + fit.window.dt_s
+    return sure and dead.high <= dead.low * limits.sluggish_late + fit.p.dt_s
 
 
 def _first_step(fits: list[Known], present: Pid, config: Config) -> FasterSettings | None:
@@ -165,7 +165,7 @@ def _first_step(fits: list[Known], present: Pid, config: Config) -> FasterSettin
     allow permit it."""
     if not fits or min(known["slope_pct_per_s"].low * present.kp for _, known in fits) <= 0.0:
         return None
-    likeliest = [between_samples(tuned(fit, False, config.advice), fit.window, present) for fit, _ in fits]
+    likeliest = [between_samples(tuned(fit, False, config.advice), fit.p, present) for fit, _ in fits]
     allowed = [p for x, (_, known) in zip(likeliest, fits, strict=True) for p in _allowed(x, known)]
     try:
         slow = min(abs(simc(p, scan_s=present.scan_s).ki / present.ki) for p in likeliest)
@@ -199,7 +199,9 @@ def _robust(possible: tuple[Process, ...], present: Pid, config: Config) -> Pid 
     return replace(present, kp=rounded(kp), ti_s=rounded(found.ti_s))
 
 
-def _proposed(fit: Fit, allowed: tuple[Process, ...], present: Pid, config: Config) -> FasterSettings | None:
+def _proposed(
+    fit: Fitted, allowed: tuple[Process, ...], present: Pid, config: Config
+) -> FasterSettings | None:
     limits, new = config.lanes, _robust(allowed, present, config)
     if new is None:
         return None
@@ -208,7 +210,7 @@ def _proposed(fit: Fit, allowed: tuple[Process, ...], present: Pid, config: Conf
         return None
     times = new.kp / new.ti_s / present.ki
     load = in_digits(load_of(fit, present))
-    loop = Loop(between_samples(fit.process, fit.window, present), present)  # the loop with this load
+    loop = Loop(between_samples(fit.process, fit.p, present), present)  # the loop with this load
     after, before = (figures(replace(loop, controller=c), load) for c in (new, present))
     travel, change = (a / max(b, 1e-9) - 1.0 for a, b in zip(after, before, strict=True))
     if change > -limits.sluggish_gain:

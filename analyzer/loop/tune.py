@@ -39,7 +39,7 @@ from analyzer.words.reason import sign_in_full
 from analyzer.words.units import number
 from identification.errors import InputError, NotAssessedError
 from identification.estimation.between_samples import scans_per_row
-from identification.estimation.window import Fit
+from identification.estimation.model import Fitted
 from identification.models import Estimate, Loop, Pid, Process, Valve
 from identification.record import Floats, LoopRecord
 from reports.pages import Field, Line, Panels, Picture, Place, Plot
@@ -151,7 +151,7 @@ def tune(
 def _forecast(
     model: Loop,
     new: Pid,
-    fit: Fit,
+    fit: Fitted,
     others: tuple[Loop, ...],
     record: LoopRecord,
     oscillation: Oscillation | None,

@@ -60,7 +60,9 @@ def _profile(m: Measured, noise_widths: float) -> Floats:
     """The profile of widths [nat], its positive part scaled to the evidence that remains after outliers; zero for
     widths under `noise_widths` deviations of OP's noise, which sometimes crosses such a backlash."""
     found = width_profile(m.linear, m.play)
-    crossed = noise_widths * robust_deviation(np.abs(np.diff(m.window.op, 2))) / math.sqrt(6.0) > WIDTHS
+    crossed = (
+        noise_widths * robust_deviation(np.abs(np.diff(m.window.blocks.op, 2))) / math.sqrt(6.0) > WIDTHS
+    )
     found[crossed] = 0.0
     most = float(found.max())
     if most <= 0.0 or most <= m.evidence:

@@ -17,9 +17,10 @@ from analyzer.loop.fit_window import scans_of, whole_window
 from analyzer.loop.measure import Measured
 from identification.estimation.beside_line import BesideLine, beside_line, in_window
 from identification.estimation.between_samples import with_scans
+from identification.estimation.model import Fitted
+from identification.estimation.problem import Problem
 from identification.estimation.search import Dynamics
 from identification.estimation.smooth_load import as_fit
-from identification.estimation.window import Fit, Window
 from identification.mismatch.recording import held_move
 from identification.record import LoopRecord
 
@@ -68,7 +69,7 @@ class WornValve:
         """Whether the whole record is likelier with the fault than with an ideal valve, under a load with real poles:
         a free noise model of one stretch can take over the process at a single move of the set point. True if the
         whole record cannot answer."""
-        return self.measured.window.position is not None or self._is_thin or self.found.evidence > 0.0
+        return self.measured.window.blocks.position is not None or self._is_thin or self.found.evidence > 0.0
 
     @property
     def shown(self) -> tuple[Fault, Measured]:
@@ -79,12 +80,12 @@ class WornValve:
             return Fault.BACKLASH, told
         return Fault.STICTION, replace(told, stick_slip=valve)
 
-    def _fits(self) -> tuple[Fit, Fit]:
+    def _fits(self) -> tuple[Fitted, Fitted]:
         """Process alone and behind the faulty valve. If the cycle of OP crosses the backlash it is fitted in the
         stretch of the measures, whose blocks are shorter: longer ones give a width that is too small."""
         m, found = self.measured, self.found
         if found.play.valve.stickband > self.limits.widest * m.window.reach:
-            return as_fit(found.sound, found.play.window), found.play
+            return as_fit(found.sound, found.play.p), found.play
         return m.linear, as_fit(in_window(found, m.window, self.period_s), m.window)
 
     @property
@@ -92,7 +93,7 @@ class WornValve:
         """Whether the record cannot answer: its stem is recorded, the load was not compared, OP swings from limit to
         limit, few blocks are good, or the loop rings with few samples a cycle."""
         m, limits = self.measured, self.limits
-        if m.ringing is None or m.window.position is not None or m.window.cycle_range >= WHOLE_PCT:
+        if m.ringing is None or m.window.blocks.position is not None or m.window.cycle_range >= WHOLE_PCT:
             return True
         if self._is_thin or self.is_held:
             return True
@@ -116,18 +117,18 @@ class WornValve:
         m, play = self.measured, self.found.play
         right_way = m.controller is None or m.controller.sign * play.gain > 0.0
         width = play.valve.stickband
-        crossed = width <= self.limits.widest * play.window.op_range
+        crossed = width <= self.limits.widest * play.p.op_range
         return right_way and crossed and width >= self.limits.beside_size * m.window.reach
 
     @cached_property
-    def _window(self) -> Window:
+    def _window(self) -> Problem:
         """The whole record, with OP at the controller's scan if the measures have it there."""
         m = self.measured
         window = whole_window(self.record, m.window, BLOCKS, self.period_s)
-        scans = None if m.window.steps == 1 else scans_of(self.record, window, m.controller)
+        scans = None if m.window.blocks.steps == 1 else scans_of(self.record, window, m.controller)
         if scans is None:
             return window
-        return with_scans(replace(m.play, window=window), scans, SEARCHED).window
+        return with_scans(replace(m.play, p=window), scans, SEARCHED).p
 
     def _starts(self) -> list[Dynamics]:
         """Time constants and dead times [s] at which the search begins."""

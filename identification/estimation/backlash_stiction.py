@@ -11,7 +11,9 @@ import numpy as np
 from numba import njit
 
 from identification.estimation.gauss_newton import descend
+from identification.estimation.model import Fitted, start_at
 from identification.estimation.noise import generic_noise
+from identification.estimation.problem import Problem, stem_blocks
 from identification.estimation.search import (
     Dynamics,
     Products,
@@ -27,7 +29,6 @@ from identification.estimation.search import (
     white_pv,
     whitened_stem,
 )
-from identification.estimation.window import Fit, Window, stem_blocks
 from identification.record import Floats
 from identification.simulation.lag import Lag, respond, unit_lag
 from identification.simulation.valve import HALTS, IDEAL, RESTS, SLIDES, StemLaw, sticking
@@ -86,7 +87,7 @@ REFINED_WORTH = 5.0
 """Gain of one time from which it is repeated [nat]: as a slip jump has to bring (cause.evidence_jump)."""
 
 
-def fit_linear(window: Window, period_s: float) -> Fit:
+def fit_linear(window: Problem, period_s: float) -> Fitted:
     """Fit the process behind an ideal valve.
 
     period_s : period of the oscillation, or another time scale of the loop [s], about which the search begins.
@@ -97,38 +98,39 @@ def fit_linear(window: Window, period_s: float) -> Fit:
 
 
 def _ranked(
-    window: Window, ar: Floats, valves: list[StemLaw], begins: list[Dynamics], halvings: int = 2
-) -> list[Fit]:
+    window: Problem, ar: Floats, valves: list[StemLaw], begins: list[Dynamics], halvings: int = 2
+) -> list[Fitted]:
     """Starts for the descent: each valve with its best dynamics under one noise model, best first."""
     trials, pv = [], white_pv(window, ar)
     for valve in valves:
         (t, dead), sigma2, count, beta = search(behind(pv, valve), begins, halvings)
-        base = np.array([beta[1], beta[2], 0.0, 0.0])
-        trials.append(Fit(float(beta[0]), t, dead, valve, sigma2, count, ar, base, window))
-    return sorted(trials, key=lambda fit: fit.sigma2)
+        fit = start_at(window, float(beta[0]), (t, dead), valve, ar)
+        slow = np.array([beta[1], beta[2], 0.0, 0.0])
+        trials.append(replace(fit, loss=sigma2, count=count, slow=slow))
+    return sorted(trials, key=lambda fit: fit.loss)
 
 
-def _chosen(near: Fit, valves: list[StemLaw], period_s: float, followed: int) -> list[Fit]:
+def _chosen(near: Fitted, valves: list[StemLaw], period_s: float, followed: int) -> list[Fitted]:
     """The best few of the given valves under each of two noise models."""
-    begins = [(near.time_constant_s, near.dead_time_s), *starts(near.window, period_s)]
+    begins = [(near.time_constant_s, near.dead_time_s), *starts(near.p, period_s)]
     noises = generic_noise(), near.ar
-    return [fit for ar in noises for fit in _ranked(near.window, ar, valves, begins)[:followed]]
+    return [fit for ar in noises for fit in _ranked(near.p, ar, valves, begins)[:followed]]
 
 
-def _likeliest(fits: list[Fit]) -> Fit:
+def _likeliest(fits: list[Fitted]) -> Fitted:
     """Descend from each fit, and return the result with the highest likelihood."""
     ends = (descend(fit, free_width=True) for fit in fits)
     return max(ends, key=lambda fit: fit.log_likelihood)
 
 
-def fit_play(linear: Fit, period_s: float, hopeful: float | None = None) -> Fit:
+def fit_play(linear: Fitted, period_s: float, hopeful: float | None = None) -> Fitted:
     """The best backlash followed by a lag: a screening, then the full search if the screening finds anything.
 
     linear : the best fit behind an ideal valve; period_s : time scale of the search [s]; hopeful : gain in log
     likelihood [nat] of a quick screening above which the full search follows; None: the screening is thorough and the
     limit is SCREENED.
     """
-    window = linear.window
+    window = linear.p
     reach = window.reach
     screened = [sticking(share * reach, 0.0) for share in SCREEN_SHARES]
     followed = len(screened) if hopeful is None else 1
@@ -143,17 +145,17 @@ def fit_play(linear: Fit, period_s: float, hopeful: float | None = None) -> Fit:
     return max(best, _likeliest(begun), key=lambda fit: fit.log_likelihood)
 
 
-def better_linear(linear: Fit, play: Fit) -> Fit:
+def better_linear(linear: Fitted, play: Fitted) -> Fitted:
     """The better of the linear fit and a linear fit that starts from the dynamics found behind backlash.
 
     An ideal valve is backlash of width zero, so this start makes the comparison fair. If both are equally likely, the
     linear fit from its own search is returned.
     """
-    trial = descend(replace(play, valve=IDEAL))
+    trial = descend(play.moved(valve=IDEAL))
     return trial if trial.log_likelihood > linear.log_likelihood + CLEAR else linear
 
 
-def fit_stick_slip(play: Fit, period_s: float) -> Fit:
+def fit_stick_slip(play: Fitted, period_s: float) -> Fitted:
     """The best stick-slip (J > 0) followed by a lag: a coarse scan of the whole range and a fine scan near the
     backlash.
 
@@ -161,14 +163,14 @@ def fit_stick_slip(play: Fit, period_s: float) -> Fit:
     to half as wide again where the slip jump is most of the stickband; narrower bands have their own finalists.
     period_s : time scale of the search [s].
     """
-    short = play.window.y.size < SHORT
+    short = play.p.y.size < SHORT
     begun = _chosen(play, _coarse(play), period_s, FOLLOWED_SHORT if short else FOLLOWED)
     narrow, laws = _grid(NARROW_WIDTHS, FINE_JUMPS), (RESTS, HALTS, SLIDES)
     fits = [_likeliest(begun), *pits(play, laws), *pits(play, laws, narrow)]
     return refined(max(fits, key=lambda fit: fit.log_likelihood))
 
 
-def refined(fit: Fit) -> Fit:
+def refined(fit: Fitted) -> Fitted:
     """The most likely stick-slip near a given one. Minima in stickband and slip jump are about 1 % wide, so a scan
     that uses time constant and dead time of the backlash fit misses the deepest one."""
     for _ in range(REFINED_MOST):
@@ -189,9 +191,9 @@ def _grid(widths: tuple[float, ...], jumps: tuple[float, ...]) -> Floats:
     return np.array(list(product(np.arange(*widths), np.arange(*jumps))))
 
 
-def _coarse(play: Fit) -> list[StemLaw]:
+def _coarse(play: Fitted) -> list[StemLaw]:
     """Stickbands up to the range of OP, with stems that rest and stems that slide."""
-    reach = play.window.reach
+    reach = play.p.reach
     near = play.valve.stickband / reach
     widths = {round(s, 4) for s in MIDDLE + LARGE} | {near, 1.1 * near}
     return [
@@ -203,8 +205,8 @@ def _coarse(play: Fit) -> list[StemLaw]:
 
 
 def pits(
-    play: Fit, tolerances: tuple[float, ...], grid: Floats | None = None, later: tuple[float, ...] = LATER
-) -> list[Fit]:
+    play: Fitted, tolerances: tuple[float, ...], grid: Floats | None = None, later: tuple[float, ...] = LATER
+) -> list[Fitted]:
     """The most likely stick-slips near a backlash or another stick-slip: local minima of the best few of each
     behaviour.
 
@@ -212,7 +214,7 @@ def pits(
     grid : shape (m, 2), stickbands as multiples of the backlash width and slip jumps as shares of the stickband;
     later : dead times added to that of the backlash fit [blocks].
     """
-    window = play.window
+    window = play.p
     pairs = np.array([play.valve.stickband, 1.0]) * (_grid(FINE_WIDTHS, FINE_JUMPS) if grid is None else grid)
     t, deads = play.time_constant_s, np.maximum(play.dead_time_s + np.array(later) * window.dt_s, 0.0)
     out, pv, begins = [], white_pv(window, generic_noise()), [(t, float(dead)) for dead in deads]
@@ -225,11 +227,11 @@ def pits(
     return [_bottom(fit) for fit in likeliest]
 
 
-def _bottom(fit: Fit) -> Fit:
+def _bottom(fit: Fitted) -> Fitted:
     """Move stickband and slip jump to their local minimum, then descend in the other constants."""
     dynamics = fit.time_constant_s, fit.dead_time_s
-    valve = settled(white_pv(fit.window, fit.ar), fit.valve, fit.sigma2, dynamics)
-    return descend(replace(fit, valve=valve))
+    valve = settled(white_pv(fit.p, fit.ar), fit.valve, fit.loss, dynamics)
+    return descend(fit.moved(valve=valve))
 
 
 @njit(cache=True)
@@ -284,7 +286,7 @@ WIDTHS = np.geomspace(0.1, 60.0, 29)
 of a positioner to a valve whose linkage is loose."""
 
 
-def width_profile(linear: Fit, play: Fit) -> Floats:
+def width_profile(linear: Fitted, play: Fitted) -> Floats:
     """Log likelihood of backlash at each of WIDTHS over that of an ideal valve [nat], shape of WIDTHS.
 
     Each width has its best process, under the better of two noise models: that of the backlash fit and the generic
@@ -293,9 +295,9 @@ def width_profile(linear: Fit, play: Fit) -> Floats:
 
     linear, play : the fits to one window behind an ideal valve and behind the best backlash.
     """
-    window = linear.window
-    blocks = replace(window, position=None)
-    out, reach = np.zeros(WIDTHS.size), float(np.ptp(window.op))
+    window = linear.p
+    blocks = window.with_blocks(position=None)
+    out, reach = np.zeros(WIDTHS.size), float(np.ptp(window.blocks.op))
     asked = np.flatnonzero((WIDTH_SEEN * reach < WIDTHS) & (WIDTH_WHOLE * reach > WIDTHS))
     if asked.size == 0:
         return out
@@ -313,17 +315,17 @@ def width_profile(linear: Fit, play: Fit) -> Floats:
     return out
 
 
-def _ideal(window: Window, linear: Fit, play: Fit, ar: Floats) -> float:
+def _ideal(window: Problem, linear: Fitted, play: Fitted, ar: Floats) -> float:
     """Innovations variance behind an ideal valve under one noise model."""
     begins = [_dynamics(linear), _dynamics(play)]
     return search(behind(white_pv(window, ar), IDEAL), begins, PROFILE_HALVINGS)[1]
 
 
-def _dynamics(fit: Fit) -> Dynamics:
+def _dynamics(fit: Fitted) -> Dynamics:
     return fit.time_constant_s, fit.dead_time_s
 
 
-def _swept(pv: WhitePv, widths: Floats, play: Fit) -> Floats:
+def _swept(pv: WhitePv, widths: Floats, play: Fitted) -> Floats:
     """Innovations variance behind backlash of increasing widths, computed from the best width outwards both ways."""
     out = np.empty(widths.size)
     first = int(np.argmin(np.abs(np.log(widths / max(play.valve.stickband, 1e-3)))))

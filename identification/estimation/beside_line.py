@@ -16,9 +16,10 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from identification.estimation.evidence import Trials, agreement_of
+from identification.estimation.model import Fitted
+from identification.estimation.problem import Problem
 from identification.estimation.search import Dynamics
 from identification.estimation.smooth_load import SmoothFit, as_fit, fit_line, innovations_of, with_harmonics
-from identification.estimation.window import Fit, Window
 from identification.record import Floats
 from identification.signals.robust import clipped_gain
 from identification.signals.turns import turns_of
@@ -37,7 +38,7 @@ class BesideLine:
     """The joint model: the fit of its process and backlash, `worn`, and the likeliest with an ideal valve, `sound`,
     and the gain in log likelihood of the first in each half-cycle [nat], shape (t,), outliers limited."""
 
-    play: Fit
+    play: Fitted
     worn: SmoothFit
     sound: SmoothFit
     gained: Floats
@@ -54,7 +55,7 @@ class BesideLine:
 
 
 def beside_line(
-    window: Window, begins: Sequence[Dynamics], valves: Sequence[StemLaw], period_s: float
+    window: Problem, begins: Sequence[Dynamics], valves: Sequence[StemLaw], period_s: float
 ) -> BesideLine:
     """Backlash under a load with a line of a period [s].
 
@@ -69,7 +70,7 @@ def beside_line(
     return BesideLine(as_fit(worn, window), worn, sound, _gained(worn, sound, window, period_s))
 
 
-def with_width(near: SmoothFit, window: Window, period_s: float) -> SmoothFit:
+def with_width(near: SmoothFit, window: Problem, period_s: float) -> SmoothFit:
     """The fit behind backlash, or stick-slip of the same shape, with its width refined in a window."""
     jump_share, at = near.law.slip_jump / near.law.stickband, math.log(near.law.stickband)
 
@@ -85,7 +86,7 @@ def with_width(near: SmoothFit, window: Window, period_s: float) -> SmoothFit:
     return max((near, behind(float(best.x))), key=_likelihood)
 
 
-def in_window(found: BesideLine, window: Window, period_s: float) -> SmoothFit:
+def in_window(found: BesideLine, window: Problem, period_s: float) -> SmoothFit:
     """The joint model behind a faulty valve fitted anew in another window, with its width refined."""
     process = found.worn.process
     begins = [(process.time_constant_s, max(process.dead_time_s - window.half_block_s, 0.0))]
@@ -96,16 +97,16 @@ def _likelihood(fit: SmoothFit) -> float:
     return fit.log_likelihood
 
 
-def _sound(window: Window, worn: SmoothFit, near: SmoothFit, period_s: float) -> SmoothFit:
+def _sound(window: Problem, worn: SmoothFit, near: SmoothFit, period_s: float) -> SmoothFit:
     """The likeliest fit with an ideal valve, whose load may have harmonics."""
     lined = fit_line(window, period_s, (near, worn), (), IDEAL)
     return max((lined, with_harmonics(lined, window, period_s)), key=_likelihood)
 
 
-def _gained(worn: SmoothFit, sound: SmoothFit, window: Window, period_s: float) -> Floats:
+def _gained(worn: SmoothFit, sound: SmoothFit, window: Problem, period_s: float) -> Floats:
     """Gain in log likelihood of the first in each half-cycle of OP [nat], outliers limited."""
     at, mine = innovations_of(worn, window, period_s)
     gained: Floats = np.zeros(window.y.size)
     gained[at] = clipped_gain(mine, innovations_of(sound, window, period_s)[1])
-    turns = turns_of(window.op_blocks, period_s / window.dt_s)
+    turns = turns_of(window.inputs.op, period_s / window.dt_s)
     return np.asarray(np.add.reduceat(gained, turns)[:-1]) if turns.size > 1 else gained.sum(keepdims=True)

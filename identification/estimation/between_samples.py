@@ -9,14 +9,13 @@ before its time; otherwise OP would react to PV before PV moves, and no dead tim
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from identification.estimation.gauss_newton import descend
-from identification.estimation.window import Fit
+from identification.estimation.model import Fitted
 from identification.models import Pid
 from identification.record import Floats
 from identification.simulation.lag import Lag, stepped, unit_lag
@@ -69,7 +68,7 @@ def scans_per_row(law: Pid | None, row_s: float) -> int:
     return max(round(row_s / law.scan_s), 1)
 
 
-def settled(fit: Fit, scans: Scans) -> Fit:
+def settled(fit: Fitted, scans: Scans) -> Fitted:
     """Fit the model and the OP between rows alternately; return the most likely fit."""
     best = None
     for _ in range(ROUNDS):
@@ -78,20 +77,20 @@ def settled(fit: Fit, scans: Scans) -> Fit:
     return best or fit
 
 
-def with_scans(fit: Fit, scans: Scans, count: int = PATHS) -> Fit:
+def with_scans(fit: Fitted, scans: Scans, count: int = PATHS) -> Fitted:
     """A fit whose window has `count` paths of OP at the controller's scan, simulated by its model."""
-    window, paths = fit.window, op_at_scans(fit, scans, count)
-    turn = window.turn // window.steps * scans.per_row
-    return replace(fit, window=replace(window, op=paths[0], paths=paths, steps=scans.per_row, turn=turn))
+    window, paths = fit.p, op_at_scans(fit, scans, count)
+    turn = window.blocks.turn // window.blocks.steps * scans.per_row
+    return fit.within(op=paths[0], paths=paths, steps=scans.per_row, turn=turn)
 
 
-def op_at_scans(fit: Fit, scans: Scans, paths: int = PATHS) -> Floats:
+def op_at_scans(fit: Fitted, scans: Scans, paths: int = PATHS) -> Floats:
     """An even number of equally probable paths of OP at every scan [% OP], shape (paths, n * scans): the recorded OP
     at each row and, between rows, the control law on simulated PV with its own noise. The noise has a fixed seed;
     each draw is used with both signs.
     """
     rows, count = scans.rows, scans.per_row
-    step_s, process = fit.window.row_s / count, fit.process
+    step_s, process = fit.p.row_s / count, fit.process
     lag = unit_lag(process.time_constant_s, max(process.dead_time_s, 0.0), step_s)
     valve = StemLaw(*(float(x) for x in fit.valve))
     loop = LoopAtScan(per_scan(scans.law, step_s), valve, lag, process.gain)

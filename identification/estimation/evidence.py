@@ -9,8 +9,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from identification.estimation.gauss_newton import descend, innovations
+from identification.estimation.model import Fitted
 from identification.estimation.noise import judged
-from identification.estimation.window import Fit, stem_of
+from identification.estimation.problem import stem_of
 from identification.record import Floats, Mask
 from identification.signals.robust import clipped_gain
 from identification.signals.turns import turns_of
@@ -24,24 +25,24 @@ SECOND_LAGS = (0.1, 0.2, 0.4, 0.7)
 second lag is dead time (the rule of the half, Skogestad 2003), the other half belongs to the first lag."""
 
 
-def evidence(ours: Fit, theirs: Fit) -> float:
+def evidence(ours: Fitted, theirs: Fitted) -> float:
     """Gain in log likelihood [nat] of one fit over another, with the innovations of outliers limited."""
     return float(clipped_gain(innovations(ours), innovations(theirs)).sum())
 
 
-def moves_begun(fit: Fit) -> np.ndarray:
+def moves_begun(fit: Fitted) -> np.ndarray:
     """Blocks at which the stem of a valve starts to move or reverses, shape (m,)."""
-    moved = np.sign(np.diff(stem_of(fit.window.stems_in_blocks, fit.valve)))
+    moved = np.sign(np.diff(stem_of(fit.p.stems_in_blocks, fit.valve)))
     set_out = np.concatenate(([0.0], moved))
     return np.flatnonzero((set_out[1:] != set_out[:-1]) & (set_out[1:] != 0))
 
 
-def stem_moves(fit: Fit) -> int:
+def stem_moves(fit: Fitted) -> int:
     """Number of times that the stem of a valve starts to move or reverses."""
     return int(moves_begun(fit).size)
 
 
-def with_load_step(fit: Fit, answering: Mask, noise: Floats) -> Fit:
+def with_load_step(fit: Fitted, answering: Mask, noise: Floats) -> Fitted:
     """The linear fit with one step of the load at its largest innovation, if the gain exceeds its penalty.
 
     A single slip of a stem and a single step of the load are indistinguishable; only a slip that also explains why
@@ -49,18 +50,18 @@ def with_load_step(fit: Fit, answering: Mask, noise: Floats) -> Fit:
     (`answering`, bool, shape (n,)) a step is not attributed to the load. `noise` is the noise model of the candidate,
     shape (p,), and a second start: a noise model fitted across the step is nearly an integrator.
     """
-    counts = judged(fit.window.usable, fit.ar.size)
+    counts = judged(fit.p.usable, fit.ar.size)
     white = np.where(answering[counts], 0.0, np.abs(innovations(fit)))
     if white.size < 50:
         return fit
     at = int(np.flatnonzero(counts)[int(np.argmax(white))])
-    stepped = replace(fit, window=replace(fit.window, step_at=at))
+    stepped = fit.within(step_at=at)
     tried = descend(stepped), descend(replace(stepped, ar=noise))
     trial = max(tried, key=lambda f: f.log_likelihood)
     return trial if trial.log_likelihood - fit.log_likelihood > STEP_PENALTY else fit
 
 
-def with_second_lag(fit: Fit) -> Fit:
+def with_second_lag(fit: Fitted) -> Fitted:
     """The linear fit behind a second lag on OP, if the gain exceeds the penalty of its constant.
 
     Backlash takes the small fast moves out of OP, as a lag does. Where OP moves much within a block, as under the set
@@ -68,15 +69,15 @@ def with_second_lag(fit: Fit) -> Fit:
     fault: of a sound valve of benchmarks/world (seed 661) by 103 nat, where a second lag explains 533 nat. Of 27 worn
     ones (seed 662) a second lag explains 50 nat at most but for one, backlash 73 to 1,600.
     """
-    window, step_s = fit.window, fit.window.step_s
+    window, step_s = fit.p, fit.p.step_s
     longest_s = max(window.dt_s, fit.dead_time_s)
-    paths = window.op[None] if window.paths is None else window.paths
+    paths = window.blocks.op[None] if window.blocks.paths is None else window.blocks.paths
     best = fit
     for share in SECOND_LAGS:
         kept = math.exp(-step_s / (share * longest_s))
         late = lfilter([1.0 - kept], [1.0, -kept], paths, zi=kept * paths[:, :1])[0]
-        behind = replace(window, op=late[0], paths=None if window.paths is None else late)
-        trial = descend(replace(fit, window=behind))
+        paths_behind = None if window.blocks.paths is None else late
+        trial = descend(fit.within(op=late[0], paths=paths_behind))
         best = max(best, trial, key=lambda x: x.log_likelihood)
     return best if best.log_likelihood - fit.log_likelihood > STEP_PENALTY else fit
 
@@ -98,17 +99,17 @@ class Trials:
         return (2.0 * self.agreeing - 1.0) * math.sqrt(self.count)
 
 
-def gains(ours: Fit, theirs: Fit) -> Floats:
+def gains(ours: Fitted, theirs: Fitted) -> Floats:
     """Gain in log likelihood of one fit over another at every block [nat], shape (n,), outliers limited."""
-    out = np.zeros(ours.window.y.size)
-    out[judged(ours.window.usable, ours.ar.size)] = clipped_gain(innovations(ours), innovations(theirs))
+    out = np.zeros(ours.p.y.size)
+    out[judged(ours.p.usable, ours.ar.size)] = clipped_gain(innovations(ours), innovations(theirs))
     return out
 
 
-def trials(ours: Fit, theirs: Fit, period_s: float) -> Trials | None:
+def trials(ours: Fitted, theirs: Fitted, period_s: float) -> Trials | None:
     """Agreement of the stretches between OP reversals that one fit explains PV better; None with fewer than four."""
-    window = ours.window
-    at = turns_of(window.op_blocks, period_s / window.dt_s)
+    window = ours.p
+    at = turns_of(window.inputs.op, period_s / window.dt_s)
     if at.size < 5:
         return None
     return agreement_of(np.add.reduceat(gains(ours, theirs), at)[:-1])
@@ -124,7 +125,7 @@ def agreement_of(gained: Floats) -> Trials:
     return Trials(gained.size, float((gained > 0).mean()), float(gained.mean()) / max(spread, 1e-9))
 
 
-def trials_between_moves(ours: Fit, theirs: Fit) -> Trials | None:
+def trials_between_moves(ours: Fitted, theirs: Fitted) -> Trials | None:
     """Agreement of the stretches between stem moves of our fit, for a loop without cycles; None without a move. A
     load ramp opposed by OP resembles a resting stem once, but not repeatedly."""
     at = moves_begun(ours)

@@ -8,6 +8,7 @@ the load's step, and the noise model of single lags. The residual is that of `ex
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,8 +17,9 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from identification.estimation.descent import Descent, down, inverse, scattered
+from identification.estimation.model import Fitted
 from identification.estimation.noise import every_lag, judged, whitened
-from identification.estimation.window import Fit, Stems, stem_of
+from identification.estimation.problem import Stems, stem_of
 from identification.record import Floats
 from identification.simulation.lag import respond, respond_together, unit_lag
 from identification.simulation.valve import StemLaw, sticking
@@ -182,43 +184,43 @@ def _descend(b: _Bench, theta: Floats, valve: StemLaw, rule: Descent) -> _Point:
     return down(b, _point(b, theta, valve), _curved, _stepped, rule)  # type: ignore[no-any-return]
 
 
-def _at(fit: Fit, free_width: bool = False) -> tuple[_Bench, Floats, StemLaw]:
+def _at(fit: Fitted, free_width: bool = False) -> tuple[_Bench, Floats, StemLaw]:
     """State of a fit in the kernels' types: the data that its descent shares, its constants and its valve."""
-    window, (most_t, most_dead) = fit.window, fit.window.bounds
-    factor, least_dead = (window.factor, -window.half_block_s) if window.fine else (1, 0.0)
+    window, (most_t, most_dead), valve = fit.p, fit.p.bounds, fit.valve
+    factor, least_dead = (window.blocks.factor, -window.half_block_s) if window.blocks.fine else (1, 0.0)
     ranges = math.log(0.05 * window.dt_s), math.log(most_t), least_dead, most_dead
     at = np.flatnonzero(judged(window.usable, fit.ar.size))
     y, extra = window.centred, window.extra
     bench = _Bench(y, window.stems, extra, at, free_width, window.dt_s, factor, ranges)
-    head = [math.log(fit.time_constant_s), fit.dead_time_s, fit.valve.stickband, fit.gain]
-    return bench, np.concatenate((head, fit.base, fit.ar)), StemLaw(*(float(x) for x in fit.valve))
+    head = [math.log(fit.time_constant_s), fit.dead_time_s, valve.stickband, fit.gain]
+    return bench, np.concatenate((head, fit.slow, fit.ar)), StemLaw(*(float(x) for x in valve))
 
 
-def innovations(fit: Fit) -> Floats:
+def innovations(fit: Fitted) -> Floats:
     """Innovations of a fit at the samples judged [% PV]."""
     return _point(*_at(fit)).e
 
 
-def disturbance(fit: Fit) -> Floats:
+def disturbance(fit: Fitted) -> Floats:
     """PV less the whole model, slow terms included [% PV], shape (n,)."""
     return _point(*_at(fit)).r
 
 
-def residual(fit: Fit) -> Floats:
+def residual(fit: Fitted) -> Floats:
     """PV less the response to the stem [% PV], shape (n,): load and noise, including the model's slow terms.
 
     In a fine window the response is computed at the record's own interval and then averaged over blocks, as PV was.
     """
-    return np.asarray(fit.window.centred - fit.gain * _point(*_at(fit)).x)
+    return np.asarray(fit.p.centred - fit.gain * _point(*_at(fit)).x)
 
 
-def slow_terms(fit: Fit) -> Floats:
+def slow_terms(fit: Fitted) -> Floats:
     """Mean, trend, decay and step of PV in a fit [% PV], shape (n,)."""
     point = _point(*_at(fit))
-    return np.asarray(fit.window.centred - fit.gain * point.x - point.r)
+    return np.asarray(fit.p.centred - fit.gain * point.x - point.r)
 
 
-def covariance(fit: Fit, free_width: bool = False) -> Floats:
+def covariance(fit: Fitted, free_width: bool = False) -> Floats:
     """Covariance of (log T, L, stickband, gain) at a fit, shape (4, 4); zero for fixed constants.
 
     It includes the uncertainty from the noise model and the slow terms (descent.py).
@@ -234,7 +236,7 @@ def covariance(fit: Fit, free_width: bool = False) -> Floats:
     return out[:4, :4]
 
 
-def descend(fit: Fit, free_width: bool = False) -> Fit:
+def descend(fit: Fitted, free_width: bool = False) -> Fitted:
     """Move all constants of a model jointly to the smallest innovations variance, by damped Gauss-Newton steps.
 
     Time constant, dead time, gain, slow terms, the noise model and, with `free_width`, the stickband move together,
@@ -243,7 +245,7 @@ def descend(fit: Fit, free_width: bool = False) -> Fit:
     b, theta, valve = _at(fit, free_width)
     rule = Descent(ITERATIONS, ITERATIONS, b.at.size, SETTLED, 10.0, 5.0, ITERATIONS)
     best = _descend(b, theta, valve, rule)
-    head, base, ar = np.split(best.theta, (4, BASE))
-    gain, t, dead = float(head[3]), math.exp(head[0]), float(head[1])
-    valve, sigma2 = StemLaw(*best.valve), max(best.loss, 1e-14)
-    return Fit(gain, t, dead, valve, sigma2, int(best.e.size), ar.copy(), base.copy(), fit.window)
+    head, slow, ar = np.split(best.theta, (4, BASE))
+    valve, t, dead = StemLaw(*best.valve), math.exp(head[0]), float(head[1])
+    end = fit.moved(gain=float(head[3]), time_constant_s=t, dead_time_s=dead, valve=valve)
+    return replace(end, loss=max(best.loss, 1e-14), count=int(best.e.size), ar=ar.copy(), slow=slow.copy())

@@ -11,9 +11,9 @@ import numpy as np
 from identification.estimation.descent import compass
 from identification.estimation.evidence import evidence
 from identification.estimation.gauss_newton import descend, disturbance, residual, slow_terms
+from identification.estimation.model import Fitted
 from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.slip_beam import Noise, Response, SlipDistances, decoded, log_chance
-from identification.estimation.window import Fit
 from identification.record import Floats
 from identification.simulation.lag import unit_lag
 from identification.simulation.valve import StemLaw, sticking
@@ -61,13 +61,13 @@ Gains = dict[tuple[float, float], float]
 class SlipPath(NamedTuple):
     """The fit behind a decoded stem, held in its window like a recorded one, and its slips' log probability."""
 
-    fit: Fit
+    fit: Fitted
     chance: float
 
     @property
     def mean(self) -> float:
         """Mean of the stem [% OP]."""
-        return float(np.mean(self.fit.window.position))  # type: ignore[arg-type]
+        return float(np.mean(self.fit.p.blocks.position))  # type: ignore[arg-type]
 
     @property
     def worth(self) -> float:
@@ -89,48 +89,48 @@ class _Trial:
 
 
 def _decoded(
-    fit: Fit, mean: float, law: StemLaw, rest: int, noise: Noise, most: int, least: float = -math.inf
+    fit: Fitted, mean: float, law: StemLaw, rest: int, noise: Noise, most: int, least: float = -math.inf
 ) -> tuple[Floats, float]:
     """The most probable stem under a fit, and its log probability; none where that is below `least`.
 
     mean : of the stem [% OP]; law, rest : friction and its longest rest [samples]; most : number of parallel paths.
     """
-    window = fit.window
+    window = fit.p
     lag = unit_lag(fit.time_constant_s, fit.process.dead_time_s, window.step_s)
     r = Response(lag, fit.gain, slow_terms(fit) - fit.gain * mean)
     f, counts = SlipDistances(law.breakaway, law.sliding, rest), judged(window.usable, noise.ar.size)
-    return decoded(window.op, window.centred, counts, r, noise, f, most, least)
+    return decoded(window.blocks.op, window.centred, counts, r, noise, f, most, least)
 
 
 def _slips(stem: Floats) -> int:
     return int((np.diff(stem) != 0).sum())
 
 
-def _gain(play: Fit, band: float, share: float, half: int) -> float:
+def _gain(play: Fitted, band: float, share: float, half: int) -> float:
     """The gain at which a friction's slips move PV as far in half a period (`half` blocks) as PV moves.
 
     0 unless it is far smaller than the gain of the backlash fit.
     """
-    centred = play.window.centred
-    stem = residual(replace(play, valve=sticking(band, share), gain=-1.0)) - centred
+    centred = play.p.centred
+    stem = residual(play.moved(valve=sticking(band, share), gain=-1.0)) - centred
     moved = (float(np.std(x[half:] - x[:-half])) if 0 < half < x.size else 0.0 for x in (centred, stem))
     pv, swing = moved
     found = math.copysign(pv / swing, play.gain) if swing > 0.0 else 0.0
     return found if abs(found) < abs(play.gain) / ABSURD else 0.0
 
 
-def _screened(play: Fit, noise: Floats, rest: int, gains: Gains) -> list[_Trial]:
+def _screened(play: Fitted, noise: Floats, rest: int, gains: Gains) -> list[_Trial]:
     """Promising frictions and dead times near a backlash fit, each with its decoded stem, best first, under a
     separate noise model."""
-    window = play.window
+    window = play.p
     e = whitened(disturbance(play), noise, every_lag(noise.size))[noise.size :]
     sigma2 = float(np.mean(e[window.usable[noise.size :]] ** 2))
-    mean, out = float(play_stem(window.op, play.valve.stickband).mean()), list[_Trial]()
+    mean, out = float(play_stem(window.blocks.op, play.valve.stickband).mean()), list[_Trial]()
     for later in LATER:
         for (width, share), gain in gains.items():
             if gain:
                 band = width * play.valve.stickband
-                fit = replace(play, dead_time_s=play.dead_time_s + later * window.dt_s, gain=gain)
+                fit = play.moved(dead_time_s=play.dead_time_s + later * window.dt_s, gain=gain)
                 law, least = sticking(band, share), _bound(out, band, share)
                 path, score = _decoded(fit, mean, law, rest, Noise(noise, sigma2), SCREENED, least)
                 out = _chosen([*out, _Trial(score, _slips(path), band, share, later, gain, path)])
@@ -160,24 +160,22 @@ def _chosen(tried: list[_Trial]) -> list[_Trial]:
     return list(dict.fromkeys(best.values()))
 
 
-def _path(fit: Fit, valve: StemLaw, stem: Floats) -> SlipPath:
+def _path(fit: Fitted, valve: StemLaw, stem: Floats) -> SlipPath:
     """The process fitted behind a decoded stem as if that were recorded."""
-    told = replace(fit.window, position=stem, decoded=True)
-    return SlipPath(
-        descend(replace(fit, window=told, valve=valve)), log_chance(told.op, stem, valve.breakaway)
-    )
+    told = fit.moved(valve=valve).within(position=stem, decoded=True)
+    return SlipPath(descend(told), log_chance(told.p.blocks.op, stem, valve.breakaway))
 
 
-def _decoded_anew(path: SlipPath, fit: Fit, law: StemLaw, rest: int, hot: float) -> Floats:
+def _decoded_anew(path: SlipPath, fit: Fitted, law: StemLaw, rest: int, hot: float) -> Floats:
     """The most probable stem under a fit near a path, shape of OP; hot : factor of the innovations variance."""
-    return _decoded(fit, path.mean, law, rest, Noise(fit.ar, hot * fit.sigma2), CARRIED)[0]
+    return _decoded(fit, path.mean, law, rest, Noise(fit.ar, hot * fit.loss), CARRIED)[0]
 
 
-def _followed(play: Fit, begun: _Trial, rest: int) -> SlipPath:
+def _followed(play: Fitted, begun: _Trial, rest: int) -> SlipPath:
     """Fit process and stem alternately from a trial; return the most probable path."""
     valve, stem = sticking(begun.band, begun.share), begun.stem
-    later_s = begun.later * play.window.dt_s
-    fit = replace(play, dead_time_s=play.dead_time_s + later_s, gain=begun.gain)
+    later_s = begun.later * play.p.dt_s
+    fit = play.moved(dead_time_s=play.dead_time_s + later_s, gain=begun.gain)
     best = path = _path(fit, valve, stem)
     hopeless = play.log_likelihood - HOPELESS * play.count
     for k in range(1, ROUNDS):
@@ -199,22 +197,22 @@ def _settled(best: SlipPath) -> SlipPath:
 
 def _moved(_: None, best: SlipPath, move: tuple[int, int, int], step: float) -> tuple[SlipPath, float]:
     """The path with another stickband, jump and dead time; an infinite loss where no path has slips."""
-    window = best.fit.window
+    window = best.fit.p
     v, (wider, jumpier, later) = best.fit.valve, (step * m for m in move)
     band, share = v.stickband * (1.0 + wider), v.slip_jump / v.stickband + 2.0 * jumpier
     dead_s = best.fit.dead_time_s + later * DEAD_STEPS * window.dt_s
     if not 0.0 < share <= 1.0 or dead_s < 0.0:
         return best, math.inf
     gain = best.fit.gain * v.slip_jump / (band * share)  # a slip moves PV by gain times jump
-    fit, law = replace(best.fit, dead_time_s=dead_s, gain=gain), sticking(band, share)
-    stem = _decoded_anew(best, fit, law, window.op.size, 1.0)
+    fit, law = best.fit.moved(dead_time_s=dead_s, gain=gain), sticking(band, share)
+    stem = _decoded_anew(best, fit, law, window.blocks.op.size, 1.0)
     if _slips(stem) < FEWEST:
         return best, math.inf
     path = _path(fit, law, stem)
     return path, -path.worth
 
 
-def fit_irregular(play: Fit, noise: Floats, period_s: float, any_gain: bool = True) -> SlipPath | None:
+def fit_irregular(play: Fitted, noise: Floats, period_s: float, any_gain: bool = True) -> SlipPath | None:
     """The most probable path of a sticking stem in a cycling loop; None where no path is as likely as backlash.
 
     play : the best backlash, fitted in blocks, without a recorded stem; noise : shape (order,), a noise model that
@@ -224,9 +222,9 @@ def fit_irregular(play: Fit, noise: Floats, period_s: float, any_gain: bool = Tr
     """
     if play.gain == 0.0:
         return None
-    window = play.window
+    window = play.p
     rest = max(int(RESTS * period_s / window.step_s), 1)
-    bands, half = play.valve.stickband, rest // (window.factor * window.steps) // 2
+    bands, half = play.valve.stickband, rest // (window.blocks.factor * window.blocks.steps) // 2
     usual: Gains = {(w, s): play.gain for w in WIDTHS for s in JUMPS}
     best = _likeliest(play, noise, rest, usual)
     if best is None and any_gain:
@@ -235,22 +233,23 @@ def fit_irregular(play: Fit, noise: Floats, period_s: float, any_gain: bool = Tr
     return None if best is None else _settled(best)
 
 
-def near_path(play: Fit, path: SlipPath) -> Fit:
+def near_path(play: Fitted, path: SlipPath) -> Fitted:
     """A fit to the backlash fit's window with a path's process and mean friction: a start for regular slips."""
     found = path.fit
     t, dead, gain = found.time_constant_s, found.dead_time_s, found.gain
     share = min(found.valve.slip_jump / max(found.valve.stickband, 1e-9), 1.0)
     valve = sticking(found.valve.stickband, share)
-    return replace(play, gain=gain, time_constant_s=t, dead_time_s=dead, base=found.base, valve=valve)
+    moved = play.moved(gain=gain, time_constant_s=t, dead_time_s=dead, valve=valve)
+    return replace(moved, slow=found.slow)
 
 
-def _likeliest(play: Fit, noise: Floats, rest: int, gains: Gains) -> SlipPath | None:
+def _likeliest(play: Fitted, noise: Floats, rest: int, gains: Gains) -> SlipPath | None:
     """The most probable path from the best trials; None where none is as likely as backlash."""
     paths = [_followed(play, t, rest) for t in _screened(play, noise, rest, gains)]
     best = max(paths, key=lambda p: p.worth, default=None)
     return None if best is None or best.worth < play.log_likelihood else best
 
 
-def path_evidence(path: SlipPath, rival: Fit) -> float:
+def path_evidence(path: SlipPath, rival: Fitted) -> float:
     """Log likelihood [nat] of a path and its slips over a fit of the same window without it."""
     return evidence(path.fit, rival) + path.chance

@@ -1,20 +1,23 @@
-"""Prediction-error fit of a recording: its preparation, a baseline model with additions, and the result."""
+"""Prediction-error fit of a model with any additions: its residual, the descent, and deviations of its constants.
+
+The descent of the batch run in gauss_newton.py is its fast path for a lag behind a valve.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.estimation.descent import Descent, damped_step, down, inverse, nats, scattered
-from identification.estimation.noise import Edges, edges_for, fitted, judged, lag_means, whitened
-from identification.limits import LIMITS, ExplainLimits
-from identification.record import Floats, Mask
-from identification.signals.correlation import correlated
+from identification.estimation.model import Fitted, Model
+from identification.estimation.noise import fitted, lag_means, whitened
+from identification.estimation.problem import Problem
+from identification.record import Floats
 from identification.signals.filters import without_lines
 from identification.simulation.open_loop import ModelInputs, simulate
-from identification.simulation.parameters import Param, Slot, Variant
+from identification.simulation.parameters import Param, Slot
 
 SCREEN_STEPS = 5  # Gauss-Newton steps in the first round: bounds the time
 
@@ -34,99 +37,6 @@ PLACES = (-1.0, -0.5, 0.0, 0.5, 1.0)  # Possible first stem positions, relative 
 PLACE_WORTH = 3.0  # Gain of another place from which it is taken [nat]: what a parameter costs
 DAMPINGS = 5  # Dampings tried for a step of explain's fits
 FAR = 3000.0  # Residual from which a model counts as diverged [% PV]
-
-BASE = (
-    Param(Slot.T, "time_constant_s", "s", 0.3, 1e9, "dt", True),
-    Param(Slot.L, "dead_time_s", "s", 0.0, 0.2, "span"),
-    Param(Slot.K, "gain", "% PV/% OP", -1e4, 1e4),
-    Param(Slot.BIAS, "bias_pct", "% PV", -2e3, 2e3),
-    Param(Slot.START, "start_pct", "% PV", -300.0, 300.0),
-)
-"""Constants of the baseline model, free in every candidate."""
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """A recording prepared for fitting.
-
-    inputs : inputs of the model; y : PV less inputs.level, shape (n,); usable : bool, shape (n,); weight : shape
-    (n,), weight of each innovation, 0 where it is not judged. limits : thresholds for candidates; memory : in an
-    experiment, largest number of samples per independent one; window : samples after which a simulation judged by its
-    own errors restarts (without_lines), 0 for one run over all.
-    """
-
-    inputs: ModelInputs
-    y: Floats
-    usable: Mask
-    weight: Floats
-    edges: Edges = field(repr=False)
-    limits: ExplainLimits = LIMITS
-    memory: float = math.inf
-    window: int = 0
-
-    @property
-    def count(self) -> int:
-        """Number of samples judged."""
-        return int((self.weight > 0).sum())
-
-    @property
-    def by_simulation(self) -> bool:
-        """Whether simulation errors are judged, without a noise model."""
-        return self.edges.size == 1
-
-    def independent(self, e: Floats) -> int:
-        """Number of independent samples among those judged, for a model with errors of shape (n,)."""
-        memory = min(self.memory, correlated(e[self.weight > 0])) if self.by_simulation else 1.0
-        return max(int(self.count / memory), 1)
-
-
-def problem(
-    inputs: ModelInputs,
-    y: Floats,
-    usable: Mask,
-    limits: ExplainLimits = LIMITS,
-    edges: Edges | None = None,
-) -> Problem:
-    """A problem whose usable samples have equal weight, with its own lag groups unless given."""
-    edges = edges_for(usable) if edges is None else edges
-    return Problem(inputs, y, usable, judged(usable, int(edges[-1])).astype(float), edges, limits)
-
-
-@dataclass(frozen=True, slots=True)
-class Model:
-    """The additions to the baseline model, and all constants, shape (SIZE,)."""
-
-    added: tuple[Variant, ...]
-    c: Floats
-
-    @property
-    def params(self) -> tuple[Param, ...]:
-        """Free constants: those of the baseline model that no addition replaces, and those of the additions."""
-        own = tuple(p for v in self.added for p in v.params)
-        replaced = {slot for v in self.added for slot in v.replaces}
-        return (*(p for p in BASE if p.slot not in replaced), *own)
-
-
-@dataclass(frozen=True, slots=True)
-class Fitted:
-    """A model at its optimum: `loss` the weighted mean square innovation, `ar` the noise model; count : number of
-    independent innovations."""
-
-    model: Model
-    loss: float
-    count: int
-    ar: Floats
-    e: Floats = field(repr=False)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the additions."""
-        return tuple(v.name for v in self.model.added)
-
-
-def gain(better: Fitted, worse: Fitted) -> float:
-    """Gain in log likelihood [nat]."""
-    return nats(better.count, worse.loss, better.loss)
 
 
 def scales(inputs: ModelInputs, c: Floats, param: Param) -> tuple[float, float]:
@@ -189,7 +99,7 @@ class Residual:
 def residual_fit(p: Problem, model: Model) -> Residual:
     """Residual, noise model and innovations of a model."""
     simulated = simulate(p.inputs, model.c)
-    r = without_lines(p.y - simulated, p.window)
+    r = without_lines(p.y - simulated, p.horizon)
     groups, root, total = p.edges.size - 1, np.sqrt(p.weight), float(p.weight.sum())
     if not float(np.abs(r).max()) < FAR:
         none = np.zeros((groups, r.size)), np.zeros((groups, groups)), np.zeros(groups)
@@ -227,7 +137,7 @@ def sensitivities(p: Problem, model: Model, ar: Floats, here: Floats | None = No
             h = -h
         c[param.slot] += h
         slope = (simulate(p.inputs, c) - here) / (h / model.c[param.slot] if param.log else h)
-        out[i] = whitened(without_lines(np.clip(slope, -1e9, 1e9), p.window), ar, p.edges)
+        out[i] = whitened(without_lines(np.clip(slope, -1e9, 1e9), p.horizon), ar, p.edges)
     return out
 
 
@@ -316,14 +226,14 @@ def _descend(p: Problem, model: Model, steps: int, aim: float) -> Fitted:
     ends = Descent(steps, DAMPINGS * steps, p.count, SETTLED, 20.0, 10.0, DAMPINGS - 1)
     best = down(p, residual_fit(p, model), curved, stepped, ends)
     e = innovations_of(p, best)
-    return Fitted(best.model, best.loss, p.independent(e), best.ar, e)
+    return Fitted(p, best.model, best.loss, p.independent(e), best.ar, e)
 
 
 def innovations_of(p: Problem, found: Residual) -> Floats:
     """Innovations [% PV], shape (n,), including those with zero weight."""
     if not found.loss < FAR**2:
         return np.full(p.y.size, FAR)
-    left = without_lines(p.y - found.simulated, p.window)
+    left = without_lines(p.y - found.simulated, p.horizon)
     return whitened(left, found.ar, p.edges)  # type: ignore[no-any-return]
 
 

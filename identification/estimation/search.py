@@ -15,7 +15,7 @@ from numba.extending import register_jitable
 
 from identification.estimation.descent import compass
 from identification.estimation.noise import AR_ORDER, arx_noise, every_lag, generic_noise, judged, whitened
-from identification.estimation.window import Stems, Window, stem_of
+from identification.estimation.problem import Problem, Stems, stem_of
 from identification.models import Fopdt
 from identification.record import Floats, Mask
 from identification.simulation.lag import Lag, stepped, unit_lag
@@ -183,7 +183,7 @@ def whitened_stem(x: Floats, ar: Floats) -> Floats:
     return white
 
 
-def white_pv(window: Window, ar: Floats) -> WhitePv:
+def white_pv(window: Problem, ar: Floats) -> WhitePv:
     """Whiten PV with one noise model."""
     rows, sums = _known(whitened_stem(window.centred, ar), judged(window.usable, ar.size), ar.size)
     return WhitePv(window.stems_in_blocks, rows, sums, ar, window.dt_s, window.bounds)
@@ -238,7 +238,7 @@ def settled(pv: WhitePv, valve: StemLaw, least: float, dynamics: Dynamics) -> St
     return compass((pv, dynamics), valve, least, _valve_tried, PIT_MOVES, PIT_STEPS, 1e-7)[0]  # type: ignore[no-any-return]
 
 
-def starts(window: Window, period_s: float) -> list[Dynamics]:
+def starts(window: Problem, period_s: float) -> list[Dynamics]:
     """Starts of the search: time constants and dead times distributed over the period [s]."""
     times = [period_s * s for s in (0.03, 0.12, 0.5, 2.5)]
     deads = [period_s * s for s in (0.0, 0.06, 0.15, 0.33)]
@@ -254,29 +254,25 @@ def record_starts(samples: int, dt_s: float) -> list[Dynamics]:
     return [(t * dt_s, d * dt_s) for t, d in sorted(pairs)]
 
 
-def _plain(window: Window, ar: Floats) -> Fopdt:
+def _plain(window: Problem, ar: Floats) -> Fopdt:
     """The best process behind an ideal valve in a window under one noise model."""
     prepared = behind(white_pv(window, np.ascontiguousarray(ar)), IDEAL)
     dynamics, _, _, beta = search(prepared, record_starts(window.y.size, window.dt_s), 2)
     return Fopdt(float(beta[0]), *dynamics)
 
 
-def simulated_best(y: Floats, op: Floats, usable: Mask, dt_s: float) -> Fopdt:
+def simulated_best(p: Problem) -> Fopdt:
     """The baseline model with the least simulation error of PV, linear load removed; see plain_processes."""
-    return _plain(Window(y, op, usable, dt_s), NO_WHITENING)
+    return _plain(p, NO_WHITENING)
 
 
-def learnt_noise(window: Window) -> Floats:
+def learnt_noise(window: Problem) -> Floats:
     """An initial noise model of a window, shape (AR_ORDER,), learnt without a process."""
     stem = window.stems_in_blocks.ideal
     return arx_noise(window.centred, stem, window.usable, AR_ORDER, INPUT_LAGS)
 
 
-def plain_processes(y: Floats, op: Floats, usable: Mask, dt_s: float) -> list[Fopdt]:
+def plain_processes(p: Problem) -> list[Fopdt]:
     """The best baseline models of PV from OP: one step ahead under each of two initial noise models, and simulated.
-
-    y, op : shape (n,), PV and OP [% of span]; usable : bool, shape (n,), False where a sample must not be used; dt_s
-    : sample interval [s]. Returns starts for a descent, one for each; the last is the simulated one.
-    """
-    window = Window(y, op, usable, dt_s)
-    return [_plain(window, ar) for ar in (learnt_noise(window), generic_noise(), NO_WHITENING)]
+    Starts for a descent, one for each; the last is the simulated one."""
+    return [_plain(p, ar) for ar in (learnt_noise(p), generic_noise(), NO_WHITENING)]

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -25,9 +25,10 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from identification.estimation.descent import Descent, down, nats
+from identification.estimation.model import Fitted, start_at
 from identification.estimation.noise import AR_ORDER
+from identification.estimation.problem import Problem, stem_of
 from identification.estimation.search import Dynamics
-from identification.estimation.window import Fit, Window, stem_of
 from identification.models import Fopdt
 from identification.record import Floats, Mask
 from identification.simulation.lag import Lag, stepped, unit_lag
@@ -227,7 +228,7 @@ def _judged(usable: Mask) -> NDArray[np.int64]:
     return np.flatnonzero(~out)
 
 
-def _case(window: Window, law: StemLaw, period_s: float, count: int) -> _Case:
+def _case(window: Problem, law: StemLaw, period_s: float, count: int) -> _Case:
     """The data of a model with so many constants."""
     stem = stem_of(window.stems_in_blocks, law)
     (most_t, most_dead), dt_s = window.bounds, window.dt_s
@@ -254,7 +255,7 @@ def _descended(case: _Case, starts: Sequence[Floats]) -> _Point:
     return min((went(p, SMOOTH_STEPS) for p in near[:FOLLOWED]), key=lambda p: p.loss)
 
 
-def _fit(window: Window, law: StemLaw, case: _Case, p: _Point) -> SmoothFit:
+def _fit(window: Problem, law: StemLaw, case: _Case, p: _Point) -> SmoothFit:
     line = None
     if p.theta.size > LOAD:
         line = Line(case.period_s / math.exp(p.theta[5]), math.exp(p.theta[6]))
@@ -264,7 +265,7 @@ def _fit(window: Window, law: StemLaw, case: _Case, p: _Point) -> SmoothFit:
     return SmoothFit(process, -nats(p.e.size, loss, 1.0), p.e.size, loss, p.theta, law, line)
 
 
-def resonant_starts(window: Window, period_s: float, law_response: complex) -> list[tuple[Dynamics, float]]:
+def resonant_starts(window: Problem, period_s: float, law_response: complex) -> list[tuple[Dynamics, float]]:
     """Time constant and dead time [s] of lags with which the controller would oscillate at a period [s], and their
     gains.
 
@@ -283,7 +284,7 @@ def resonant_starts(window: Window, period_s: float, law_response: complex) -> l
 
 
 def fit_smooth(
-    window: Window,
+    window: Problem,
     period_s: float,
     starts: Sequence[tuple[Dynamics, float | None]],
     law: StemLaw = IDEAL,
@@ -307,7 +308,7 @@ def fit_smooth(
 
 
 def fit_line(
-    window: Window,
+    window: Problem,
     period_s: float,
     near: Sequence[SmoothFit],
     begins: Sequence[Dynamics] = (),
@@ -336,7 +337,7 @@ def _loads(period_s: float) -> list[Floats]:
     return [np.array([math.log(c * period_s), *z]) for c in CORNERS for z in ZEROS]
 
 
-def with_harmonics(lined: SmoothFit, window: Window, period_s: float) -> SmoothFit:
+def with_harmonics(lined: SmoothFit, window: Problem, period_s: float) -> SmoothFit:
     """The fit under a load with a line, found at a period [s], fitted anew under one whose line has harmonics too."""
     count = LINE + len(HARMONICS)
     case = _case(window, lined.law, period_s, count)
@@ -344,13 +345,13 @@ def with_harmonics(lined: SmoothFit, window: Window, period_s: float) -> SmoothF
     return _fit(window, lined.law, case, _descended(case, starts))
 
 
-def innovations_of(found: SmoothFit, window: Window, period_s: float) -> tuple[NDArray[np.int64], Floats]:
+def innovations_of(found: SmoothFit, window: Problem, period_s: float) -> tuple[NDArray[np.int64], Floats]:
     """The blocks judged, shape (m,), and the innovations of a fit there [% of PV's span], found at a period [s]."""
     case = _case(window, found.law, period_s, found.theta.size)
     return case.at, _point(case, found.theta).e
 
 
-def as_fit(found: SmoothFit, window: Window) -> Fit:
+def as_fit(found: SmoothFit, window: Problem) -> Fitted:
     """The result as a fit of the batch run, whose noise model has single lags: as many as reproduce the load to
     CUT."""
     dt_s, p = window.dt_s, found.process
@@ -364,5 +365,5 @@ def as_fit(found: SmoothFit, window: Window) -> Fit:
         before = (z1 + z2) * (memory[k - 1] if k else 0.0) - z1 * z2 * (memory[k - 2] if k > 1 else 0.0)
         memory[k] = given[k] + before
     dead_s = p.dead_time_s - window.half_block_s
-    known = found.law, found.sigma2, found.count, -memory[1:], np.zeros(4), window
-    return Fit(p.gain, p.time_constant_s, dead_s, *known)
+    fit = start_at(window, p.gain, (p.time_constant_s, dead_s), found.law, -memory[1:])
+    return replace(fit, loss=found.sigma2, count=found.count)

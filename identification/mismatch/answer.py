@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from identification.estimation.descent import half_width, nats
-from identification.estimation.prediction_error import Fitted, Problem, deviations, residual_fit
+from identification.estimation.model import Fitted
+from identification.estimation.prediction_error import deviations, residual_fit
+from identification.estimation.problem import Problem
 from identification.mismatch import words
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.catalogue.supply_variation import AT_REST

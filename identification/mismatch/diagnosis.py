@@ -17,7 +17,8 @@ import numpy as np
 
 from identification.controller.check import LATE_SAMPLES, Finding, judge
 from identification.controller.pi_regression import ControlLaw, Trends, shifted, unstated_law
-from identification.estimation.prediction_error import FULL_STEPS, descended, gain
+from identification.estimation.model import gain
+from identification.estimation.prediction_error import FULL_STEPS, descended
 from identification.mismatch.answer import holds_zero
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS, RECORDER_FAULTS, fault
 from identification.mismatch.effect import TIE, Ends, Friction

@@ -18,7 +18,9 @@ import numpy as np
 
 from identification.controller.check import Finding
 from identification.controller.pi_regression import ControlLaw
-from identification.estimation.prediction_error import FULL_STEPS, Fitted, Problem, descended, gain, problem
+from identification.estimation.model import Fitted, gain
+from identification.estimation.prediction_error import FULL_STEPS, descended
+from identification.estimation.problem import Problem, problem
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.effect import ONE_CONSTANT, Ends
 from identification.mismatch.friction import is_friction

@@ -10,6 +10,7 @@ itself; the constants do not change.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -17,17 +18,10 @@ from numba import njit
 
 from identification.estimation.backlash_stiction import pits
 from identification.estimation.descent import compass
+from identification.estimation.model import Fitted, Model
 from identification.estimation.noise import generic_noise
-from identification.estimation.prediction_error import (
-    FULL_STEPS,
-    SCREEN_STEPS,
-    Fitted,
-    Model,
-    Problem,
-    descended,
-    residual_fit,
-)
-from identification.estimation.window import Fit, Window
+from identification.estimation.prediction_error import FULL_STEPS, SCREEN_STEPS, descended, residual_fit
+from identification.estimation.problem import Problem, in_blocks
 from identification.mismatch.effect import Friction
 from identification.mismatch.outside import about
 from identification.mismatch.recording import SeenInCycles
@@ -86,17 +80,10 @@ def fit_sticking(p: Problem, play: Fitted, row: Variant, rows: tuple[Variant, ..
 
 def _as_a_night(p: Problem, play: Fitted, model: Model) -> list[Model]:
     """Starts at the local optima of stickband and jump from a batch-run scan."""
-    window, c = _window_behind(p, play.model.c), model.c
-    near = Fit(
-        float(c[Slot.K]),
-        min(float(c[Slot.T]), window.bounds[0]),
-        float(c[Slot.L]),
-        sticking(float(c[Slot.STICKBAND]), 0.0),
-        play.loss,
-        play.count,
-        generic_noise(),
-        np.zeros(4),
-        window,
+    behind, c = _behind(p, play.model.c), model.c
+    near = replace(play, p=behind, ar=generic_noise(), slow=np.zeros(4)).moved(
+        time_constant_s=min(float(c[Slot.T]), behind.bounds[0]),
+        valve=sticking(float(c[Slot.STICKBAND]), 0.0),
     )
     out = []
     for found in pits(near, (friction_of(c).tolerance,)):
@@ -138,12 +125,12 @@ def _heavier(p: Problem, model: Model, move: tuple[int, ...], step: float) -> tu
     return trial, residual_fit(p, trial).loss
 
 
-def _window_behind(p: Problem, c: Floats) -> Window:
-    """The window for a lag behind a valve: OP at the stem's input, PV without the model's other effects."""
+def _behind(p: Problem, c: Floats) -> Problem:
+    """The problem for a lag behind a valve: OP at the stem's input, PV without the model's other effects."""
     inputs, plain = p.inputs, alone(c, (*OF_CYCLES, Slot.BIAS, Slot.START, Slot.LEAK))
     op = before_stem(np.ascontiguousarray(acted(Signal.OP, inputs.op, c, inputs.dt_s)), c, inputs.dt_s)
     y = p.y - simulate(inputs, c) + simulate(inputs, plain)
-    return Window(y, op, p.usable, inputs.dt_s)
+    return in_blocks(y, op, p.usable, inputs.dt_s)
 
 
 def from_cycles(x: Round, seen: SeenInCycles, rows: tuple[Variant, ...]) -> list[Fitted]:

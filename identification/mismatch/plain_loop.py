@@ -6,21 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identification.estimation.model import Fitted, Model
 from identification.estimation.noise import NO_NOISE
-from identification.estimation.prediction_error import (
-    FULL_STEPS,
-    Fitted,
-    Model,
-    Problem,
-    correlated,
-    descended,
-    problem,
-)
+from identification.estimation.prediction_error import FULL_STEPS, descended
+from identification.estimation.problem import Problem, problem
 from identification.estimation.search import plain_processes
 from identification.limits import LIMITS, ExplainLimits, RecorderLimits
 from identification.mismatch.recording import Recording
 from identification.mismatch.reference import left_freely
 from identification.record import Floats, Mask
+from identification.signals.correlation import correlated
 from identification.signals.robust import robust_weights
 from identification.simulation.open_loop import ModelInputs, as_parameters
 from identification.simulation.parameters import Slot
@@ -83,7 +78,7 @@ def prepared(
 def plain(p: Problem, brought: Floats | None = None, clip: Clip | None = None) -> Fitted:
     """The baseline model at its optimum, from several starts."""
     starts = [] if brought is None else [brought.copy()]
-    for process in plain_processes(p.y, p.inputs.op, p.usable, p.inputs.dt_s):
+    for process in plain_processes(p):
         c = as_parameters(process)
         c[Slot.START] = p.y[0]
         c[Slot.BIAS] = float(np.mean(p.y)) - process.gain * float(np.mean(p.inputs.op) - p.inputs.middle)

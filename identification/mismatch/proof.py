@@ -13,16 +13,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from identification.estimation.model import Fitted, Model, gain
 from identification.estimation.noise import NO_NOISE, whitened
-from identification.estimation.prediction_error import (
-    FULL_STEPS,
-    Fitted,
-    Model,
-    Problem,
-    bounds,
-    descended,
-    gain,
-)
+from identification.estimation.prediction_error import FULL_STEPS, bounds, descended
+from identification.estimation.problem import Problem
 from identification.estimation.search import simulated_best
 from identification.mismatch.effect import ONE_CONSTANT, Effect
 from identification.mismatch.friction import WEARS, simulated_anew
@@ -271,7 +265,7 @@ class Pair:
 
 def pair_of(p: Problem, fits: tuple[Fitted, Fitted], judged: Mask) -> Pair:
     """The models of two fits, the worse first."""
-    process, c = simulated_best(p.y, p.inputs.op, judged, p.inputs.dt_s), fits[0].model.c.copy()
+    process, c = simulated_best(replace(p, usable=judged)), fits[0].model.c.copy()
     c[Slot.K], c[Slot.T], c[Slot.L] = process.gain, process.time_constant_s, process.dead_time_s
     return Pair(fits[0].model, fits[1].model, Model((), c), judged)
 
@@ -310,7 +304,7 @@ class Criterion:
     def nearer(self, model: Model, judged: Mask) -> Floats:
         """Constants of a model with the baseline part refitted to the least misfit; those of effects are kept."""
         told = tuple(replace(row, params=()) for row in model.added)
-        q = replace(self.p, edges=NO_NOISE, window=self.window, weight=judged.astype(float))
+        q = replace(self.p, edges=NO_NOISE, horizon=self.window, weight=judged.astype(float))
         return descended(q, Model(told, model.c), FULL_STEPS).model.c
 
     def candidates(self, pair: Pair) -> tuple[list[Floats], list[Floats]]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.controller.check import StatedSettings
 from identification.controller.pi_regression import fed_back
+from identification.estimation.problem import in_blocks
 from identification.estimation.search import plain_processes
 from identification.limits import LIMITS, ExplainLimits, RecorderLimits
 from identification.models import Backlash, Estimate, Fopdt, Stiction
@@ -168,5 +169,7 @@ def coarser_by(s: Recording) -> int:
     most = s.pv.size // EXPERIMENT_SAMPLES
     if most < 2:
         return 1
-    fast = min(x.time_constant_s + x.dead_time_s for x in plain_processes(s.pv, s.op, s.usable, s.dt_s))
+    fast = min(
+        x.time_constant_s + x.dead_time_s for x in plain_processes(in_blocks(s.pv, s.op, s.usable, s.dt_s))
+    )
     return max(min(most, int(fast / (SAMPLES_A_LAG * s.dt_s))), 1)

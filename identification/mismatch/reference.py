@@ -14,8 +14,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from identification.estimation.model import Fitted
 from identification.estimation.noise import lag_means, whitened
-from identification.estimation.prediction_error import Fitted, Problem, sensitivities
+from identification.estimation.prediction_error import sensitivities
+from identification.estimation.problem import Problem
 from identification.record import Floats
 from identification.simulation.lag import lagged
 from identification.simulation.open_loop import simulate, through_valve

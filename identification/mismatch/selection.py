@@ -7,15 +7,9 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from identification.estimation.prediction_error import (
-    FULL_STEPS,
-    SCREEN_STEPS,
-    Fitted,
-    Model,
-    Problem,
-    descended,
-    gain,
-)
+from identification.estimation.model import Fitted, Model, gain
+from identification.estimation.prediction_error import FULL_STEPS, SCREEN_STEPS, descended
+from identification.estimation.problem import Problem
 from identification.mismatch.catalogue import CANDIDATES
 from identification.mismatch.effect import PARAMETER_PENALTY, SEARCH_PENALTY, Friction
 from identification.mismatch.friction import STARTS, fit_sticking

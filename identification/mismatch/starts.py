@@ -13,16 +13,10 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from identification.controller.check import runs
+from identification.estimation.model import Fitted, Model
 from identification.estimation.noise import whitened
-from identification.estimation.prediction_error import (
-    SCREEN_STEPS,
-    Fitted,
-    Model,
-    Problem,
-    descended,
-    scales,
-    sensitivities,
-)
+from identification.estimation.prediction_error import SCREEN_STEPS, descended, scales, sensitivities
+from identification.estimation.problem import Problem
 from identification.mismatch.recording import Recording
 from identification.record import Floats, Mask
 from identification.simulation.open_loop import simulate, through_valve

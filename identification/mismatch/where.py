@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from identification.controller.check import runs
+from identification.estimation.model import Fitted
 from identification.estimation.noise import whitened
-from identification.estimation.prediction_error import Fitted, Problem
+from identification.estimation.problem import Problem
 from identification.mismatch import words
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.location import Located, located

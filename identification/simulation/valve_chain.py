@@ -28,6 +28,8 @@ from identification.simulation.valve import (
 COASTS = {Motion.RESTS: -1.0, Motion.HALTS: -0.5, Motion.SLIDES: 0.0}
 """The parameter COAST for each motion of the stem."""
 BEHAVIOUR = {coast: TOLERANCES[motion] for motion, coast in COASTS.items()}
+"""Tolerance of each; a larger parameter is the tolerance itself: the reversal of OP that a sliding stem ignores."""
+COAST_OF = {tolerance: coast for coast, tolerance in BEHAVIOUR.items()}
 SERVO_STEPS = 5
 """Steps of a positioner within one sample; ours: its period is never below four samples."""
 RATE, SERVO, DAMPING, DEADBAND = (int(s) for s in (Slot.RATE, Slot.SERVO, Slot.DAMPING, Slot.DEADBAND))
@@ -139,7 +141,16 @@ def behind_stem(x: Floats, c: Floats, dt_s: float, middle: float) -> Floats:
 def friction_of(c: Floats) -> StemLaw:
     """Friction of a model's valve."""
     away, sliding = thresholds(float(c[Slot.STICKBAND]), float(c[Slot.JUMP]))
-    return StemLaw(away, max(sliding, 0.0), BEHAVIOUR.get(float(c[Slot.COAST]), SLIDES))
+    coast = float(c[Slot.COAST])
+    return StemLaw(away, max(sliding, 0.0), BEHAVIOUR.get(coast, max(coast, SLIDES)))
+
+
+def with_friction(c: Floats, law: StemLaw) -> Floats:
+    """A model's parameters, shape (SIZE + own,), with another friction of the valve."""
+    out = c.copy()
+    out[Slot.STICKBAND], out[Slot.JUMP] = law.stickband, law.slip_jump
+    out[Slot.COAST] = COAST_OF.get(law.tolerance, law.tolerance)
+    return out
 
 
 def memory(op: float, stem: float | None = None) -> Floats:

@@ -15,7 +15,8 @@ from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
 from identification.controller.check import judge
 from identification.controller.pi_regression import Trends
-from identification.estimation.prediction_error import Model, descended, gain
+from identification.estimation.model import Model, gain
+from identification.estimation.prediction_error import descended
 from identification.mismatch.answer import answer
 from identification.mismatch.catalogue import CANDIDATES
 from identification.mismatch.diagnosis import controller_finding_of, recorder_finding_of

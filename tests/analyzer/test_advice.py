@@ -21,7 +21,7 @@ from analyzer.loop.oscillation import Oscillations
 from analyzer.loop.quality import prepare
 from analyzer.loop.witness import witness
 from analyzer.store.rows import night_row
-from identification.estimation.window import Window
+from identification.estimation.problem import in_blocks
 from identification.models import Backlash, Fopdt, Integrator, Pid
 from proofs.plant import CONFIG, START_S, Sketch, prepared, series, simulate, spec
 from tuning.describing import describe
@@ -132,7 +132,7 @@ def test_noise_is_read_behind_a_filter_of_pv(filter_s: float, rounding: float) -
         seen[k] = last
     op = 50.0 - 3.0 * seen + np.sin(2 * np.pi * np.arange(n) / 900.0)
     op = np.round(op / rounding) * rounding if rounding else op
-    window = Window(50.0 + noise, op, np.ones(n, dtype=bool), 1.0)
+    window = in_blocks(50.0 + noise, op, np.ones(n, dtype=bool), 1.0)
     assert scan_noise(window, Pid(3.0, 100.0, scan_s=1.0, pv_filter_s=filter_s)) == pytest.approx(
         size, rel=0.1
     )
@@ -152,7 +152,7 @@ def test_noise_is_read_behind_a_derivative(td: float, narrow: float, filter_s: f
         last = seen
         op[k] = 50.0 - 3.0 * (seen + slope)
     op += np.sin(2 * np.pi * np.arange(n) / 900.0)
-    window = Window(50.0 + noise[::every], op[::every], np.ones(n // every, dtype=bool), float(every))
+    window = in_blocks(50.0 + noise[::every], op[::every], np.ones(n // every, dtype=bool), float(every))
     pid = Pid(3.0, 100.0, td, scan_s=1.0, td_filter=narrow, pv_filter_s=filter_s)
     assert scan_noise(window, pid) == pytest.approx(size, rel=0.1)
 
@@ -264,7 +264,7 @@ def test_stale_settings_are_told_and_nothing_is_advised():
 def test_a_model_beyond_its_record_gets_no_advice(pipe):
     """A fit whose dead time is a third of the record gets no settings, and its reason says why."""
     m = pipe.verdict.measured
-    late = replace(m.play, dead_time_s=m.window.duration_s / 3)
+    late = m.play.moved(dead_time_s=m.window.duration_s / 3)
     verdict = replace(pipe.verdict, measured=replace(m, play=late), fault="backlash")
     p = propose(verdict, PIPE.controller, 100.0, CONFIG).proposal
     assert p.controller is None
@@ -328,9 +328,9 @@ def test_loops_that_a_cycle_cannot_tell_apart_have_its_loop_gain(pipe):
     fit, period_s = pipe.verdict.fit, pipe.oscillations.first.period_s
     loop = sought_for(pipe.verdict, PIPE.controller, CONFIG.advice)[0]
     late = 0.25 * period_s  # an integrator and a wider valve take their phase from the dead time
-    fit = replace(fit, dead_time_s=fit.dead_time_s + late)
+    fit = fit.moved(dead_time_s=fit.dead_time_s + late)
     loop = replace(loop, process=replace(loop.process, dead_time_s=loop.process.dead_time_s + late))
-    swing, omega = 0.5 * fit.window.cycle_range, 2.0 * math.pi / period_s
+    swing, omega = 0.5 * fit.p.cycle_range, 2.0 * math.pi / period_s
 
     def product(one):
         p = one.process

@@ -51,9 +51,9 @@ def test_the_whole_window_has_the_whole_record_in_few_blocks():
     record = _record(pv)
     window = window_of(record, PERIOD_S, CONFIG.cause)
     whole = whole_window(record, window, 1000, PERIOD_S)
-    assert whole.factor == 87
-    assert whole.y == pytest.approx(pv[: DAY_S // 87 * 87].reshape(-1, 87).mean(axis=1))
-    assert whole_window(record, window, DAY_S, PERIOD_S).factor == window.factor
+    assert whole.blocks.factor == 87
+    assert whole.pv == pytest.approx(pv[: DAY_S // 87 * 87].reshape(-1, 87).mean(axis=1))
+    assert whole_window(record, window, DAY_S, PERIOD_S).blocks.factor == window.blocks.factor
 
 
 @pytest.mark.parametrize("every", [1, 10])

@@ -18,7 +18,8 @@ from benchmarks.world.promises import forecast_of
 from benchmarks.world.recorder import recorded
 from benchmarks.world.settings import outcome
 from benchmarks.world.simulate import BACKLASH, Controller, Process, Valve
-from identification.estimation.window import Fit, Window
+from identification.estimation.model import Fitted
+from identification.estimation.problem import in_blocks
 from identification.models import Pid
 from identification.record import LoopRecord
 from proofs.plant import prepared
@@ -36,7 +37,7 @@ def by_minute(x: np.ndarray) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def night() -> tuple[LoopRecord, np.ndarray, Fit]:
+def night() -> tuple[LoopRecord, np.ndarray, Fitted]:
     """Ten hours of a worn valve, its true load at PV [% PV], and the fit of the program."""
     made = run(WORN, hours=10)
     late = np.concatenate((np.full(15, made.stem[0]), made.stem))[: made.stem.size]
@@ -50,7 +51,7 @@ def night() -> tuple[LoopRecord, np.ndarray, Fit]:
     )
 
 
-def test_the_load_of_a_night_is_that_of_the_plant(night: tuple[LoopRecord, np.ndarray, Fit]) -> None:
+def test_the_load_of_a_night_is_that_of_the_plant(night: tuple[LoopRecord, np.ndarray, Fitted]) -> None:
     """Nine tenths of the true load's variance over minutes are reconstructed, over the whole record."""
     record, truth, fit = night
     load = load_of_night(fit, PID, record, PERIOD_S)
@@ -59,7 +60,7 @@ def test_the_load_of_a_night_is_that_of_the_plant(night: tuple[LoopRecord, np.nd
     assert np.var(by_minute(load) - true) < 0.1 * np.var(true)
 
 
-def test_hours_that_must_not_be_used_leave_no_trace(night: tuple[LoopRecord, np.ndarray, Fit]) -> None:
+def test_hours_that_must_not_be_used_leave_no_trace(night: tuple[LoopRecord, np.ndarray, Fitted]) -> None:
     """With two hours of a dead transmitter the load is that of the other hours, without a step between them."""
     record, _, fit = night
     hours = slice(7200, 14_400)
@@ -85,7 +86,7 @@ def test_noise_is_read_where_op_is_free(period: float) -> None:
     noise = size * rng.standard_normal(n)
     op = np.clip(50.0 + 120.0 * np.sin(2 * np.pi * np.arange(n) / period) - 3.0 * noise, 0.0, 100.0)
     assert np.mean((op <= 0.0) | (op >= 100.0)) > 0.6
-    window = Window(50.0 + noise, op, np.ones(n, dtype=bool), 1.0)
+    window = in_blocks(50.0 + noise, op, np.ones(n, dtype=bool), 1.0)
     assert scan_noise(window, Pid(3.0, 100.0, scan_s=1.0)) == pytest.approx(size, rel=0.1)
 
 

@@ -40,7 +40,7 @@ def test_play_does_not(seed):
     _, verdict = seen(PLAY, seed)
     assert (verdict.cause, verdict.fault) == ("valve", "backlash")
     assert verdict.measured is not None
-    assert not verdict.measured.window.decoded
+    assert not verdict.measured.window.blocks.decoded
 
 
 def test_advice_says_on_which_friction_it_rests():

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from identification.estimation.problem import in_blocks
 from identification.estimation.search import simulated_best
 from identification.mismatch.effect import Block, Ends, Fault, Finding, Floats, Recording, within
 from identification.mismatch.pictures import Axis, Picture, comb
@@ -25,7 +26,7 @@ def _is_slight(jitter_s: float, s: Recording) -> bool:
     that acts on each sample."""
     if s.stated is not None or float(np.ptp(s.op)) == 0.0:
         return False
-    process = simulated_best(s.pv - s.pv.mean(), s.op, s.usable, s.dt_s)
+    process = simulated_best(in_blocks(s.pv, s.op, s.usable, s.dt_s))
     return jitter_s < s.limits.recorder.jitter_lag * process.time_constant_s
 
 

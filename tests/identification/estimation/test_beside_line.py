@@ -11,8 +11,8 @@ from scipy.signal import lfilter
 from benchmarks.world.draw import wander
 from benchmarks.world.simulate import BACKLASH, Controller, Process, Valve, simulate
 from identification.estimation.beside_line import BesideLine, beside_line
+from identification.estimation.problem import block_means, in_blocks
 from identification.estimation.smooth_load import _line, _whitened
-from identification.estimation.window import Window, block_means
 from identification.record import Floats
 from identification.simulation.lag import unit_lag
 
@@ -36,7 +36,7 @@ def _trends(
 def _found(trends: tuple[Floats, Floats]) -> BesideLine:
     pv, op = trends
     y = block_means(pv, BLOCK)
-    window = Window(y, np.ascontiguousarray(op), np.ones(y.size, dtype=bool), 1.0 * BLOCK, BLOCK)
+    window = in_blocks(y, np.ascontiguousarray(op), np.ones(y.size, dtype=bool), 1.0 * BLOCK, BLOCK)
     return beside_line(window, STARTS, (), PERIOD_S)
 
 

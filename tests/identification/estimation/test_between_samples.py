@@ -23,7 +23,8 @@ from identification.estimation.between_samples import (
     scans_per_row,
     without_noise,
 )
-from identification.estimation.window import Fit, Window
+from identification.estimation.model import start_at
+from identification.estimation.problem import in_blocks
 from identification.models import Pid
 from identification.record import LoopRecord
 from identification.simulation.lag import unit_lag
@@ -57,7 +58,7 @@ def measured(d: Drawn, every: int, scan_s: float) -> Measured:
 def test_a_width_recorded_every_ten_seconds_is_that_of_the_valve(drawn: Drawn) -> None:
     """Of a controller that scans every second, one row in ten tells the play's width within 15 %."""
     m = measured(drawn, 10, 1.0)
-    assert m.window.steps == 10
+    assert m.window.blocks.steps == 10
     assert m.play.valve.stickband == pytest.approx(drawn.valve.band, rel=0.15)
 
 
@@ -66,7 +67,7 @@ def test_a_controller_no_faster_than_its_record_holds_op_between_rows() -> None:
     own fit is the likelier one, and its width is the valve's."""
     d = replace(WORN[0], controller=replace(WORN[0].controller, scan_s=10.0))
     m = measured(d, 1, 1.0)
-    assert m.window.steps == 1
+    assert m.window.blocks.steps == 1
     assert m.play.valve.stickband == pytest.approx(d.valve.band, rel=0.15)
 
 
@@ -81,8 +82,8 @@ def rows_of(n: int = 400) -> Rows:
 def test_op_is_the_recorded_one_at_each_row() -> None:
     """Every path of OP passes through the recorded values, and between rows the paths differ by opposite noise."""
     rows = rows_of()
-    window = Window(rows.pv, rows.op, np.ones(rows.pv.size, dtype=bool), 10.0)
-    fit = Fit(1.0, 80.0, 12.0, sticking(1.0, 0.0), 1.0, 1, np.zeros(8), np.zeros(4), window)
+    window = in_blocks(rows.pv, rows.op, np.ones(rows.pv.size, dtype=bool), 10.0)
+    fit = start_at(window, 1.0, (80.0, 12.0), sticking(1.0, 0.0), np.zeros(8))
     paths = op_at_scans(fit, Scans(rows, Pid(2.0, 60.0), 10))
     assert np.array_equal(paths[:, ::10], np.broadcast_to(rows.op, (len(paths), rows.op.size)))
     assert np.ptp(paths[:, 5::10], axis=0).min() > 0.0

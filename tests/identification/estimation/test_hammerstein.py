@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from identification.estimation.backlash_stiction import better_linear, fit_linear, fit_play, fit_stick_slip
 from identification.estimation.evidence import evidence
 from identification.estimation.gauss_newton import descend, innovations
-from identification.estimation.window import Stems, Window, block_means, stem_blocks
+from identification.estimation.problem import Problem, Stems, block_means, in_blocks, stem_blocks
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
 from identification.simulation.lag import respond, unit_lag
@@ -27,11 +28,11 @@ def steps(seed: int, n: int = N) -> np.ndarray:
     return 50 + np.cumsum(moves) - np.linspace(0, moves.sum(), n)
 
 
-def window(process: Fopdt, valve: Backlash | None, seed: int, noise: float = 0.1) -> Window:
+def window(process: Fopdt, valve: Backlash | None, seed: int, noise: float = 0.1) -> Problem:
     """An open loop under moving OP with white noise on PV."""
     op = steps(seed)
     pv = pv_of(process, valve, op, 1.0) + noise * np.random.default_rng(seed + 1).standard_normal(N)
-    return Window(pv, op, np.ones(N, dtype=bool), 1.0)
+    return in_blocks(pv, op, np.ones(N, dtype=bool), 1.0)
 
 
 @pytest.mark.parametrize(
@@ -51,7 +52,7 @@ def test_process_is_recovered(process):
 def test_noise_level_is_recovered():
     """The innovations variance of a fit is the variance of the noise that was added."""
     fit = fit_linear(window(Fopdt(2.0, 30.0, 5.0), None, 4, noise=0.2), 120.0)
-    assert fit.sigma2 == pytest.approx(0.04, rel=0.08)
+    assert fit.loss == pytest.approx(0.04, rel=0.08)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -79,7 +80,7 @@ def test_play_is_recovered_from_its_limit_cycle():
     noise = 0.05 * np.random.default_rng(30).standard_normal(N)
     noise[5:] += 1.0  # a step of the load, without which the stem would never leave its play
     record = closed_loop(loop, np.full(N, 50.0), noise)
-    w = Window(record.pv, record.op, np.ones(N, dtype=bool), 1.0)
+    w = in_blocks(record.pv, record.op, np.ones(N, dtype=bool), 1.0)
     found = fit_play(fit_linear(w, 38.0), 38.0)
     assert found.valve.stickband == pytest.approx(1.0, rel=0.02)
     assert found.slope == pytest.approx(0.4, rel=0.02)
@@ -92,21 +93,17 @@ def test_descent_never_loses(free_width):
     first = fit_linear(w, 120.0)
     rng = np.random.default_rng(41)
     for _ in range(12):
-        start = type(first)(
+        moved = first.moved(
             gain=first.gain * rng.uniform(0.2, 3),
             time_constant_s=first.time_constant_s * 10 ** rng.uniform(-1, 1),
             dead_time_s=rng.uniform(0, 30),
             valve=sticking(rng.uniform(0.3, 6), rng.uniform(0, 1)),
-            sigma2=1.0,
-            count=first.count,
-            ar=first.ar * rng.uniform(0, 1),
-            base=first.base,
-            window=w,
         )
+        start = replace(moved, ar=first.ar * rng.uniform(0, 1))
         end = descend(start, free_width)
         before, after = (float(np.mean(innovations(fit) ** 2)) for fit in (start, end))
         assert after <= before * (1 + 1e-9)
-        assert end.sigma2 == pytest.approx(after, rel=1e-6)
+        assert end.loss == pytest.approx(after, rel=1e-6)
 
 
 def test_evidence_is_antisymmetric_about_nothing():
@@ -119,9 +116,9 @@ def test_evidence_is_antisymmetric_about_nothing():
 def test_unusable_samples_do_not_count():
     """Nonsense at samples that are not usable changes neither gain nor time constant beyond the scatter."""
     w = window(Fopdt(2.0, 30.0, 5.0), None, 60)
-    y, usable = w.y.copy(), np.ones(N, dtype=bool)
+    y, usable = w.pv.copy(), np.ones(N, dtype=bool)
     y[1000:1200], usable[1000:1200] = 500.0, False
-    fit = fit_linear(Window(y, w.op, usable, 1.0), 120.0)
+    fit = fit_linear(in_blocks(y, w.blocks.op, usable, 1.0), 120.0)
     assert fit.gain == pytest.approx(2.0, rel=0.04)
     assert fit.time_constant_s == pytest.approx(30.0, rel=0.06)
 
@@ -171,7 +168,7 @@ class KanoValve:
         return self.stem
 
 
-def cycling_tank(seed: int, stickband: float, jump: float, slope: float = 0.1) -> Window:
+def cycling_tank(seed: int, stickband: float, jump: float, slope: float = 0.1) -> Problem:
     """A tank under PI behind such a valve, PV stepped in tenths of a scan, OP kept at 0.05 %."""
     rng = np.random.default_rng(seed)
     n, dead = 1800, 3
@@ -185,7 +182,7 @@ def cycling_tank(seed: int, stickband: float, jump: float, slope: float = 0.1) -
         for _ in range(10):
             path.append(stem)
             level += 0.1 * slope * path[-dead * 10 - 1]
-    return Window(pv, op, np.ones(n, dtype=bool), 1.0)
+    return in_blocks(pv, op, np.ones(n, dtype=bool), 1.0)
 
 
 @pytest.mark.parametrize("jump", [1.22, 2.02])
@@ -207,9 +204,9 @@ def test_descent_and_disturbance_tell_one_story():
     op = 50 + np.cumsum(rng.normal(0, 0.2, 8 * 600))
     pv = block_means(respond(op - 50, unit_lag(300.0, 12.0, 1.0)), 8) + rng.normal(0, 0.05, 600) + 3.0
     for fine in (False, True):
-        window = Window(pv, op, np.ones(600, dtype=bool), 8.0, 8, fine=fine)
+        window = in_blocks(pv, op, np.ones(600, dtype=bool), 8.0, 8, fine=fine)
         for fit in (fit_linear(window, 400.0), fit_play(fit_linear(window, 400.0), 400.0)):
-            assert float(np.mean(innovations(fit) ** 2)) == pytest.approx(fit.sigma2, rel=1e-6)
+            assert float(np.mean(innovations(fit) ** 2)) == pytest.approx(fit.loss, rel=1e-6)
     process = fit_linear(window, 400.0).process
     assert process.time_constant_s == pytest.approx(300.0, rel=0.05)
     assert process.dead_time_s == pytest.approx(12.0, abs=2.0)

@@ -9,10 +9,11 @@ import pytest
 
 from identification.estimation.gauss_newton import covariance, residual
 from identification.estimation.gauss_newton import descend as descend_lag
+from identification.estimation.model import Model, start_at
 from identification.estimation.noise import generic_noise
-from identification.estimation.prediction_error import Model, deviations, problem
 from identification.estimation.prediction_error import descended as descend_any
-from identification.estimation.window import Fit, Window
+from identification.estimation.prediction_error import deviations
+from identification.estimation.problem import in_blocks
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.model_file import constants, to_data
 from identification.record import Floats
@@ -53,29 +54,14 @@ def test_both_fits_find_the_same_constants(seed: int) -> None:
     """From one start, a tenth off, constants agree within their own deviations, and these agree within 30 %."""
     pv, op = cycled(seed)
     good = np.ones(N, dtype=bool)
-    window = Window(pv, op, good, 1.0)
-    begun = Fit(
-        1.1 * GAIN,
-        0.9 * LAG,
-        DEAD,
-        StemLaw(BAND / 2, BAND / 2, 0.0),
-        1.0,
-        N,
-        generic_noise(),
-        np.zeros(4),
-        window,
-    )
+    window = in_blocks(pv, op, good, 1.0)
+    begun = start_at(window, 1.1 * GAIN, (0.9 * LAG, DEAD), StemLaw(BAND / 2, BAND / 2, 0.0), generic_noise())
     one = descend_lag(begun, free_width=True)
     spread = np.sqrt(np.diag(covariance(one, free_width=True)))
 
-    level, middle = float(pv.mean()), float(op.mean())
-    inputs = ModelInputs(op, 1.0, middle, level, (float(pv.min()), float(pv.max())))
-    c = neutral()
-    c[Slot.K], c[Slot.T], c[Slot.L], c[Slot.STICKBAND] = 1.1 * GAIN, 0.9 * LAG, DEAD, BAND
-    p = problem(inputs, pv - level, good)
-    any_fit = descend_any(p, Model((EFFECTS["backlash"].variants[0],), c), 40)
+    any_fit = descend_any(window, Model((EFFECTS["backlash"].variants[0],), begun.model.c), 40)
     found = any_fit.model.c
-    told = {param.slot: d for param, d in zip(any_fit.model.params, deviations(p, any_fit), strict=True)}
+    told = {param.slot: d for param, d in zip(any_fit.model.params, deviations(window, any_fit), strict=True)}
 
     pairs = (
         (math.log(one.time_constant_s), math.log(found[Slot.T]), spread[0], told[Slot.T]),
@@ -99,8 +85,8 @@ def test_the_kernel_leaves_what_the_simulator_leaves(law: StemLaw, dead_s: float
     """The residual of a lag behind a valve is PV less the whole simulator's response, but for a constant, once what
     PV was at first is forgotten."""
     pv, op = cycled(6)
-    window = Window(pv, op, np.ones(N, dtype=bool), 1.0)
-    fit = Fit(GAIN, LAG, dead_s, law, 1.0, N, generic_noise(), np.zeros(4), window)
+    window = in_blocks(pv, op, np.ones(N, dtype=bool), 1.0)
+    fit = start_at(window, GAIN, (LAG, dead_s), law, generic_noise())
     inputs = ModelInputs(op, 1.0, float(op.mean()), 0.0, (0.0, 100.0))
     c = as_parameters(fit.process, law.valve)
     if law.breakaway > 0.0:

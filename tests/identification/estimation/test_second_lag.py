@@ -21,7 +21,7 @@ from benchmarks.world.draw import drawn
 from benchmarks.world.pairs import varied
 from identification.estimation.backlash_stiction import fit_linear, fit_play
 from identification.estimation.evidence import evidence, with_second_lag
-from identification.estimation.window import Window
+from identification.estimation.problem import in_blocks
 
 N, LAG_S, SECOND_S, DEAD = 20_000, 120.0, 6.0, 4
 
@@ -45,7 +45,7 @@ def gains(second_s: float, play: float = 0.0) -> tuple[float, float]:
         stem[k] = moved
     block = 10
     y = behind(stem, second_s).reshape(-1, block).mean(axis=1)
-    window = Window(y, op, np.ones(y.size, bool), float(block), block)
+    window = in_blocks(y, op, np.ones(y.size, bool), float(block), block)
     linear = fit_linear(window, 300.0)
     return evidence(with_second_lag(linear), linear), evidence(fit_play(linear, 300.0), linear)
 

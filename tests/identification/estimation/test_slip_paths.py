@@ -12,6 +12,7 @@ from scipy.stats import norm
 from identification.estimation.backlash_stiction import fit_linear, fit_play, fit_stick_slip
 from identification.estimation.irregular_slips import fit_irregular
 from identification.estimation.noise import generic_noise
+from identification.estimation.problem import in_blocks
 from identification.estimation.slip_beam import (
     SCATTER,
     STUCK,
@@ -22,7 +23,6 @@ from identification.estimation.slip_beam import (
     log_chance,
     slip_chance,
 )
-from identification.estimation.window import Window
 from identification.record import Floats
 from identification.simulation.lag import Lag
 
@@ -141,9 +141,9 @@ def cycled(scatter: float, seed: int, n: int = 4000) -> tuple[Floats, Floats]:
 
 
 def asked(scatter: float, seed: int):
-    """Window, play and path of such a loop, its first quarter left out."""
+    """Problem, play and path of such a loop, its first quarter left out."""
     pv, op = (x[1000:] for x in cycled(scatter, seed))
-    window = Window(pv, np.ascontiguousarray(op), np.ones(pv.size, dtype=bool), 1.0)
+    window = in_blocks(pv, np.ascontiguousarray(op), np.ones(pv.size, dtype=bool), 1.0)
     crossings = int((np.diff(np.sign(op - op.mean())) != 0).sum())
     period = 2.0 * op.size / max(crossings, 1)
     period = max(period, 40.0)
@@ -190,7 +190,7 @@ def test_a_square_pv_of_a_fast_flow_is_no_play(seed):
         pipe.append(stem)
         x += (1.0 - math.exp(-1.0 / 12.0)) * (50.0 + 1.1 * (pipe.pop(0) + load - 50.0) - x)
     pv, op = np.array(pv_out[100:]), np.array(op_out[100:])
-    window = Window(pv, op, np.ones(pv.size, dtype=bool), 10.0)
+    window = in_blocks(pv, op, np.ones(pv.size, dtype=bool), 10.0)
     play = fit_play(fit_linear(window, 300.0), 300.0)
     assert play.gain > 3.0 * 1.1
     path = fit_irregular(play, generic_noise(), 300.0)
@@ -216,7 +216,7 @@ def test_a_jump_of_nearly_the_stickband_is_recovered():
         pipe.append(stem)
         x += (1.0 - math.exp(-1.0 / 57.0)) * (1.4 * (pipe.pop(0) + load - 50.0) - x)
     pv, op = pv[1800:], np.ascontiguousarray(op[1800:])  # the cycle has built up
-    window = Window(pv, op, np.ones(pv.size, dtype=bool), 1.0)
+    window = in_blocks(pv, op, np.ones(pv.size, dtype=bool), 1.0)
     play = fit_play(fit_linear(window, 92.0), 92.0)
     assert play.valve.stickband > 1.4 * (static + kinetic)
     assert play.gain > 1.5 * 1.4

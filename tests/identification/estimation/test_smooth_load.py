@@ -10,8 +10,8 @@ import pytest
 
 from benchmarks.world.draw import Drawn, run
 from benchmarks.world.simulate import Controller, Process, Valve, sensitivity
+from identification.estimation.problem import Problem, block_means, in_blocks
 from identification.estimation.smooth_load import as_fit, fit_line, fit_smooth, resonant_starts
-from identification.estimation.window import Window, block_means
 from identification.models import Loop, Pid
 from tuning.frequency_response import controller_response, maximum_sensitivity
 
@@ -24,11 +24,11 @@ CALM = Drawn(
 BLOCK = 4
 
 
-def _window(d: Drawn, scale: float = 1.0) -> Window:
+def _window(d: Drawn, scale: float = 1.0) -> Problem:
     t = run(d, hours=8)
     n = t.pv.size // BLOCK
     pv, op = scale * block_means(t.pv, BLOCK), np.ascontiguousarray(t.op[: n * BLOCK])
-    return Window(pv, op, np.ones(n, dtype=bool), BLOCK * 1.0, BLOCK)
+    return in_blocks(pv, op, np.ones(n, dtype=bool), BLOCK * 1.0, BLOCK)
 
 
 def _law(d: Drawn, period_s: float) -> tuple[Pid, complex]:
@@ -75,8 +75,8 @@ def test_holes_are_bridged():
     """A twentieth of the blocks missing moves slope and dead time by less than a tenth."""
     whole = _window(TIGHT)
     holes = np.random.default_rng(3).random(whole.usable.size) < 0.05
-    y = np.interp(np.arange(holes.size), np.flatnonzero(~holes), whole.y[~holes])
-    thin = Window(y, whole.op, ~holes, whole.dt_s, whole.factor)
+    y = np.interp(np.arange(holes.size), np.flatnonzero(~holes), whole.pv[~holes])
+    thin = in_blocks(y, whole.blocks.op, ~holes, whole.dt_s, whole.blocks.factor)
     one, other = (fit_smooth(w, 100.0, [((100.0, 16.0), None)]) for w in (whole, thin))
     assert other.process.slope == pytest.approx(one.process.slope, rel=0.1)
     assert other.process.dead_time_s == pytest.approx(one.process.dead_time_s, rel=0.1)

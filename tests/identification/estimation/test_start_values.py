@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from identification.estimation.problem import in_blocks
 from identification.estimation.search import plain_processes
 from identification.mismatch.plain_loop import prepared
 from identification.models import Fopdt, Loop, Pid
@@ -32,7 +33,7 @@ def recorded(seed: int) -> LoopRecord:
 def test_starts_hold_one_near_the_truth() -> None:
     """Of the two starts one has the gain within a third and the lag plus dead time within a third."""
     s = recorded(11)
-    found = plain_processes(s.pv - s.pv.mean(), s.op, ~s.bad, s.dt_s)
+    found = plain_processes(in_blocks(s.pv, s.op, ~s.bad, s.dt_s))
     assert any(
         abs(p.gain / 1.2 - 1) < 0.33 and abs((p.time_constant_s + p.dead_time_s) / 23.4 - 1) < 0.33
         for p in found

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -14,7 +12,7 @@ from identification.estimation.evidence import (
     trials,
     trials_between_moves,
 )
-from identification.estimation.window import Window
+from identification.estimation.problem import in_blocks
 from identification.models import Backlash, Fopdt
 from identification.signals.turns import turning_points, turns_of
 from identification.simulation.valve import RESTS, StemLaw
@@ -36,7 +34,7 @@ def judged(valve: Backlash | None, seed: int) -> Trials:
     op = swinging(seed)
     noise = 0.2 * np.random.default_rng(seed + 100).standard_normal(N)
     pv = pv_of(Fopdt(1.5, 30.0, 5.0), valve, op, 1.0) + noise
-    window = Window(pv, op, np.ones(N, dtype=bool), 1.0)
+    window = in_blocks(pv, op, np.ones(N, dtype=bool), 1.0)
     linear = fit_linear(window, PERIOD)
     found = trials(fit_play(linear, PERIOD), linear, PERIOD)
     assert found is not None
@@ -77,7 +75,7 @@ def test_trials_do_not_agree_behind_an_ideal_valve(seed):
 def test_gains_add_up_to_the_evidence_of_the_same_scale():
     """A fit has no gain over itself."""
     op = swinging(1)
-    window = Window(pv_of(Fopdt(1.5, 30.0, 5.0), None, op, 1.0), op, np.ones(N, dtype=bool), 1.0)
+    window = in_blocks(pv_of(Fopdt(1.5, 30.0, 5.0), None, op, 1.0), op, np.ones(N, dtype=bool), 1.0)
     rival = fit_linear(window, PERIOD)
     assert not gains(rival, rival).any()
 
@@ -85,7 +83,7 @@ def test_gains_add_up_to_the_evidence_of_the_same_scale():
 def test_too_few_turns_are_no_trials():
     """A record with two turns of OP has none."""
     op = swinging(1)[:300]
-    window = Window(op.copy(), op, np.ones(300, dtype=bool), 1.0)
+    window = in_blocks(op.copy(), op, np.ones(300, dtype=bool), 1.0)
     rival = fit_linear(window, PERIOD)
     assert trials(rival, rival, PERIOD) is None
 
@@ -95,7 +93,7 @@ def test_moves_of_a_stem_are_trials_where_nothing_cycles(seed):
     """Behind a play of 3 % nine in ten stretches between moves of the stem show it; OP turns as often as it moves."""
     op = swinging(seed)
     noise = 0.2 * np.random.default_rng(seed + 100).standard_normal(N)
-    window = Window(
+    window = in_blocks(
         pv_of(Fopdt(1.5, 30.0, 5.0), Backlash(3.0), op, 1.0) + noise, op, np.ones(N, dtype=bool), 1.0
     )
     linear = fit_linear(window, PERIOD)
@@ -109,7 +107,7 @@ def test_moves_of_a_stem_are_trials_where_nothing_cycles(seed):
 def test_a_stem_that_never_moves_is_no_trial():
     """A play wider than OP's range leaves no move, and so no trial."""
     op = 50 + np.sin(np.arange(N) / 50.0)
-    window = Window(0.1 * np.random.default_rng(1).standard_normal(N), op, np.ones(N, dtype=bool), 1.0)
+    window = in_blocks(0.1 * np.random.default_rng(1).standard_normal(N), op, np.ones(N, dtype=bool), 1.0)
     plain = fit_linear(window, PERIOD)
-    still = replace(plain, valve=StemLaw(5.0, 5.0, RESTS))
+    still = plain.moved(valve=StemLaw(5.0, 5.0, RESTS))
     assert trials_between_moves(still, plain) is None

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identification.estimation.prediction_error import problem
+from identification.estimation.problem import problem
 from identification.mismatch.plain_loop import Clip, inputs_of, plain
 from identification.mismatch.proof import anchored
 from identification.models import Fopdt

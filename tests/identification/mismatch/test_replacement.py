@@ -7,7 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from identification.estimation.prediction_error import Model, descended, residual_fit
+from identification.estimation.model import Model
+from identification.estimation.prediction_error import descended, residual_fit
 from identification.mismatch import diagnosis
 from identification.mismatch.answer import alternatives
 from identification.mismatch.catalogue import EFFECTS

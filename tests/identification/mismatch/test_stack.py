@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
+from identification.estimation.model import Model
 from identification.estimation.noise import NO_NOISE
-from identification.estimation.prediction_error import Model
 from identification.mismatch.catalogue import CANDIDATES
 from identification.mismatch.explanation import Explanation, is_stack
 from identification.mismatch.plain_loop import inputs_of, prepared

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from identification.controller.check import Finding, StatedSettings
-from identification.estimation.prediction_error import Fitted, Model, Problem, descended, problem
+from identification.estimation.model import Fitted, Model
+from identification.estimation.prediction_error import descended
+from identification.estimation.problem import Problem, problem
 from identification.mismatch.answer import Answer, answer
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.diagnosis import explain, without_the_idle
@@ -96,7 +98,7 @@ def test_free_valve_is_asked_for_no_friction() -> None:
     """Where the cycles convict no valve, no effect of friction is tried, and all others are."""
     s = recorded(3, 0.3, 0.01, None)
     p = problem(inputs_of(s), s.pv - s.pv.mean(), s.usable)
-    near = Fitted(Model((), as_parameters(Fopdt(GAIN, LAG, DEAD))), 1.0, N, np.zeros(3), np.zeros(N))
+    near = Fitted(p, Model((), as_parameters(Fopdt(GAIN, LAG, DEAD))), 1.0, N, np.zeros(3), np.zeros(N))
     asked = {
         free: {r.name for e in EFFECTS.values() for r in e.candidates if applies(x, r)}
         for free in (False, True)
@@ -163,7 +165,7 @@ def test_constant_at_its_far_end_is_no_finding(name: str, slot: Slot, value: flo
     for q in row.params:
         c[q.slot] = 5.0 if q.log else -0.5
     c[slot] = value if name != "saturation" else float(p.inputs.op.max())
-    assert runs_out(p, Fitted(Model((row,), c), 1.0, N, np.zeros(3), np.zeros(N))) is out
+    assert runs_out(p, Fitted(p, Model((row,), c), 1.0, N, np.zeros(3), np.zeros(N))) is out
 
 
 def test_play_that_a_valve_in_good_order_has_is_no_finding() -> None:
@@ -217,9 +219,9 @@ def test_idle_effect_goes_again() -> None:
 def test_grid_yields_to_what_lasts_and_not_to_a_load(name: str, first: bool) -> None:
     """An effect of valve or process that the grid cannot hide stands before it; a load says nothing against it."""
     p = as_problem(10, 0.0)
-    plain = Fitted(Model((), as_parameters(Fopdt(GAIN, LAG, DEAD))), 1.0, N, np.zeros(3), np.zeros(N))
+    plain = Fitted(p, Model((), as_parameters(Fopdt(GAIN, LAG, DEAD))), 1.0, N, np.zeros(3), np.zeros(N))
     row = EFFECTS[name].candidates[0]
-    best = Fitted(Model((row,), plain.model.c), 0.5, N, np.zeros(3), np.zeros(N))
+    best = Fitted(p, Model((row,), plain.model.c), 0.5, N, np.zeros(3), np.zeros(N))
     grid = Finding({"step_pct": 0.2}, np.ones(N, dtype=bool), "quantization")
     found = Explanation(p, plain, best, (Candidate(best, 20.0, 10.0),), recorder=grid)
     assert (found.finding is grid) is first
