@@ -197,11 +197,20 @@ def maximum_sensitivity(loop: Loop) -> float:
     return 1.0 / float(_least_distance(process, c.kp, law, omega * c.scan_s))
 
 
-def resonance_s(loop: Loop) -> float:
+def resonance_s(loop: Loop, near_s: float = 0.0, least: float = math.inf) -> float:
     """Period [s] of the largest amplification of loads by the linear part: of the largest peak of abs(1/(1 + L)), or
-    of its maximum if there is no peak."""
+    of its maximum if there is no peak.
+
+    near_s : period [s] whose nearest peak is preferred among those at least as high as `least`: behind a dead time
+    longer than its lag a loop rings at each odd multiple of its frequency, and the highest peak may be any of them.
+    """
     omega = frequencies(loop, LOOKED_AT, lowest=1e-2)
     size = 1.0 / np.abs(1.0 + loop_response(loop, omega))
+    peaks = 1 + np.flatnonzero((size[1:-1] >= size[:-2]) & (size[1:-1] >= size[2:]) & (size[1:-1] >= least))
+    if near_s > 0.0 and peaks.size:
+        return float(
+            2.0 * math.pi / omega[peaks[np.argmin(np.abs(np.log(omega[peaks] * near_s / (2.0 * math.pi))))]]
+        )
     return float(2.0 * math.pi / omega[int(np.argmax(size))])
 
 

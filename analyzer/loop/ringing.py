@@ -29,6 +29,8 @@ LEAST = (1.5, 1.57, 1.73, 1.89, 1.96, 2.1, 2.18, 2.42, 2.57)
 LIKELY_MS = 30.0
 """Maximum sensitivity of a gain margin of 1.03: few loops are so near their limit of stability without crossing it,
 while a loop without a fault under a sine, explained as ringing, has 34 and more (benchmarks/world)."""
+POORLY_DAMPED = 2.0
+"""Peak of the sensitivity above which a loop is poorly damped [-] (Astrom, Hagglund 2006: 1.4 to 2)."""
 OF_RINGING = 2.0
 """Evidence for a valve fault, over the penalty of its constants, in a loop that rings without it [-]: ours, a sound
 valve of benchmarks/world (seed 542) has 1.6, worn ones of proofs/untidy_loops.py (seed 16) 2.6 and 3.6, a weak one
@@ -215,9 +217,9 @@ def _resonant(window: Problem, period_s: float, law: Pid | None) -> list[tuple[D
 
 
 def _peak(smooth: SmoothFit, window: Problem, law: Pid | None, scale_s: float) -> tuple[float, float]:
-    """Maximum sensitivity [-] of the loop of a fit, and the period [s] of its peak; 1 without a law, or if it acts
-    the wrong way."""
+    """Maximum sensitivity [-] of the loop of a fit, and the period [s] of its poorly damped peak nearest to the
+    expected one, or of its largest; 1 without a law, or if it acts the wrong way."""
     if law is None or law.sign * smooth.process.gain <= 0.0:
         return 1.0, scale_s
     loop = Loop(between_samples(smooth.process, window, law), law)
-    return maximum_sensitivity(loop), resonance_s(loop)
+    return maximum_sensitivity(loop), resonance_s(loop, scale_s, POORLY_DAMPED)

@@ -6,6 +6,7 @@ The descent of the batch run in gauss_newton.py is its fast path for a lag behin
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -237,12 +238,19 @@ def innovations_of(p: Problem, found: Residual) -> Floats:
     return whitened(left, found.ar, p.edges)  # type: ignore[no-any-return]
 
 
-def deviations(p: Problem, fit: Fitted) -> Floats:
-    """Standard deviations of the free constants (of logarithms where so searched), shape (m,); see descent.py."""
+def deviations(p: Problem, fit: Fitted, held: Collection[int] = ()) -> Floats:
+    """Standard deviations of the free constants (of logarithms where so searched), shape (m,); see descent.py.
+
+    held : indices of constants that are not free; their deviations are zero.
+    """
     found = residual_fit(p, fit.model)
     gram, _, moves = curvature(p, found)
     if not np.isfinite(gram).all():
         return np.full(gram.shape[0], np.inf)
     follow = np.linalg.lstsq(found.gram, found.columns @ moves.T, rcond=1e-13)[0]
     scores = (moves - follow.T @ found.columns) * found.white
-    return np.sqrt(np.maximum(np.diag(scattered(inverse(gram), scores.T, fit.loss)), 0.0))
+    free = np.array([i for i, q in enumerate(fit.model.params) if q.slot not in held])
+    spread = scattered(inverse(gram[np.ix_(free, free)]), scores[free].T, fit.loss)
+    out = np.zeros(gram.shape[0])
+    out[free] = np.sqrt(np.maximum(np.diag(spread), 0.0))
+    return out

@@ -10,12 +10,12 @@ import numpy as np
 
 from identification.estimation.descent import half_width, nats
 from identification.estimation.model import Fitted
-from identification.estimation.prediction_error import deviations, residual_fit
+from identification.estimation.prediction_error import bounds, deviations, residual_fit
 from identification.estimation.problem import Problem
 from identification.mismatch import words
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.catalogue.supply_variation import AT_REST
-from identification.mismatch.effect import TIE, Block, exact
+from identification.mismatch.effect import TIE, Block
 from identification.mismatch.explanation import Explanation, by_cycles, is_stack
 from identification.mismatch.outside import about
 from identification.mismatch.proof import HeldOut
@@ -182,31 +182,38 @@ def effects_of(found: Explanation, s: Recording) -> tuple[EffectFound, ...]:
 
 
 def parameters_of(p: Problem, fit: Fitted, row: Variant) -> dict[str, Estimate]:
-    """A row's constants with 90 % intervals (descent.py)."""
+    """A row's constants with 90 % intervals (descent.py), which end where their ranges do."""
     wide = dict(zip((q.slot for q in fit.model.params), deviations(p, fit), strict=True))
     out = {}
     for q in row.params:
         value, half = float(fit.model.c[q.slot]), half_width(float(wide[q.slot]))
+        low, high = bounds(p.inputs, fit.model.c, q)
         if q.log:
             spread = math.exp(min(half, 5.0))
             out[q.name] = Estimate(value, value / spread, value * spread, q.unit)
         else:
-            out[q.name] = exact(value, q.unit, half)
+            out[q.name] = Estimate(value, max(value - half, low), min(value + half, high), q.unit)
     derived = about(row.name).derived
     return out | (derived(out) if derived is not None else {})
 
 
 SIZES = (
     *("coupling_gain", "gain_drift", "gain_slope", "curve", "opposing_share", "flow_share", "slow_share"),
-    *("amplitude_pct", "size_1_pct"),
+    *("sine_pct", "cosine_pct", "size_1_pct", "size_2_pct", "size_3_pct"),
 )
-"""Parameters that give the size of an effect: at zero there is no effect."""
+"""Parameters that give the size of an effect: where all of them are zero there is no effect."""
 
 
 def holds_zero(p: Problem, fit: Fitted, row: Variant) -> bool:
-    """Whether the interval of an effect's size includes zero, so that there is no evidence of the effect."""
-    found = parameters_of(p, fit, row)
-    return any(found[name].low < 0.0 < found[name].high for name in SIZES if name in found)
+    """Whether the intervals of all sizes of an effect include zero, so that there is no evidence of the effect.
+
+    An effect of size zero has no other constants: they are present under the alternative alone (Davies 1987), and are
+    held.
+    """
+    sizes = [q for q in row.params if q.name in SIZES]
+    held = {int(q.slot) for q in row.params} - {int(q.slot) for q in sizes}
+    wide = dict(zip((q.slot for q in fit.model.params), deviations(p, fit, held), strict=True))
+    return bool(sizes) and all(abs(fit.model.c[q.slot]) < half_width(float(wide[q.slot])) for q in sizes)
 
 
 def alternatives(found: Explanation) -> tuple[str, ...]:

@@ -313,7 +313,7 @@ def test_a_calm_loop_witnesses_no_width_that_its_stretches_do_not_bear_out(pipe)
     """Stick-slip that was tried on a calm loop is not told slip by slip: its width is none where single stretches
     alone speak for it."""
     m = pipe.verdict.require_measured
-    tried = replace(m.play, valve=m.play.valve._replace(sliding=0.25 * m.play.valve.stickband))
+    tried = m.play.moved(valve=m.play.valve._replace(sliding=0.25 * m.play.valve.stickband))
     single = replace(m, stick_slip=tried, steady=0.0, asked=0.0)
     calm = replace(pipe.verdict, measured=single, steady=None)
     said = json.loads(witness(calm, False, prepared(simulate(PIPE, 6.0)), CONFIG) or "")

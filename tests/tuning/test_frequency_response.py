@@ -117,3 +117,12 @@ def test_a_loop_near_its_limit_amplifies_most_at_its_ultimate_period():
     (Ziegler, Nichols 1942): phase -90 degrees of the integrator and -90 of the dead time."""
     loop = Loop(Integrator(0.01, 30.0), Pid(0.95 * 0.5 * math.pi / (0.01 * 30.0), math.inf, scan_s=0.0))
     assert resonance_s(loop) == pytest.approx(120.0, rel=0.03)
+
+
+def test_the_peak_next_to_an_expected_period_is_preferred() -> None:
+    """A gain of .9 behind a dead time has equal peaks at two dead times and at odd parts of them; no peak of a
+    hundred is there, and then the largest counts."""
+    loop = Loop(Fopdt(1.0, 1e-3, 30.0), Pid(0.9, math.inf, scan_s=0.0))
+    for period_s in (60.0, 20.0, 12.0):
+        assert resonance_s(loop, 1.1 * period_s, 2.0) == pytest.approx(period_s, rel=0.03)
+    assert resonance_s(loop, 20.0, 100.0) == resonance_s(loop)
