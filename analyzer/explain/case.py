@@ -55,6 +55,8 @@ WHOLE_SAMPLES = 40000  # Samples up to which a recording is explained whole: 20 
 STRETCH_SAMPLES = 15000
 """Samples of the most informative stretch of a longer one: as much time, because a long recording contains
 more that requires an effect."""
+NIGHT_S, LONGER = 86400.0, 1.5
+"""Length of a night [s], and of a recording, in nights, from which its last night alone is judged as a night."""
 PART_SAMPLES = 300
 """Samples of PV from which a part under other settings is judged: a noise model that looks 25 back needs
 twelve times that."""
@@ -179,6 +181,27 @@ def telling_stretch(prepared: Prepared, most: int | None) -> tuple[Prepared, str
     return replace(prepared, record=r.span(first, first + most)), said
 
 
+def latest_night(prepared: Prepared) -> Prepared:
+    """The last NIGHT_S of a longer record: what a night judges."""
+    r = prepared.record
+    n = round(NIGHT_S / r.dt_s)
+    return prepared if len(r) < LONGER * n else replace(prepared, record=r.span(len(r) - n, len(r)))
+
+
+def stretch_of_night(prepared: Prepared, verdict: Verdict, most: int) -> tuple[Prepared, str]:
+    """The night's part of a recording, of more than `most` samples STRETCH_SAMPLES up to the end of the stretch in
+    which it fitted a valve fault, and a sentence on it."""
+    night = latest_night(prepared)
+    r, m = night.record, verdict.require_measured
+    if len(r) > most:
+        fitted = m.window.blocks.first + m.window.y.size * m.window.blocks.factor
+        first = min(max(fitted - STRETCH_SAMPLES, 0), len(r) - STRETCH_SAMPLES)
+        night = replace(night, record=r.span(first, first + STRETCH_SAMPLES))
+    days = f"{len(night.record) * r.dt_s / 86400:.1f} of {prepared.record.duration_s / 86400:.1f} days"
+    said = f"Judged on {len(night.record)} of {len(prepared.record)} samples, the {days} in which the night"
+    return night, f"{said} identified the valve."
+
+
 def case(
     spec: LoopSpec,
     specs: tuple[LoopSpec, ...],
@@ -201,7 +224,12 @@ def case(
     taught = learned(spec, series, whole, config, beside=ops_beside(spec, specs, series, whole, config))
     known = controller(spec, whole.scale.span) is not None
     coarse = whole if most is None or len(whole.record) <= most else coarser(whole, taught, config, known)
-    prepared, shortened = telling_stretch(as_given(coarse), most)
+    verdict, period_s = verdict_on(spec, latest_night(whole), config)
+    verdict = as_decided(verdict, fault)
+    if most is not None and len(coarse.record) > most and coarse is whole and verdict.cause is Cause.VALVE:
+        prepared, shortened = stretch_of_night(as_given(whole), verdict, most)
+    else:
+        prepared, shortened = telling_stretch(as_given(coarse), most)
     if coarse is not whole:
         stated = f"each {coarse.record.dt_s:.3g} s: its experiments need no more."
         shortened = (
@@ -217,8 +245,6 @@ def case(
         raise NotAssessedError(f"{spec.loop}: {lacks}")
     stamps = raw.stamp_s[~raw.bad]
     stamps = stamps[(stamps >= r.start_s - r.dt_s) & (stamps <= r.start_s + r.duration_s)]
-    verdict, period_s = verdict_on(spec, whole, config)
-    verdict = as_decided(verdict, fault)
     others = ops_beside(spec, specs, series, prepared, config)
     subject = subject_of(spec, prepared, stamps, (verdict, period_s), others, config)
     factor = coarser_by(subject) if is_experiment(subject) else 1

@@ -16,7 +16,6 @@ from identification.estimation.model import Fitted, Model
 from identification.estimation.noise import fitted, lag_means, whitened
 from identification.estimation.problem import Problem
 from identification.record import Floats
-from identification.signals.filters import without_lines
 from identification.simulation.open_loop import ModelInputs, simulate
 from identification.simulation.parameters import Param, Slot
 
@@ -100,7 +99,7 @@ class Residual:
 def residual_fit(p: Problem, model: Model) -> Residual:
     """Residual, noise model and innovations of a model."""
     simulated = simulate(p.inputs, model.c)
-    r = without_lines(p.y - simulated, p.horizon)
+    r = p.judged_part(p.y - simulated)
     groups, root, total = p.edges.size - 1, np.sqrt(p.weight), float(p.weight.sum())
     if not float(np.abs(r).max()) < FAR:
         none = np.zeros((groups, r.size)), np.zeros((groups, groups)), np.zeros(groups)
@@ -138,7 +137,7 @@ def sensitivities(p: Problem, model: Model, ar: Floats, here: Floats | None = No
             h = -h
         c[param.slot] += h
         slope = (simulate(p.inputs, c) - here) / (h / model.c[param.slot] if param.log else h)
-        out[i] = whitened(without_lines(np.clip(slope, -1e9, 1e9), p.horizon), ar, p.edges)
+        out[i] = whitened(p.judged_part(np.clip(slope, -1e9, 1e9)), ar, p.edges)
     return out
 
 
@@ -234,7 +233,7 @@ def innovations_of(p: Problem, found: Residual) -> Floats:
     """Innovations [% PV], shape (n,), including those with zero weight."""
     if not found.loss < FAR**2:
         return np.full(p.y.size, FAR)
-    left = without_lines(p.y - found.simulated, p.horizon)
+    left = p.judged_part(p.y - found.simulated)
     return whitened(left, found.ar, p.edges)  # type: ignore[no-any-return]
 
 

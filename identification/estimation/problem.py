@@ -19,6 +19,7 @@ from identification.estimation.noise import AR_ORDER, Edges, edges_for, judged
 from identification.limits import LIMITS, ExplainLimits
 from identification.record import Floats, Mask
 from identification.signals.correlation import correlated
+from identification.signals.filters import in_band, without_lines
 from identification.simulation.open_loop import ModelInputs
 from identification.simulation.valve import RESTS, StemLaw, first_slip, stem_step
 
@@ -91,8 +92,9 @@ class Problem:
     inputs : inputs of the model, one value per sample; y : PV less inputs.level, shape (n,); usable : bool, shape
     (n,), False at gaps; weight : shape (n,), weight of each innovation, 0 where it is not judged; edges : lag groups
     of the noise model; blocks : the rows of the samples. limits : thresholds for candidates; memory : in an
-    experiment, largest number of samples per independent one; horizon : samples after which a simulation judged by
-    its own errors restarts (without_lines), 0 for one run over all. The fits of the batch run have noise models of
+    experiment, largest number of samples per independent one; of a simulation judged by its own errors, horizon :
+    samples after which it restarts (without_lines), 0 for one run over all, and band : shortest and longest period
+    [samples] in which it is judged, None for all. The fits of the batch run have noise models of
     their own (gauss_newton.py), and judge each usable sample equally.
     """
 
@@ -105,6 +107,11 @@ class Problem:
     limits: ExplainLimits = LIMITS
     memory: float = math.inf
     horizon: int = 0
+    band: tuple[float, float] | None = None
+
+    def judged_part(self, x: Floats) -> Floats:
+        """The part of a simulation's errors, shape (n,), that is judged."""
+        return in_band(x, *self.band) if self.band else without_lines(x, self.horizon)
 
     @property
     def count(self) -> int:

@@ -260,11 +260,11 @@ def fit_of(found: Explanation, dt_s: float) -> dict[str, Any]:
 
 def in_band_of(proof: HeldOut) -> dict[str, Any] | None:
     """Misfits on held-out data in the loop's band, and its shortest and longest period [s]."""
-    if proof.band is None or proof.banded is None:
+    if proof.in_band is None:
         return None
-    shortest, longest = proof.band
-    baseline, explained = map(asdict, proof.banded)
-    return {"shortest_s": shortest, "longest_s": longest, "baseline": baseline, "explained": explained}
+    (shortest, longest), x = proof.in_band.band, proof.in_band
+    misfits = {"baseline": asdict(x.plain), "explained": asdict(x.better)}
+    return {"shortest_s": shortest, "longest_s": longest, **misfits}
 
 
 def constants_moved(found: Explanation) -> dict[str, tuple[float, float]]:

@@ -179,13 +179,13 @@ def adds_in_band(found: Explanation, proof: HeldOut) -> bool:
     """Whether the last effect removes enough of the held-out misfit in the loop's band, if that is known. A second
     effect takes up what the first one's model leaves, which is a deficit of the model everywhere; the first one only
     must not add to it."""
-    if found.band is None or proof.banded is None or not proof.holds_in_band:
+    if proof.in_band is None or not proof.holds_in_band:
         return proof.holds_in_band
     if len(found.accepted) == 1:
         return True
     less = first_effects(found, len(found.accepted) - 1)
-    before = held_out(less.p, less.plain, less.best, band=found.band).banded
-    return before is None or proof.banded[1].rmse ** 2 <= (1.0 - LEAST_IN_BAND) * before[1].rmse ** 2
+    before = held_out(less.p, less.plain, less.best, band=found.band).in_band
+    return before is None or proof.in_band.better.rmse**2 <= (1.0 - LEAST_IN_BAND) * before.better.rmse**2
 
 
 def first_effects(found: Explanation, count: int) -> Explanation:

@@ -31,8 +31,8 @@ from identification.record import Floats
 from identification.signals.filters import stretch_ends
 from identification.simulation.open_loop import as_parameters, from_flow, simulate
 from identification.simulation.parameters import Signal, Slot, Variant, acted, alone
-from identification.simulation.valve import StemLaw, moved_stem, sticking
-from identification.simulation.valve_chain import before_stem, behind_stem, friction_of
+from identification.simulation.valve import IDEAL, StemLaw, moved_stem, sticking
+from identification.simulation.valve_chain import before_stem, behind_stem, friction_of, with_friction
 
 STARTS = 3  # Starts of a candidate, or of a stem with mass, that are followed to the end: bounds the time
 MASSES_MOVED = 20  # Starts of a stem with mass that are moved by small steps: bounds the time
@@ -164,16 +164,28 @@ def _begun(p: Problem, near: Fitted, seen: SeenInCycles, valve: Valve) -> Floats
 def simulated_anew(p: Problem, c: Floats, window: int) -> Floats:
     """PV's deviation [% PV], shape (n,), for constants, shape (SIZE + own,), the stem re-estimated every `window`
     samples; as simulate() without friction."""
-    inputs, friction = p.inputs, friction_of(c)
-    if friction.breakaway <= 0.0:
+    inputs = p.inputs
+    if friction_of(c).breakaway <= 0.0:
         return simulate(inputs, c)
+    flow = behind_stem(stem_anew(p, c, window), c, inputs.dt_s, inputs.middle)
+    return from_flow(inputs, c, acted(Signal.FLOW, flow, c, inputs.dt_s))
+
+
+def stem_anew(p: Problem, c: Floats, window: int) -> Floats:
+    """The stem [% OP], shape (n,), behind the friction of constants, re-estimated every `window` samples."""
+    inputs = p.inputs
     op = before_stem(np.ascontiguousarray(acted(Signal.OP, inputs.op, c, inputs.dt_s)), c, inputs.dt_s)
     dead = round(float(c[Slot.L]) / inputs.dt_s)
     pole = math.exp(-inputs.dt_s / max(float(c[Slot.T]), 1e-9))
-    mass = float(c[Slot.STEM_T]), inputs.dt_s
-    stem = stem_placed(op, p.y, stretch_ends(op.size, window), dead, pole, float(c[Slot.K]), friction, mass)
-    flow = behind_stem(stem, c, inputs.dt_s, inputs.middle)
-    return from_flow(inputs, c, acted(Signal.FLOW, flow, c, inputs.dt_s))
+    mass, ends = (float(c[Slot.STEM_T]), inputs.dt_s), stretch_ends(op.size, window)
+    return stem_placed(op, p.y, ends, dead, pole, float(c[Slot.K]), friction_of(c), mass)  # type: ignore[no-any-return]
+
+
+def behind_placed(p: Problem, c: Floats, window: int) -> tuple[Problem, Floats]:
+    """The problem with the stem, re-estimated every `window` samples, in place of OP, and the constants without
+    friction: a process can be fitted to it as behind an ideal valve."""
+    stem = stem_anew(p, c, window)
+    return replace(p, inputs=replace(p.inputs, op=stem)), with_friction(c, IDEAL)
 
 
 @njit(cache=True)

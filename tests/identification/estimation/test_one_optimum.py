@@ -20,6 +20,7 @@ from identification.record import Floats
 from identification.simulation.open_loop import ModelInputs, as_parameters, simulate
 from identification.simulation.parameters import Slot, neutral
 from identification.simulation.valve import HALTS, IDEAL, StemLaw, first_slip, sticking
+from identification.simulation.valve_chain import friction_of, with_friction
 
 GAIN, LAG, DEAD, BAND, N = 1.3, 20.0, 4.0, 2.0, 4000
 FIRST = 420
@@ -104,3 +105,25 @@ def test_where_a_stem_stood_first_is_not_carried_to_another_recording() -> None:
     back = constants(data)
     assert (back[Slot.PLACE], back[Slot.START]) == (0.0, 0.0)
     assert (back[Slot.K], back[Slot.STICKBAND]) == (1.2, 2.0)
+
+
+def test_a_constant_has_a_smaller_deviation_where_another_is_held() -> None:
+    """With the time constant held its deviation is zero and that of the gain is smaller: the two go together."""
+    pv, op = cycled(7)
+    p = in_blocks(pv, op, np.ones(N, dtype=bool), 1.0)
+    fit = descend_any(
+        p, Model((), as_parameters(start_at(p, GAIN, (LAG, DEAD), IDEAL, generic_noise()).process)), 20
+    )
+    slots = [int(q.slot) for q in fit.model.params]
+    free, held = (dict(zip(slots, deviations(p, fit, fixed), strict=True)) for fixed in ((), (int(Slot.T),)))
+    assert held[Slot.T] == 0.0
+    assert 0.0 < held[Slot.K] < 0.95 * free[Slot.K]
+
+
+@pytest.mark.parametrize(
+    "law",
+    [IDEAL, sticking(2.0, 0.0), sticking(2.0, 1.0, HALTS), sticking(3.0, 0.4, 0.0), sticking(3.0, 0.4, 0.3)],
+)
+def test_a_model_keeps_a_valve(law: StemLaw) -> None:
+    """A valve written into a model's constants is read from them, with the reversal that a sliding stem ignores."""
+    assert friction_of(with_friction(neutral(), law)) == pytest.approx(law)

@@ -185,7 +185,8 @@ def test_less_far_astray_is_no_proof(fit_pct: float, carries: bool) -> None:
 
 
 @pytest.mark.parametrize(
-    ("gain", "held", "carries"), [(5.0, 1.03, False), (50.0, 1.03, True), (50.0, 1.4, False)]
+    ("gain", "held", "carries"),
+    [(2.5, 1.03, False), (3.5, 1.03, True), (50.0, 1.03, True), (50.0, 1.4, False)],
 )
 def test_what_is_seen_ahead_has_to_simulate_as_well_as_a_plain_loop(
     gain: float, held: float, carries: bool
