@@ -17,13 +17,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import identification  # noqa: F401 (before numba: the kernels' cache)
-from analyzer.comparison.before_after import Change, Grade, grade
+from analyzer.comparison.before_after import grade
+from analyzer.comparison.measures import Change, Grade
 from analyzer.config import Config
 from analyzer.history.export import open_export
 from analyzer.loops.changes import TuningChange
 from analyzer.night import batch
 from analyzer.night.nights import Plant
-from analyzer.pages.before_after import NINETY, ChangeCase, change_cases
+from analyzer.pages.before_after import NINETY
+from analyzer.pages.change_cases import ChangeCase, change_cases
 from analyzer.store.store import Store
 from benchmarks.world.__main__ import START_US, export, spec_of
 from proofs.before_after_plant import CHANGES, DAY_S, DAYS, NOTHING, Changed, changed, recorded, truth

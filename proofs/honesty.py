@@ -17,14 +17,8 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.stats import ttest_ind
 
-from analyzer.comparison.before_after import (
-    MEASURES,
-    ChangeVerdict,
-    LoopComparison,
-    compare,
-    gridded,
-    spans_around,
-)
+from analyzer.comparison.before_after import LoopComparison, compare
+from analyzer.comparison.measures import MEASURES, ChangeVerdict, gridded, spans_around
 from analyzer.config import Config
 from analyzer.loop.assessments import hourly
 from analyzer.loop.oscillation import detect

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.comparison.before_after import Span, compare, grade
+from analyzer.comparison.before_after import compare, grade
 from analyzer.comparison.before_after import follows as source_of
+from analyzer.comparison.measures import Span
 from analyzer.config import Config
 from analyzer.loop.advice import advise
 from analyzer.loop.assess import assess, cause_of, verdict_by_measures
 from analyzer.loop.assessments import assess_span
-from analyzer.loop.cause import dead_valve
+from analyzer.loop.dead_valve import dead_valve
 from analyzer.loop.decisions import Finding, SignKind, Status, Swing
 from analyzer.loop.fitness import at_limits
 from analyzer.loop.judged_stretch import differing

@@ -1,6 +1,7 @@
 """The data of a page: frozen, with final texts and numbers; rendered to HTML or Markdown elsewhere.
 
-Any text may contain anything that a plant writes; the renderers escape it. Arrays are float64, shapes as given.
+Any text may contain anything that a plant writes; the renderers escape it. Arrays are float64, shapes as given. All
+parts of a page are in this one file, because two renderers have to know each of them.
 """
 
 from __future__ import annotations

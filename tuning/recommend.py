@@ -6,24 +6,24 @@ Its sentences are in reasons.toml; the texts inserted in them are made here.
 from __future__ import annotations
 
 import math
-import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from importlib.resources import files
 from typing import NamedTuple
 
 import numpy as np
 
-from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Process
+from identification.models import Fopdt, Loop, Pid, Process
 from identification.record import Floats
 from identification.simulation.closed_loop import scan_step
 from tuning import Action, Cause
 from tuning.describing import band, is_play
+from tuning.first_step import calmest, steps
 from tuning.forecast import in_digits
 from tuning.frequency_response import integral_s, maximum_sensitivity, rejects_s, resonance_s
-from tuning.limit_cycle import Confirmed, Cycle, confirm
+from tuning.limit_cycle import Confirmed, confirm
 from tuning.limits import LIMITS, TuningLimits
-from tuning.ringing import ObservedRinging, error_ratio, from_ringing, process_of, sensitivity_at
+from tuning.reasons import WHY, fault_told, nothing_better, robustness, seconds_text, settings, why_calmer
+from tuning.ringing import ObservedRinging, sensitivity_at
 from tuning.rules import LAMBDA_PER_DELAY, TAU_C_PER_DELAY, effective_delay, simc
 from tuning.search import (
     Bench,
@@ -31,26 +31,17 @@ from tuning.search import (
     LoadedLoop,
     bench,
     figures,
-    rejection,
     robust,
     rounded,
     search,
     standard_load,
 )
 
-WHY: Mapping[str, str] = tomllib.loads((files("tuning") / "reasons.toml").read_text("utf-8"))
-"""Reasons for settings or for none, by the cause or by the deciding condition."""
-
-
 INTEGRAL_TIMES = 5
 """Number of integral times tried, from the longest to the shortest lag consistent with the record: neighbours differ
 by less than two if the ends differ by ten."""
 STEPS_ALONE = 25
 """Steps of an integral time that is alone, at most: ours, a factor of 200."""
-SHARES_KEPT, CALM_MS = (0.5, 0.6, 0.67, 0.75, 0.8), 7.0
-"""Shares of the response at the ringing period that a first step keeps; the most robust with an error within the
-price is chosen. Maximum sensitivity of the fitted process up to which it is robust: with four fifths of the response
-the integrator with dead time has 5 to 7, true plants about 3.5 (benchmarks.world, seeds 1, 2, 3, 16, 61)."""
 WITHOUT_SETTINGS = {
     Cause.LOAD: Action.FIND_DISTURBANCE,
     Cause.UNDECIDED: Action.UNDECIDED,
@@ -183,9 +174,9 @@ def _first_step(
     """The most robust step from the observed ringing alone with an error within the price; among equals the one of
     least error; with a higher gain only if there is no other; none if there is none. An integral alone rings before
     any long lag, so its steps are tested on the identified process."""
-    tried = _steps(old, seen, process)
-    best = _calmest(old, tried, limits)
-    known: dict[str, object] = {"period": _seconds(seen.period_s)}
+    tried = steps(old, seen, process)
+    best = calmest(old, tried, limits)
+    known: dict[str, object] = {"period": seconds_text(seen.period_s)}
     if best is None:
         least = min(tried, key=lambda x: x.error, default=None)
         if least is None:
@@ -200,45 +191,6 @@ def _first_step(
         return Proposal(Action.RETUNE, why, best.new, ms_before=now)
     known["left"] = sensitivity_at(old, best.new, seen.period_s)
     return Proposal(Action.RETUNE, WHY["first_step"].format(**known), best.new, ms_before=now)
-
-
-def calmer_step(old: Pid, seen: ObservedRinging, limits: TuningLimits = LIMITS) -> Step | None:
-    """The step that `recommend` takes from the ringing alone, without a model; None if there is none within the
-    price in error, or the controller has integral action alone."""
-    return _calmest(old, _steps(old, seen, None), limits) if old.kp else None
-
-
-def _calmest(old: Pid, steps: Sequence[Step], limits: TuningLimits) -> Step | None:
-    """The most robust step within the price in error; among equals that of least error, with a higher gain only if
-    there is no other."""
-    within = [x for x in steps if x.error <= limits.tight_price]
-
-    def rank(x: Step) -> tuple[bool, float, float]:
-        return abs(x.new.kp) > abs(old.kp), max(x.ms, limits.ms_most_sample), x.error
-
-    return min(within, key=rank, default=None)
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """Settings from the ringing alone, their maximum sensitivity on the process fitted to the ringing [-], and their
-    error relative to the present one by the recorded error's spectrum [-]."""
-
-    new: Pid
-    ms: float
-    error: float
-
-
-def _steps(old: Pid, seen: ObservedRinging, known: Process | None) -> list[Step]:
-    """The steps from the ringing alone that make the fitted process robust enough."""
-    process, made = known or process_of(old, seen.period_s), []
-    for share in SHARES_KEPT:
-        for one in from_ringing(old, seen.period_s, share):
-            new = replace(one, kp=rounded(one.kp), ti_s=rounded(one.ti_s))
-            ms = maximum_sensitivity(Loop(process, new))
-            if ms <= CALM_MS:
-                made.append(Step(new, ms, error_ratio(old, new, seen, process)))
-    return made
 
 
 def _alone(loop: Loop) -> ObservedRinging:
@@ -373,10 +325,10 @@ def _valve(
     candidates = search(table)
     chosen = _confirmed(table, candidates, before)
     if chosen is None:
-        why = _nothing_better(loop, before, bool(candidates))
+        why = nothing_better(loop, before, bool(candidates))
         return Proposal(Action.REPAIR_VALVE, why, before=before, ms_before=now, candidates=candidates)
     best, after = chosen
-    why = _why_calmer(best, before, after, now, table)
+    why = why_calmer(best, before, after, now, table)
     beyond = band(loop.valve) >= limits.band_beyond
     return Proposal(
         Action.REPAIR_VALVE if beyond else Action.RETUNE,
@@ -440,69 +392,3 @@ def _confirmed(
         ):
             return candidate, after
     return None
-
-
-def robustness(ms: float) -> str:
-    """Text for a maximum sensitivity; infinite means unstable."""
-    return f"Ms {ms:.2f}" if math.isfinite(ms) else "unstable"
-
-
-def _seconds(x: float) -> str:
-    """A time without an exponent."""
-    return f"{x:.3g}" if x < 1000 else f"{x:.0f}"
-
-
-def settings(controller: Pid) -> str:
-    """Text for Kp and Ti, in percent of spans and seconds."""
-    if controller.kp == 0.0:
-        return f"Ti {_seconds(controller.ti_s)} s (integral action only)"
-    ti = integral_s(controller)
-    return f"Kp {controller.kp:.3g} %/%, Ti {f'{_seconds(ti)} s' if math.isfinite(ti) else 'off'}"
-
-
-def fault_told(loop: Loop) -> str:
-    """Text for a valve fault with its size."""
-    width = band(loop.valve)
-    return (
-        f"backlash of {width:.2g} %"
-        if is_play(loop.valve)
-        else f"stick-slip with a stickband of {width:.2g} %"
-    )
-
-
-def swings(cycle: Cycle | None) -> str:
-    """Text for a limit cycle with its period and amplitude."""
-    if cycle is None:
-        return "no limit cycle"
-    return f"a cycle of {_seconds(cycle.period_s)} s and ±{cycle.pv_amplitude:.2g} % PV"
-
-
-def _percent(ratio: float) -> str:
-    return f"{100 * (ratio - 1):+.0f} %"
-
-
-def _why_calmer(best: Candidate, before: Confirmed, after: Confirmed, ms_before: float, table: Bench) -> str:
-    """Reason for the settings of a loop with a faulty valve, and the remaining work."""
-    loop, new = table.loops[0], best.controller
-    peaks = [rejection(loop.process, pid).peak for pid in (new, loop.controller)]
-    why = WHY["calmer"].format(
-        fault=fault_told(loop),
-        old=f"{swings(before.cycle)} at {settings(loop.controller)} ({robustness(ms_before)})",
-        new=f"{swings(after.cycle)} at {settings(new)} ({robustness(best.ms)})",
-        models=len(table.loops),
-        travel=_percent(best.travel),
-        error=_percent(best.error),
-        peak=peaks[0] / peaks[1],
-    )
-    if not is_play(loop.valve):
-        return f"{why} {WHY['stick_slip_stays']}"
-    if isinstance(loop.process, Integrator):
-        return f"{why} {WHY['play_always_cycles']}"
-    return why if after.cycle is None else f"{why} {WHY['play_is_left']}"
-
-
-def _nothing_better(loop: Loop, before: Confirmed, considered: bool) -> str:
-    """Reason for no settings for a loop with a faulty valve."""
-    known = {"fault": fault_told(loop), "cycle": swings(before.cycle)}
-    kind = "backlash" if isinstance(loop.valve, Backlash) else "stick-slip"
-    return WHY["none_worth_it" if considered else "none_kept"].format(kind=kind, **known)

@@ -27,7 +27,7 @@ def loops(asked: Asked, out: Path | None) -> None:
 
     Example: triage loops export.parquet --out loops.csv
     """
-    from analyzer.finder.draft import as_csv
+    from analyzer.finder.as_csv import as_csv
     from analyzer.night.opened import drafted
     from reports.whole_file import whole_file
 

@@ -16,7 +16,7 @@ from analyzer.commands.options import FILE, FOLDER, SOME_LOST, Command, opened_s
 from identification.errors import InputError
 
 if TYPE_CHECKING:
-    from analyzer.comparison.before_after import Span
+    from analyzer.comparison.measures import Span
     from analyzer.config import Config
     from analyzer.loops.changes import TuningChange
     from analyzer.store.store import Store
@@ -91,7 +91,8 @@ def report(
     Example: triage report store --changes changes.csv --out report
     """
     from analyzer.config import read_config
-    from analyzer.pages.before_after import change_cases, changes_page
+    from analyzer.pages.before_after import changes_page
+    from analyzer.pages.change_cases import change_cases
 
     limits, kept = read_config(config), opened_store(store)
     zone = kept.zone()
@@ -112,7 +113,7 @@ def report(
 
 
 def _span_given(texts: Sequence[str] | None, option: str, zone: str) -> Span | None:
-    from analyzer.comparison.before_after import Span
+    from analyzer.comparison.measures import Span
     from analyzer.history.stamps import parse_time
 
     if not texts:
@@ -137,7 +138,7 @@ def _changes(
     """The changes of the command line, or those detected in the loops' behaviour."""
     from analyzer.history.stamps import parse_time
     from analyzer.loops.changes import TuningChange, read_changes
-    from analyzer.pages.before_after import detected
+    from analyzer.pages.change_cases import detected
 
     if find:
         return detected(store, [loop] if loop else None, config)

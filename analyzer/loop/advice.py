@@ -38,9 +38,10 @@ from identification.estimation.model import Fitted
 from identification.estimation.problem import LONGEST_DEAD_TIME
 from identification.models import Loop, Pid
 from identification.record import Floats, LoopRecord
+from tuning.first_step import calmer_step
 from tuning.frequency_response import integral_s, is_stable
 from tuning.limit_cycle import Cycle, confirm
-from tuning.recommend import WITHOUT_SETTINGS, Proposal, calmer_step, recommend
+from tuning.recommend import WITHOUT_SETTINGS, Proposal, recommend
 from tuning.search import LoadedLoop, rounded
 
 SAID = sentences("settings")
@@ -55,7 +56,7 @@ class Advice:
     kp_new and ti_new in the units and form that loops.csv states, None unless action is retune; before and after, the
     limit cycles in simulation at the present and at the new settings, None if there is none; lack, the missing data
     if the action is to get more data; due, due time of a valve's repair; compared, present, new and textbook settings
-    on the load, None if no settings were searched for.
+    on the load, None without settings.
     """
 
     action: Action | None

@@ -17,16 +17,14 @@ from analyzer.loop.cause import (
     NO_CAUSE,
     Verdict,
     cap_confidence,
-    dead_valve,
     hidden_by_grid,
     judge,
     not_assessed,
-    refine_stick_slip,
     resolve_ambiguity,
-    with_dead_valve,
     with_worn_valve,
 )
 from analyzer.loop.cycling_span import Span, detect_where_it_cycles
+from analyzer.loop.dead_valve import dead_valve, with_dead_valve
 from analyzer.loop.decisions import Cause, LacksError, MissingData, Requirement, RequirementKind
 from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
 from analyzer.loop.judged_stretch import Earlier, Shown, Stretch, as_recorded, judged_stretch, shown
@@ -37,6 +35,7 @@ from analyzer.loop.quality import Prepared
 from analyzer.loop.ringing import same_period
 from analyzer.loop.setpoint_moves import Move, moves
 from analyzer.loop.shared_valve import Shared
+from analyzer.loop.stick_slip import refine_stick_slip
 from analyzer.loop.worn_valve import WornValve
 from analyzer.plantwide.wave import Wave, waves_of
 from identification.controller.free_law import FreeLaw

@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.config import CauseLimits, Config
-from analyzer.loop.agreement import closest
 from analyzer.loop.decisions import (
     CAUSES,
     Cause,
@@ -40,16 +39,10 @@ from analyzer.loop.ringing import Regularity, Ringing, between_samples
 from analyzer.loop.signs import WEAK, signs_of
 from analyzer.loop.worn_valve import WornValve
 from identification.errors import NotAssessedError
-from identification.estimation.backlash_stiction import SHORT, refined
 from identification.estimation.between_samples import scans_per_row
-from identification.estimation.gauss_newton import descend
-from identification.estimation.irregular_slips import SlipPath, fit_irregular, near_path, path_evidence
 from identification.estimation.model import Fitted
-from identification.estimation.noise import generic_noise
 from identification.estimation.smooth_load import as_fit
 from identification.models import Backlash, Loop
-from identification.record import LoopRecord
-from identification.simulation.valve import HALTS, RESTS
 from tuning.describing import describe
 from tuning.frequency_response import loop_response
 
@@ -317,36 +310,6 @@ def cap_confidence(verdict: Verdict, most_pct: float) -> Verdict:
     return replace(verdict, confidence={k: min(v, most_pct) for k, v in verdict.confidence.items()})
 
 
-def dead_valve(record: LoopRecord, limits: CauseLimits) -> Sign | None:
-    """A valve that no longer moves PV: OP winds over much of its range, the error keeps its sign, PV is constant."""
-    good = ~(record.mask("gap") | record.mask("manual"))
-    if record.sp_estimated or good.sum() < 100:
-        return None
-    wound = float(np.ptp(record.op[good]))
-    if wound < limits.wound_pct:
-        return None
-    pv, e = record.pv[good], record.error[good]
-    low, high = np.quantile(pv, [0.05, 0.95])
-    still = float(high - low) <= 0.1 * float(np.median(np.abs(e)))
-    one_sided = max(float((e > 0).mean()), float((e < 0).mean()))
-    if not still or one_sided < 0.95:
-        return None
-    return Sign(Cause.VALVE, 0.9, SignKind.DEAD_VALVE, (wound,))
-
-
-def with_dead_valve(verdict: Verdict, sign: Sign) -> Verdict:
-    """A verdict of a clear valve fault without oscillation."""
-    confidence = {Cause.VALVE: 90.0, Cause.TUNING: 0.0, Cause.LOAD: 0.0}
-    return replace(
-        verdict,
-        cause=Cause.VALVE,
-        confidence=confidence,
-        fault=Fault.UNDECIDED,
-        signs=(sign, *verdict.signs),
-        dead=True,
-    )
-
-
 def resolve_ambiguity(
     verdict: Verdict, prepared: Prepared, oscillation: Oscillation | None, config: Config
 ) -> Verdict:
@@ -418,57 +381,3 @@ def _beside_another_cycle(
         why = Sign(Cause.VALVE, 1.0, SignKind.LIKELIER, (str(Cause.VALVE), lead))
         return Verdict(Cause.VALVE, confidence, fault, (why, *verdict.signs), measured=told)
     return verdict
-
-
-def refine_stick_slip(verdict: Verdict, period_s: float, config: Config) -> Verdict:
-    """The verdict on a loop that cycles, its valve's fault replaced if slips at variable distances explain PV better.
-
-    The cause is unchanged: the test is for the kind of fault of a valve already identified by PV and OP. If the stem
-    is identified slip by slip, the window contains it as if recorded. Settings are searched with one friction for all
-    slips: that of the likeliest fit with regular slips, or the mean one of the slips, with a stem that rests after
-    each slip or follows OP until it stops. The simulation at the present settings that is closest to the record
-    decides. The cycle has a period of period_s [s].
-    """
-    m, limits = verdict.measured, config.cause
-    if (
-        verdict.cause is not Cause.VALVE
-        or m is None
-        or m.window.blocks.position is not None
-        or m.window.y.size < SHORT
-    ):
-        return verdict
-    window = m.play.p
-    blocks = replace(m.play, p=window.of_rows.with_blocks(fine=False))
-    play = descend(blocks, free_width=True) if window.blocks.fine or window.blocks.steps > 1 else m.play
-    path = fit_irregular(play, generic_noise(), period_s, verdict.fault is not Fault.STICTION)
-    if path is None:
-        return verdict
-    jump = path_evidence(path, play)
-    more = jump - max(m.jump, 0.0)
-    new = verdict.fault is Fault.BACKLASH  # for other faults a jump is known, or nearly
-    share = limits.jump_share if new else 0.0
-    if more < max(limits.evidence_jump, share * (m.evidence + more)):
-        return verdict
-    told = _with_path(m, path, jump, more)
-    fault = fault_of(told, limits)
-    law = _finely(refined(near_path(play, path)), m)
-    best = max((x for x in (m.stick_slip, law) if x is not None), key=lambda fit: fit.log_likelihood)
-    slips = told.stick_slip
-    if m.controller is not None and slips is not None:
-        laws = (slips.valve._replace(tolerance=motion) for motion in (RESTS, HALTS))
-        fits = (best, *(slips.moved(valve=law) for law in laws))
-        best = closest(fits, m.controller, config.advice)
-    steady = replace(verdict, measured=replace(m, stick_slip=best), fault=fault)
-    return replace(verdict, measured=told, fault=fault, steady=steady)
-
-
-def _finely(fit: Fitted, m: Measured) -> Fitted:
-    """A fit in blocks, refined at the resolution of the measures."""
-    return descend(fit.within(fine=True)) if m.window.blocks.fine else fit
-
-
-def _with_path(m: Measured, path: SlipPath, jump: float, more: float) -> Measured:
-    """The measures, with the path's stem and the friction and process of its fit."""
-    fit = _finely(path.fit, m)
-    linear, play = (replace(x, p=fit.p) for x in (m.linear, m.play))
-    return replace(m, linear=linear, play=play, stick_slip=fit, jump=jump, evidence=m.evidence + more)

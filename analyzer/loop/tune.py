@@ -29,8 +29,10 @@ from analyzer.loop.measure import time_scale
 from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
 from analyzer.loop.sample_clock import onto_clock
-from analyzer.loop.settings_side_by_side import compared, middle_ti
+from analyzer.loop.settings_side_by_side import compared
 from analyzer.loop.sluggish import faster_settings, rejecting_settings
+from analyzer.loop.tune_pictures import pictures
+from analyzer.loop.tuned import Tuning
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import experiments, sentences
@@ -42,13 +44,11 @@ from identification.estimation.between_samples import scans_per_row
 from identification.estimation.model import Fitted
 from identification.models import Estimate, Loop, Pid, Process, Valve
 from identification.record import Floats, LoopRecord
-from reports.pages import Field, Line, Panels, Picture, Place, Plot
-from tuning.describing import describe
-from tuning.forecast import UNMODELLED, Forecast, in_digits, loop_in_digits, predict, run
+from tuning.forecast import UNMODELLED, Forecast, predict
 from tuning.frequency_response import is_stable, slowest_s
-from tuning.harmonic_balance import curves, travel_map
-from tuning.limit_cycle import Confirmed, confirm
-from tuning.recommend import WHY, WITHOUT_SETTINGS, Proposal
+from tuning.limit_cycle import confirm
+from tuning.reasons import WHY
+from tuning.recommend import WITHOUT_SETTINGS, Proposal
 
 NEIGHBOURS = 8
 """Other loops whose OP is read with a loop's own trends, in the order of loops.csv [loops]: each is one more
@@ -64,34 +64,9 @@ over error forecast, 24 loops with backlash of benchmarks/world every 10 s (seed
 s."""
 
 SAID = sentences("settings")
-MAP_POINTS = 36
-"""Points of the map along each axis."""
 NO_MOVES = Requirement(None, RequirementKind.MOVING_PV)
-SPREAD = 20.0
-"""Factor of the map's range below and above the present settings."""
 FORECAST = ("average_absolute_error", "stem_travel", "oscillation", "variability")
 """Reported figures of a forecast."""
-
-
-@dataclass(frozen=True, slots=True)
-class Tuning:
-    """All results for retuning one loop.
-
-    estimates by name with 90 % intervals; model, the identified loop with its present controller; period_s and
-    amplitude_pct of the recorded cycle [s], [% of span], None if there is none; cycle, the simulated one; proposal;
-    forecast, under the load of the whole record, None if nothing is proposed; load [% PV] of the fitted stretch on
-    the scan's clock; others, other possible loops.
-    """
-
-    estimates: dict[str, Estimate]
-    model: Loop
-    period_s: float | None
-    amplitude_pct: float | None
-    cycle: Confirmed
-    proposal: Proposal
-    forecast: Forecast | None
-    load: Floats
-    others: tuple[Loop, ...] = ()
 
 
 def identified(found: Assessment, limits: AdviceLimits) -> tuple[Process, Valve, dict[str, Estimate]]:
@@ -229,64 +204,6 @@ def proposal_lines(t: Tuning, spec: LoopSpec, pv_span: float) -> list[str]:
         form = f"{spec.gain_unit}, {spec.form}"
         out.append(f"until the repair: kp {number(kp)}, ti {number(ti)} {spec.ti_unit} ({form})")
     return [*out, *filter(None, [t.proposal.reason]), *_forecast_lines(t)]
-
-
-def pictures(t: Tuning, title: str) -> tuple[Picture, ...]:
-    """Describing functions, travel map and forecast, those that exist."""
-    out: tuple[Picture, ...] = ()
-    if t.model.valve is not None:
-        out = (_curves(t, title), *([_map_field(t, title)] if t.model.controller.kp else []))
-    return out if t.proposal.new is None else (*out, _trend_panels(t, t.proposal.new, title))
-
-
-def _curves(t: Tuning, title: str) -> Plot:
-    """Intersections of the describing function with the loop: limit cycles."""
-    c = curves(t.model)
-    reach = 1.4 * float(np.abs(c.valve).max(initial=1.0))
-    re, im = c.linear.real, c.linear.imag
-    inside = (re > -0.3 * reach) & (re < reach) & (im > -0.8 * reach) & (im < 0.25 * reach)
-    proposal_lines = (
-        Line("valve N(A)", c.valve.real, c.valve.imag, kind="op"),
-        Line("−1/(G C)", re[inside], im[inside], kind="pv"),
-    )
-    at = [(describe(t.model.valve, b.op_amplitude), b) for b in c.crossings]
-    places = tuple(
-        Place(n.real, n.imag, f"{b.period_s:.3g} s{'' if b.stable else ', unstable'}", "cycle") for n, b in at
-    )
-    whole = f"{title}: N(A) and −1/(G C)"
-    return Plot("limit-cycle", whole, "real", "imaginary", proposal_lines, reach=(0.0,), places=places)
-
-
-def _map_field(t: Tuning, title: str) -> Field:
-    """Valve travel of each pair of settings, those without a cycle, and those that are unstable."""
-    from analyzer.pages.compared import travel_field
-
-    c, new = t.model.controller, t.proposal.controller
-    kp = c.kp * np.geomspace(1 / SPREAD, SPREAD, MAP_POINTS)
-    now_s = middle_ti(t.model)
-    top = max(SPREAD * now_s, 3 * new.ti_s if new else 0.0)
-    found = travel_map(t.model, kp, np.geomspace(now_s / 4, top, MAP_POINTS))
-    places = [Place(abs(c.kp), now_s, "now", "now")]
-    places += [Place(abs(new.kp), new.ti_s, "proposed", "recommended")] if new else []
-    return travel_field(found, places, f"{title}: predicted travel of OP", "OP")
-
-
-def _trend_panels(t: Tuning, new: Pid, title: str) -> Panels:
-    """Both tunings on the same reconstructed load."""
-    pv: list[Line] = []
-    op: list[Line] = []
-    for name, kind, c in (("now", "pv", t.model.controller), ("proposed", "brought", new)):
-        r = run(replace(loop_in_digits(t.model), controller=c), in_digits(t.load))
-        last = slice(-min(len(r), int(15 * (t.period_s or 600) / r.dt_s)), None)
-        hours, stem = r.time_s[last] / 3600.0, r.stem
-        pv.append(Line(name, hours, r.pv[last], kind=kind))
-        op.append(Line(name, hours, r.op[last], kind=kind))
-        op.append(Line(f"stem, {name}", hours, stem[last], kind=f"{kind} stem"))
-    plots = (
-        Plot("forecast-pv", "Error", "hours", "PV − SP [%]", tuple(pv)),
-        Plot("forecast-op", "Valve", "hours", "OP, stem [%]", tuple(op)),
-    )
-    return Panels("forecast", f"{title}: both tunings on the same load", plots)
 
 
 @dataclass(frozen=True, slots=True)

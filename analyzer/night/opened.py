@@ -11,7 +11,8 @@ from typing import Any
 from weakref import finalize
 
 from analyzer.config import WorkerLimits
-from analyzer.finder.draft import MA_HIGH, MA_LOW, Row, draft, found_told
+from analyzer.finder.as_csv import Row
+from analyzer.finder.draft import MA_HIGH, MA_LOW, draft, found_told
 from analyzer.history.export import Export, ReadOptions, open_export
 from analyzer.history.files import own_scratch
 from analyzer.history.series import Series

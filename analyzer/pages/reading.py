@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from analyzer.comparison.before_after import Span
 from analyzer.comparison.block_bootstrap import Floats
+from analyzer.comparison.measures import Span
 from analyzer.lanes.lanes import FIGURE
 from analyzer.loop.cost import LOSS, cost, cost_column
 from analyzer.loop.decisions import Cause, Status, counts

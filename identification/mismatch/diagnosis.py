@@ -20,6 +20,7 @@ from identification.controller.pi_regression import ControlLaw, Trends, shifted,
 from identification.estimation.model import gain
 from identification.estimation.prediction_error import FULL_STEPS, descended
 from identification.mismatch.answer import holds_zero
+from identification.mismatch.candidate_proof import passes
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS, RECORDER_FAULTS, fault
 from identification.mismatch.effect import TIE, Ends, Friction
 from identification.mismatch.explanation import (
@@ -34,7 +35,6 @@ from identification.mismatch.explanation import (
 from identification.mismatch.friction import from_cycles, is_friction
 from identification.mismatch.outside import OUTSIDE, RIVALS, about
 from identification.mismatch.plain_loop import Clip, inputs_of, prepared, without_spikes
-from identification.mismatch.proof import passes
 from identification.mismatch.recording import Recording, SeenInCycles, is_experiment, straightened, unlogged
 from identification.mismatch.reference import Prediction, best_prediction
 from identification.mismatch.selection import (

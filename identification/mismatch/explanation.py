@@ -21,6 +21,7 @@ from identification.controller.pi_regression import ControlLaw
 from identification.estimation.model import Fitted, gain
 from identification.estimation.prediction_error import FULL_STEPS, descended
 from identification.estimation.problem import Problem, problem
+from identification.mismatch.candidate_proof import is_one_move
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.effect import ONE_CONSTANT, Ends
 from identification.mismatch.friction import is_friction
@@ -34,7 +35,6 @@ from identification.mismatch.proof import (
     anchored,
     course,
     held_out,
-    is_one_move,
     misfit,
 )
 from identification.mismatch.recording import STEP, Recording, SeenInCycles

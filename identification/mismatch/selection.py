@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 from identification.estimation.model import Fitted, Model, gain
 from identification.estimation.prediction_error import FULL_STEPS, SCREEN_STEPS, descended
 from identification.estimation.problem import Problem
+from identification.mismatch.candidate_proof import is_one_move
 from identification.mismatch.catalogue import CANDIDATES
 from identification.mismatch.effect import PARAMETER_PENALTY, SEARCH_PENALTY, Friction
 from identification.mismatch.friction import STARTS, fit_sticking
 from identification.mismatch.outside import about
-from identification.mismatch.proof import is_one_move
 from identification.mismatch.recording import Recording
 from identification.mismatch.reference import SETTLES
 from identification.mismatch.starts import Round, mode_starts, screened, start_models

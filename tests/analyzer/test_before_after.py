@@ -7,20 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analyzer.comparison.before_after import (
-    HOUR_S,
-    LIMITS,
-    MEASURES,
-    ChangeVerdict,
-    Span,
-    compare,
-    follows,
-    grade,
-    gridded,
-    reasons_against,
-    spans_around,
-)
+from analyzer.comparison.before_after import HOUR_S, compare, follows, grade, reasons_against
 from analyzer.comparison.block_bootstrap import Side, difference, drift_factor, replicates
+from analyzer.comparison.measures import LIMITS, MEASURES, ChangeVerdict, Span, gridded, spans_around
 from proofs.honesty import examined
 
 CHANGED_S = 1000 * 86400.0

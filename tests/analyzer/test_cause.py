@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from analyzer.loop.assess import Assessment, assess
-from analyzer.loop.cause import Verdict, dead_valve, judge
+from analyzer.loop.cause import Verdict, judge
+from analyzer.loop.dead_valve import dead_valve
 from analyzer.loop.quality import prepare
 from analyzer.plantwide.night import followers_of, trace
 from analyzer.words.reason import sign_text

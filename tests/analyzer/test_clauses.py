@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analyzer.words.reason import joined
-from tuning.recommend import WHY, robustness
+from tuning.reasons import WHY, robustness
 
 
 @given(st.lists(st.one_of(st.none(), st.from_regex(r"[a-z ]{0,9}\.?", fullmatch=True)), max_size=5))

@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analyzer.comparison.before_after import Change, Grade, Reference, Span, grade, parts_of, reference
-from analyzer.comparison.equal_load import FIGURES, NO_RATIO, EqualLoad, LogRatio, LoopNight, Weeks, pid_of
+from analyzer.comparison.before_after import Reference, grade, parts_of, reference
+from analyzer.comparison.equal_load import FIGURES, NO_RATIO, EqualLoad, LogRatio, Weeks
+from analyzer.comparison.loop_night import LoopNight, pid_of
+from analyzer.comparison.measures import Change, Grade, Span
 from analyzer.history.export import open_export
 from analyzer.loop.assessments import travel_of
 from analyzer.loops.changes import TuningChange
@@ -19,7 +21,8 @@ from analyzer.loops.spec import LoopSpec, controller_columns
 from analyzer.loops.tags import controller, match
 from analyzer.night import batch
 from analyzer.night.nights import Plant
-from analyzer.pages.before_after import ChangeCase, _evidence, change_cases, changes_page, outcome
+from analyzer.pages.before_after import changes_page, outcome
+from analyzer.pages.change_cases import ChangeCase, _evidence, change_cases
 from analyzer.store.store import Store
 from identification.models import ErrorForm, Form, Pid
 from proofs.before_after_plant import LOADS, changed, truth

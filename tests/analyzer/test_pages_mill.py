@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from analyzer.comparison.before_after import ChangeVerdict, grade
+from analyzer.comparison.before_after import grade
+from analyzer.comparison.measures import ChangeVerdict
 from analyzer.config import Config
 from analyzer.history.export import ReadOptions, open_export
 from analyzer.loops.changes import read_changes
 from analyzer.loops.tags import match, read_loops
 from analyzer.pages import before_after
-from analyzer.pages.before_after import ChangeCase, change_cases, detected
+from analyzer.pages.change_cases import ChangeCase, change_cases, detected
 from analyzer.store.store import Store
 from reports.markdown import render
 

@@ -14,7 +14,8 @@ from analyzer.columns import row_of
 from analyzer.config import Config
 from analyzer.loops.changes import TuningChange
 from analyzer.pages import before_after, loop, morning, night
-from analyzer.pages.before_after import change_cases, detected, wear_texts
+from analyzer.pages.before_after import wear_texts
+from analyzer.pages.change_cases import change_cases, detected
 from analyzer.pages.loop_pictures import autocorrelation, rhythm_plots, turn_panels
 from analyzer.pages.morning import score
 from analyzer.pages.reading import read_hours, read_night, read_trends

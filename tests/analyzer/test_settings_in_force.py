@@ -14,7 +14,7 @@ from analyzer.loops.changes import TuningChange, in_force, read_changes, setting
 from analyzer.loops.tags import match, read_loops
 from analyzer.night import batch
 from analyzer.night.nights import Plant
-from analyzer.pages.before_after import detected
+from analyzer.pages.change_cases import detected
 from analyzer.store.store import Store
 from identification.errors import InputError
 from proofs.plant import START_S, Sketch, Trends, simulate, spec, write_export

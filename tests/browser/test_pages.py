@@ -15,7 +15,7 @@ import pytest
 
 from analyzer.loops.changes import TuningChange
 from analyzer.pages import before_after, night
-from analyzer.pages.before_after import change_cases
+from analyzer.pages.change_cases import change_cases
 from reports.folder import write_html
 from tests.reports.small_store import NASTY, START_S, small_store
 

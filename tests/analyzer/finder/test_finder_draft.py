@@ -11,7 +11,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from analyzer.cli import main
-from analyzer.finder.draft import Row, as_csv, type_of, unit_of
+from analyzer.finder.as_csv import Row, as_csv
+from analyzer.finder.draft import type_of, unit_of
 from analyzer.loops.spec import LoopSpec, read_loops
 from proofs.controllers_plant import controlled
 from tests.analyzer.finder.test_finder_pairs import pi_loop, strangers

@@ -12,12 +12,13 @@ from identification.estimation.model import Fitted, Model
 from identification.estimation.prediction_error import descended
 from identification.estimation.problem import Problem, problem
 from identification.mismatch.answer import Answer, answer
+from identification.mismatch.candidate_proof import runs_out
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.diagnosis import explain, without_the_idle
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.friction import simulated_anew
 from identification.mismatch.plain_loop import inputs_of
-from identification.mismatch.proof import HeldOut, Misfit, runs_out
+from identification.mismatch.proof import HeldOut, Misfit
 from identification.mismatch.recording import Recording, SeenInCycles
 from identification.mismatch.selection import Candidate, applies
 from identification.mismatch.starts import Round
