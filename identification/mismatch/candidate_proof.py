@@ -88,10 +88,14 @@ def is_spread(p: Problem, better: Fitted, worse: Fitted) -> bool:
 
 
 def held_out_gain(p: Problem, fits: tuple[Fitted, Fitted]) -> float:
-    """Gain in log likelihood [nat] on the held-out part, of two models fitted to the first part, worse and better."""
+    """Gain in log likelihood [nat] on the held-out part, of two models fitted to the first part, worse and better.
+
+    The mean of the innovations there is free: the level of a later load is not known, and an integrator
+    adds it up.
+    """
     early, cut = early_part(p)
     late = p.weight[cut:]
     whitenings = [whitened(p.y - simulate(p.inputs, fit.model.c), fit.ar, p.edges)[cut:] for fit in fits]
-    losses = [float((late * e) @ e) for e in whitenings]
+    losses = [float((late * e) @ e - (late @ e) ** 2 / max(late.sum(), 1e-300)) for e in whitenings]
     won = 0.5 * (losses[0] - losses[1]) / max(fits[1].loss, 1e-30)
     return won * fits[1].count / max(early.count, 1)

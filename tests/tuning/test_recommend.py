@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import tuning.first_step
 import tuning.recommend
 from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Stiction
 from identification.signals.spectrum import spectrum
@@ -350,7 +351,7 @@ def test_settings_from_the_ringing_alone_are_robust(dead_time, ti):
     old, period = ringing(process, ti)
     steps = [x for share in (0.5, 0.67) for x in from_ringing(old, period, share)]
     alike = process_of(old, period)
-    calm = [x for x in steps if maximum_sensitivity(Loop(alike, x)) <= tuning.recommend.CALM_MS]
+    calm = [x for x in steps if maximum_sensitivity(Loop(alike, x)) <= tuning.first_step.CALM_MS]
     assert calm
     assert max(maximum_sensitivity(Loop(process, x)) for x in calm) < 5.0
 
