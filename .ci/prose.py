@@ -15,7 +15,7 @@ PAGES = (
     "README.md",
     "CONTRIBUTING.md",
     "CONVENTIONS.md",
-    "PROOF.md",
+    "docs/evidence/PROOF.md",
     "docs/*.md",
     "benchmarks/world/README.md",
 )

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Does the right effect beat the best wrong one, on the recording that was fitted and on the later one?
 
-ablation.py CASES [--cases 90] [--jobs 2] [--out PROOF.md]
+ablation.py CASES [--cases 90] [--jobs 2] [--out docs/evidence/PROOF.md]
 
 Every row of the catalogue is fitted to a sealed case, whole and at the size that suits it best: an opponent harder
 than a wrong effect of the right one's size. Rows that share the right one's mark by their nature are no opponents.
@@ -126,10 +126,10 @@ def section(rows: pd.DataFrame) -> str:
     head = ["level", "right ahead, fitted recording", "right no worse, later one", "misfit, wrong over right"]
     parts = [
         "## Ablation: the best wrong effect in the right one's place",
-        "`python proofs/concealed/ablation.py CASES --out PROOF.md`. Every row is fitted whole and at its best\n"
-        "size, which is stricter than a wrong effect of the right one's size. Gains are compared after the penalty\n"
-        "for constants and search. Some effects have others as special cases: stick-slip has backlash, two valves\n"
-        'have a stop. A wrong one may then be as good on later data; "no worse" is within 2 %.',
+        "`python proofs/concealed/ablation.py CASES --out docs/evidence/PROOF.md`. Every row is fitted whole\n"
+        "and at its best size, which is stricter than a wrong effect of the right one's size. Gains are compared\n"
+        "after the penalty for constants and search. Some effects have others as special cases: stick-slip has\n"
+        'backlash, two valves have a stop. A wrong one may then be as good on later data; "no worse" is within 2 %.',
         table(head, lines),
         f"Lost on the fitted recording: {worst or 'none'}.",
         "The controller's Kp and Ti were identified from SP, PV and OP of the same cases. They are within 2 % in "

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What is explained on recordings of real laboratory rigs, from the exports alone.
 
-rigs.py FOLDER [--out PROOF.md]
+rigs.py FOLDER [--out docs/evidence/PROOF.md]
 
 FOLDER holds TANK-*.parquet, DUCT-*.parquet, PHX-*.parquet, PILOT-*.parquet and DRYER.parquet, without set points
 and without loops.csv (but for the duct's PI loop). The duct's models, plain and improved, are fitted to its open-loop
@@ -70,7 +70,11 @@ def section(folder: pathlib.Path) -> str:
         step = found if path.stem == STEP else step
         lines.append(line(path.stem, found))
     head = ["recording", "verdict", "effects", "misfit, fitted (% of PV's spread)", "held out"]
-    parts = ["## Rigs", "`python proofs/concealed/rigs.py FOLDER --out PROOF.md`", table(head, lines)]
+    parts = [
+        "## Rigs",
+        "`python proofs/concealed/rigs.py FOLDER --out docs/evidence/PROOF.md`",
+        table(head, lines),
+    ]
     if step is not None and (folder / f"{LOOP}.parquet").exists():
         told = carried_over(step, loaded(folder / f"{LOOP}.parquet"))
         parts.append(

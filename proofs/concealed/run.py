@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Asks a triage command to explain every sealed case; opens the truths only after the last answer.
 
-run.py CASES OUT --triage "triage" --jobs 2 [--proof PROOF.md]
+run.py CASES OUT --triage "triage" --jobs 2 [--proof docs/evidence/PROOF.md]
 """
 
 import argparse

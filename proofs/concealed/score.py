@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Compares answers with truths: right names, blocks, false alarms, recovered misfit, parameters.
 
-score.py CASES OUT [--out PROOF.md]
+score.py CASES OUT [--out docs/evidence/PROOF.md]
 """
 
 import argparse
