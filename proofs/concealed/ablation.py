@@ -129,7 +129,7 @@ def section(rows: pd.DataFrame) -> str:
         "`python proofs/concealed/ablation.py CASES --out docs/evidence/PROOF.md`. Every row is fitted whole\n"
         "and at its best size, which is stricter than a wrong effect of the right one's size. Gains are compared\n"
         "after the penalty for constants and search. Some effects have others as special cases: stick-slip has\n"
-        'backlash, two valves have a stop. A wrong one may then be as good on later data; "no worse" is within 2 %.',
+        'backlash, two valves have a stop. A wrong one may then be as good on later data; "no worse" is within\n2 %.',
         table(head, lines),
         f"Lost on the fitted recording: {worst or 'none'}.",
         "The controller's Kp and Ti were identified from SP, PV and OP of the same cases. They are within 2 % in "

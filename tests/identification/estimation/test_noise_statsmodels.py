@@ -24,7 +24,7 @@ def coloured(seed: int) -> np.ndarray:
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_free_model_is_that_of_statsmodels(seed: int) -> None:
-    """Lags of PV and of an input by least squares, as AutoReg with the input's lags: within one in ten thousand."""
+    """Lags of PV and of an input by least squares, as AutoReg with the input's lags: within .002."""
     u = np.random.default_rng(seed + 10).standard_normal(N)
     y = coloured(seed) + np.convolve(u, [0.0, 0.5, 0.3])[:N]
     past = np.column_stack([np.roll(u, i + 1) for i in range(ORDER)])
