@@ -45,8 +45,8 @@ from identification.simulation.parameters import Slot
 
 ROUNDS = 3  # Effects named at most: a record seldom shows more
 LEAST_IN_BAND = 0.1
-"""Share of the held-out misfit in the loop's band that a further effect must remove to be named. Source: a
-judgement: a tenth of the mean square is 5 % of the rms, which a trend hardly shows."""
+"""Share of the misfit that a further effect must remove, held out in the loop's band, or of a load over all data.
+Source: a judgement: a tenth of the mean square is 5 % of the rms, which a trend hardly shows."""
 LEAST_CYCLE = 20
 """Fewest samples of a window in which the stem is placed again: a line and the place are three numbers."""
 
@@ -167,7 +167,7 @@ def carried_over(found: Explanation) -> Explanation:
         unproven = not proof.carries and proof.falls and unjudged
         timed = proof.falls and all(EFFECTS[name].timed for name in names[:count])
         timed = timed and (proof.holds_in_band or any(c.row.needs == "line" for c in kept.accepted))
-        seen = proof.carries and adds_in_band(kept, proof)
+        seen = proof.carries and adds_enough(kept, proof)
         if seen or unproven or cycling or timed:
             return replace(kept, proof=proof, refuted=names[count:], unproven=unproven)
     proof = held_out(found.p, found.plain, found.plain, band=found.band)
@@ -175,17 +175,24 @@ def carried_over(found: Explanation) -> Explanation:
     return replace(found, best=found.plain, accepted=(), proof=proof, refuted=names, outside=outside)
 
 
-def adds_in_band(found: Explanation, proof: HeldOut) -> bool:
-    """Whether the last effect removes enough of the held-out misfit in the loop's band, if that is known. A second
-    effect takes up what the first one's model leaves, which is a deficit of the model everywhere; the first one only
-    must not add to it."""
+def adds_enough(found: Explanation, proof: HeldOut) -> bool:
+    """Whether the last effect removes enough of the held-out misfit in the loop's band, if that is known; a load,
+    which may be outside it, of the misfit over all data. A second effect takes up what the first one's model leaves,
+    which is a deficit of the model everywhere; the first one only must not add to it."""
     if proof.in_band is None or not proof.holds_in_band:
         return proof.holds_in_band
     if len(found.accepted) == 1:
         return True
     less = first_effects(found, len(found.accepted) - 1)
-    before = held_out(less.p, less.plain, less.best, band=found.band).in_band
-    return before is None or proof.in_band.better.rmse**2 <= (1.0 - LEAST_IN_BAND) * before.better.rmse**2
+    before = held_out(less.p, less.plain, less.best, band=found.band)
+    if EFFECTS[found.accepted[-1].name].timed:
+        return removes(before.overall[1], proof.overall[1])
+    return before.in_band is None or removes(before.in_band.better, proof.in_band.better)
+
+
+def removes(before: Misfit, after: Misfit) -> bool:
+    """Whether LEAST_IN_BAND of the misfit (mean square) is gone."""
+    return after.rmse**2 <= (1.0 - LEAST_IN_BAND) * before.rmse**2
 
 
 def first_effects(found: Explanation, count: int) -> Explanation:

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from identification.controller.check import StatedSettings
-from identification.estimation.model import Model
+from identification.estimation.model import Fitted, Model
 from identification.estimation.prediction_error import FULL_STEPS, descended
-from identification.estimation.problem import problem
+from identification.estimation.problem import Problem, problem
 from identification.mismatch.catalogue import EFFECTS
+from identification.mismatch.explanation import Explanation, carried_over
 from identification.mismatch.proof import gain_z, held_out
 from identification.mismatch.recording import Recording
+from identification.mismatch.selection import Candidate
 from identification.signals.filters import in_band
 from identification.simulation.open_loop import ModelInputs
 from identification.simulation.parameters import Slot, neutral
@@ -57,12 +59,13 @@ def test_the_band_follows_from_cycle_or_integral_time() -> None:
     assert Recording(*given, stated=StatedSettings(1.0, np.inf, 1.0)).band is None
 
 
-def cycling(width: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
+def cycling(width: float, seed: int, sine_pct: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """PV and OP, shape (6000,), of a lag of 300 samples behind backlash and four samples of pipe, in plain Python:
-    a PI controller makes it cycle every 154 samples, and the load is a random walk."""
+    a PI controller makes it cycle every 154 samples; the load is a random walk and a sine of 1500 samples."""
     rng = np.random.default_rng(seed)
     stem, x, total, load, pipe, pv_out, op_out = 50.0, 0.0, 50.0, 0.0, [50.0] * 4, [], []
-    for _ in range(6500):
+    for k in range(6500):
+        slow = sine_pct * math.sin(2.0 * math.pi * k / 1500.0)
         load += 0.01 * rng.standard_normal()
         pv = 50.0 + x + 0.02 * rng.standard_normal()
         total += 1.5 * (50.0 - pv) / 20.0
@@ -71,15 +74,12 @@ def cycling(width: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
         op_out.append(op)
         stem = min(max(stem, op - width / 2), op + width / 2)
         pipe.append(stem)
-        x += (1.0 - math.exp(-1.0 / 300.0)) * (10.0 * (pipe.pop(0) - 50.0 + load) - x)
+        x += (1.0 - math.exp(-1.0 / 300.0)) * (10.0 * (pipe.pop(0) - 50.0 + load + slow) - x)
     return np.array(pv_out[500:]), np.array(op_out[500:])
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_worn_valve_shows_in_the_band_on_held_out_data(seed: int) -> None:
-    """Backlash of 4 % removes over half of what the best baseline model leaves in the band, and the squared errors
-    differ significantly; a model compared with itself removes nothing."""
-    pv, op = cycling(4.0, seed)
+def fitted(pv: np.ndarray, op: np.ndarray) -> tuple[Problem, Fitted, Fitted]:
+    """Problem, baseline fit and fit with backlash of such a loop."""
     level = float(pv.mean())
     inputs = ModelInputs(op, 1.0, float(op.mean()), level, (float(pv.min()), float(pv.max())))
     p, c = problem(inputs, pv - level, np.ones(pv.size, dtype=bool)), neutral()
@@ -87,7 +87,14 @@ def test_a_worn_valve_shows_in_the_band_on_held_out_data(seed: int) -> None:
     plain = descended(p, Model((), c), FULL_STEPS)
     worn = c.copy()
     worn[Slot.STICKBAND] = 4.0
-    better = descended(p, Model((EFFECTS["backlash"].variants[0],), worn), FULL_STEPS)
+    return p, plain, descended(p, Model((EFFECTS["backlash"].candidates[0],), worn), FULL_STEPS)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_worn_valve_shows_in_the_band_on_held_out_data(seed: int) -> None:
+    """Backlash of 4 % removes over half of what the best baseline model leaves in the band, and the squared errors
+    differ significantly; a model compared with itself removes nothing."""
+    p, plain, better = fitted(*cycling(4.0, seed))
     found = held_out(p, plain, better, 0, (19.0, 308.0)).in_band
     assert found is not None
     assert found.share > 0.5
@@ -95,6 +102,20 @@ def test_a_worn_valve_shows_in_the_band_on_held_out_data(seed: int) -> None:
     same = held_out(p, plain, plain, 0, (19.0, 308.0)).in_band
     assert same is not None
     assert same.share == 0.0
+
+
+@pytest.mark.parametrize(("second", "kept"), [("load-oscillation", True), ("valve-characteristic", False)])
+def test_a_slow_load_beside_a_worn_valve_counts_by_all_data(second: str, kept: bool) -> None:
+    """A sine of five times the band's longest period is kept beside backlash; a curve of the valve, which is not
+    there and removes nothing in the band, is not."""
+    p, plain, better = fitted(*cycling(4.0, 1, 0.6))
+    c, row = better.model.c.copy(), EFFECTS[second].candidates[0]
+    if second == "load-oscillation":
+        c[Slot.OMEGA], c[Slot.SINE] = 2.0 * math.pi / 1500.0, 0.1
+    both = descended(p, Model((*better.model.added, row), c), 2 * FULL_STEPS)
+    accepted = Candidate(better, 1.0, 1.0), Candidate(both, 1.0, 1.0)
+    found = carried_over(Explanation(p, plain, both, accepted, band=(19.0, 308.0)))
+    assert (second in [c.name for c in found.accepted]) is kept
 
 
 def test_squared_errors_of_equal_models_differ_by_chance() -> None:
