@@ -97,6 +97,7 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
         late_s=late * s.dt_s,
         cycles=s.cycles,
         band=s.band,
+        every_scan=s.every_scan,
     )
     if any(ends(x) is Ends.ALL for x in (recorder, controller)):
         return carried_over(found)

@@ -61,9 +61,9 @@ class Explanation:
     residual, 0 where there is none, and left_by : the class of the reference that predicts it (reference.py); proof :
     plain and best on held-out data; refuted : names of effects that fit the first part but not the rest; unproven :
     whether OP moved only once, so that no data remain for a proof; cycles : the faulty valve that the loop's cycles
-    show; band : the loop's band, as in Recording; others : misfits on other recordings, if some were held out whole;
-    by_innovations : in an experiment, the explanation by innovations alone; outside : an effect outside the catalogue
-    that explains it better than any named one.
+    show; band : the loop's band, and every_scan, as in Recording; others : misfits on other recordings, if some were
+    held out whole; by_innovations : in an experiment, the explanation by innovations alone; outside : an effect
+    outside the catalogue that explains it better than any named one.
     """
 
     p: Problem = field(repr=False)
@@ -82,6 +82,7 @@ class Explanation:
     unproven: bool = False
     cycles: SeenInCycles | None = None
     band: tuple[float, float] | None = None
+    every_scan: bool = True
     others: tuple[OnOther, ...] = ()
     outside: Candidate | None = None
     by_innovations: Explanation | None = field(default=None, repr=False)
@@ -162,7 +163,8 @@ def carried_over(found: Explanation) -> Explanation:
     for count in range(len(names), 0, -1):
         kept = found if count == len(names) else first_effects(found, count)
         cycling = count == 1 and by_cycles(found)
-        proof = held_out(kept.p, kept.plain, kept.best, cycle if cycling else 0, found.band)
+        around = cycle if cycling else 0, found.band, found.every_scan
+        proof = held_out(kept.p, kept.plain, kept.best, *around)
         unjudged = is_one_move(found.p) or proof.is_blind
         unproven = not proof.carries and proof.falls and unjudged
         timed = proof.falls and all(EFFECTS[name].timed for name in names[:count])
