@@ -9,9 +9,7 @@ from identification.models import Loop, Pid, Process
 from tuning.frequency_response import maximum_sensitivity
 from tuning.limits import LIMITS, TuningLimits
 from tuning.ringing import ObservedRinging, error_ratio, from_ringing, process_of
-from tuning.search import (
-    rounded,
-)
+from tuning.search import rounded
 
 SHARES_KEPT, CALM_MS = (0.5, 0.6, 0.67, 0.75, 0.8), 7.0
 """Shares of the response at the ringing period that a first step keeps; the most robust with an error within the
@@ -25,10 +23,10 @@ def calmer_step(old: Pid, seen: ObservedRinging, limits: TuningLimits = LIMITS) 
     return calmest(old, steps(old, seen, None), limits) if old.kp else None
 
 
-def calmest(old: Pid, steps: Sequence[Step], limits: TuningLimits) -> Step | None:
+def calmest(old: Pid, tried: Sequence[Step], limits: TuningLimits) -> Step | None:
     """The most robust step within the price in error; among equals that of least error, with a higher gain only if
     there is no other."""
-    within = [x for x in steps if x.error <= limits.tight_price]
+    within = [x for x in tried if x.error <= limits.tight_price]
 
     def rank(x: Step) -> tuple[bool, float, float]:
         return abs(x.new.kp) > abs(old.kp), max(x.ms, limits.ms_most_sample), x.error

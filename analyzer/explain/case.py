@@ -56,7 +56,8 @@ STRETCH_SAMPLES = 15000
 """Samples of the most informative stretch of a longer one: as much time, because a long recording contains
 more that requires an effect."""
 NIGHT_S, LONGER = 86400.0, 1.5
-"""Length of a night [s], and of a recording, in nights, from which its last night alone is judged as a night."""
+"""Length of a night [s], and of a recording [nights] from which its last night alone is judged: ours, a day and some
+hours of the next are still explained as one."""
 PART_SAMPLES = 300
 """Samples of PV from which a part under other settings is judged: a noise model that looks 25 back needs
 twelve times that."""
@@ -189,14 +190,17 @@ def latest_night(prepared: Prepared) -> Prepared:
 
 
 def stretch_of_night(prepared: Prepared, verdict: Verdict, most: int) -> tuple[Prepared, str]:
-    """The night's part of a recording, of more than `most` samples STRETCH_SAMPLES up to the end of the stretch in
-    which it fitted a valve fault, and a sentence on it."""
+    """The night's part of a recording, and a sentence on it: where it has more than `most` samples, at most
+    STRETCH_SAMPLES up to the end of the stretch in which the night fitted a valve fault."""
     night = latest_night(prepared)
     r, m = night.record, verdict.require_measured
     if len(r) > most:
-        fitted = m.window.blocks.first + m.window.y.size * m.window.blocks.factor
-        first = min(max(fitted - STRETCH_SAMPLES, 0), len(r) - STRETCH_SAMPLES)
-        night = replace(night, record=r.span(first, first + STRETCH_SAMPLES))
+        n, fitted = (
+            min(most, STRETCH_SAMPLES),
+            m.window.blocks.first + m.window.y.size * m.window.blocks.factor,
+        )
+        first = min(max(fitted - n, 0), len(r) - n)
+        night = replace(night, record=r.span(first, first + n))
     days = f"{len(night.record) * r.dt_s / 86400:.1f} of {prepared.record.duration_s / 86400:.1f} days"
     said = f"Judged on {len(night.record)} of {len(prepared.record)} samples, the {days} in which the night"
     return night, f"{said} identified the valve."

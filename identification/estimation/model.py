@@ -8,6 +8,7 @@ is known. Effects of the catalogue are added to it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -131,22 +132,14 @@ class Fitted:
         return replace(self, model=replace(self.model, c=c))
 
 
-def start_at(
-    p: Problem,
-    gain: float,
-    dynamics: tuple[float, float],
-    valve: StemLaw,
-    ar: Floats,
-    slow: Floats | None = None,
-) -> Fitted:
-    """A start of a fit of the batch run.
+def start_at(p: Problem, gain: float, dynamics: tuple[float, float], valve: StemLaw, ar: Floats) -> Fitted:
+    """A start of a fit of the batch run, without slow terms.
 
-    dynamics : time constant and dead time [s], the latter counted from the first row of a block; ar : noise model of
-    single lags; slow : coefficients of 1, t, decay and the load's step, shape (4,), zero if not given.
+    gain [% PV/% OP]; dynamics : time constant and dead time [s], the latter counted from the first row of a block; ar
+    : noise model of single lags, shape (p,).
     """
-    c = with_friction(neutral(), valve)
-    c[Slot.K], c[Slot.T], c[Slot.L] = gain, dynamics[0], dynamics[1] + p.half_block_s
-    return Fitted(p, Model((), c), 1.0, 1, ar, slow=np.zeros(4) if slow is None else slow)
+    start = Fitted(p, Model((), neutral()), math.inf, 1, ar, slow=np.zeros(4))
+    return start.moved(gain=gain, time_constant_s=dynamics[0], dead_time_s=dynamics[1], valve=valve)
 
 
 def gain(better: Fitted, worse: Fitted) -> float:

@@ -36,6 +36,7 @@ from identification.mismatch.proof import (
     course,
     held_out,
     misfit,
+    removed,
 )
 from identification.mismatch.recording import STEP, Recording, SeenInCycles
 from identification.mismatch.selection import Candidate, without
@@ -188,13 +189,8 @@ def adds_enough(found: Explanation, proof: HeldOut) -> bool:
     less = first_effects(found, len(found.accepted) - 1)
     before = held_out(less.p, less.plain, less.best, band=found.band)
     if EFFECTS[found.accepted[-1].name].timed:
-        return removes(before.overall[1], proof.overall[1])
-    return before.in_band is None or removes(before.in_band.better, proof.in_band.better)
-
-
-def removes(before: Misfit, after: Misfit) -> bool:
-    """Whether LEAST_IN_BAND of the misfit (mean square) is gone."""
-    return after.rmse**2 <= (1.0 - LEAST_IN_BAND) * before.rmse**2
+        return removed(before.overall[1], proof.overall[1]) >= LEAST_IN_BAND
+    return before.in_band is None or removed(before.in_band.better, proof.in_band.better) >= LEAST_IN_BAND
 
 
 def first_effects(found: Explanation, count: int) -> Explanation:

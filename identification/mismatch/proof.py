@@ -63,6 +63,11 @@ class Misfit:
     fit_pct: float | None
 
 
+def removed(before: Misfit, after: Misfit) -> float:
+    """Share of a misfit (mean square) that is gone [-]."""
+    return 1.0 - after.rmse**2 / max(before.rmse**2, 1e-30)
+
+
 @dataclass(frozen=True, slots=True)
 class OnOther:
     """Misfit of models on one other recording, over the same windows, and its samples.
@@ -79,7 +84,7 @@ class OnOther:
     @property
     def share(self) -> float:
         """Share of the misfit (mean square) that the effects remove there."""
-        return 1.0 - self.explained.rmse**2 / max(self.baseline.rmse**2, 1e-30)
+        return removed(self.baseline, self.explained)
 
 
 def anchored(y: Floats, simulated: Floats, window: int) -> Floats:
@@ -121,7 +126,7 @@ class InBand:
     @property
     def share(self) -> float:
         """Share of the misfit (mean square) that the effect removes."""
-        return 1.0 - self.better.rmse**2 / max(self.plain.rmse**2, 1e-30)
+        return removed(self.plain, self.better)
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,8 +185,7 @@ class HeldOut:
     @property
     def share(self) -> float:
         """Share of the held-out misfit (mean square) that the effect removes."""
-        before, after = (m.rmse**2 for m in self.held)
-        return 1.0 - after / max(before, 1e-30)
+        return removed(*self.held)
 
     @property
     def share_in_band(self) -> float:

@@ -5,19 +5,29 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from analyzer.config import Config
-from analyzer.explain.case import PART_SAMPLES, asked_cases, parts, parts_said
+from analyzer.explain.case import (
+    PART_SAMPLES,
+    asked_cases,
+    latest_night,
+    parts,
+    parts_said,
+    stretch_of_night,
+)
 from analyzer.history.series import Series
+from analyzer.loop.quality import prepare
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.asked import Asked
 from analyzer.night.nights import ALWAYS
 from analyzer.night.opened import guarded
+from identification.estimation.problem import in_blocks
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
 from tests.analyzer.test_explain import asked
@@ -112,3 +122,18 @@ def test_play_is_proven_under_the_other_settings(tmp_path: Path) -> None:
     assert answer["effects"][0]["parameters"]["backlash_pct"]["value"] == pytest.approx(2.0, rel=0.05)
     assert answer["held_out_on"][0]["share"] > 0.3
     assert "Settings changed" in answer["reason"]
+
+
+@pytest.mark.parametrize(("most", "first", "count"), [(100_000, 100_000, 86_400), (40_000, 125_000, 15_000)])
+def test_a_long_recording_is_explained_where_its_night_fitted_the_valve(
+    most: int, first: int, count: int
+) -> None:
+    """Of 186,400 s the last night, or the 15,000 s of it up to the end of the fitted stretch, in row 40,000."""
+    n = 186_400
+    whole = prepare(SPEC, trends(n), Config().quality)
+    window = in_blocks(np.zeros(3000), np.zeros(30_000), np.ones(3000, dtype=bool), 10.0, 10, first=10_000)
+    verdict = SimpleNamespace(require_measured=SimpleNamespace(window=window))
+    part, said = stretch_of_night(whole, verdict, most)  # type: ignore[arg-type]
+    assert (len(latest_night(whole).record), len(part.record)) == (86_400, count)
+    assert part.record.start_s == whole.record.start_s + first
+    assert f"{count} of {n} samples" in said
