@@ -24,8 +24,8 @@ import numpy as np
 
 from analyzer.config import Config
 from analyzer.loop import assess as of_night
-from analyzer.loop import tune as of_settings
-from analyzer.loop.advice import withheld
+from analyzer.loop.advice import tune as of_settings
+from analyzer.loop.advice.advise import withheld
 from analyzer.night.asked import asked_of
 from analyzer.night.nights import Plant, PlantLoop
 from analyzer.night.opened import opened

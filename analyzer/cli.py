@@ -111,7 +111,7 @@ def tune(asked: Asked, tag: str, store: Path | None, form: str, out: Path | None
 
     Example: triage tune export.parquet --loops loops.csv --loop LIC2107 --store store --out pictures
     """
-    from analyzer.loop.tune import proposal
+    from analyzer.loop.advice.tune import proposal
     from analyzer.night.opened import guarded
     from reports.plain import json_ready
 

@@ -17,7 +17,7 @@ import pyarrow as pa
 
 from benchmarks.plant_night import Plant, make, tenth
 from proofs.common import command, command_line, publish, table
-from tests.analyzer.dask_cluster import dask_cluster
+from tests.analyzer.night.dask_cluster import dask_cluster
 
 TURNS = 3
 """Nights of each, of which the median counts."""

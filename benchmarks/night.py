@@ -22,7 +22,7 @@ from analyzer.config import Config
 from analyzer.history.export import Export, open_export
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.decisions import counts
-from analyzer.loop.quality import prepare
+from analyzer.loop.record.quality import prepare
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller, find_loops, match, read_loops
 from identification.errors import TriageError

@@ -27,7 +27,7 @@ import numpy as np
 from analyzer.config import Config
 from analyzer.loop.assess import assess
 from analyzer.loop.decisions import Cause
-from analyzer.loop.quality import prepare
+from analyzer.loop.record.quality import prepare
 from benchmarks.night import HEALTHY
 from proofs.common import command, parser_of, publish
 from proofs.plant import START_S, Sketch, Trends, series, simulate, spec

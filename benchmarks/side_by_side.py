@@ -22,8 +22,8 @@ from importlib.util import find_spec
 import numpy as np
 
 from analyzer.config import Config
-from analyzer.loop.fit_window import window_of
-from analyzer.loop.measure import measure, time_scale
+from analyzer.loop.identification.fit_data import window_of
+from analyzer.loop.identification.measure import measure, time_scale
 from identification.estimation.backlash_stiction import fit_linear
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.record import Floats, LoopRecord
@@ -295,7 +295,7 @@ def speed_table() -> str:
     """Simulation and identification of a day, over floors that any program pays."""
     from scipy.signal import lfilter
 
-    from analyzer.loop.oscillation import detect
+    from analyzer.loop.oscillation.detection import detect
 
     loop, zero = Loop(Fopdt(80, 200, 1), Pid(1, 10), Backlash(1.0)), np.zeros(86_400)
     noise = np.random.default_rng(0).standard_normal(86_400)

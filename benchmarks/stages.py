@@ -20,10 +20,10 @@ from analyzer.config import Config
 from analyzer.explain.case import case
 from analyzer.explain.explained import explained
 from analyzer.history.export import Export, open_export
-from analyzer.loop.advice import advise
+from analyzer.loop.advice.advise import advise
 from analyzer.loop.assess import assess, cause_of
-from analyzer.loop.oscillation import counting, detect
-from analyzer.loop.quality import prepare
+from analyzer.loop.oscillation.detection import counting, detect
+from analyzer.loop.record.quality import prepare
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller, find_loops
 from benchmarks.night import fastest, floor, plant, stated

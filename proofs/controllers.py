@@ -20,10 +20,10 @@ import pandas as pd
 
 from analyzer.config import Config
 from analyzer.history.export import Export, open_export
-from analyzer.loop.judged_stretch import controller_of, shown
-from analyzer.loop.measure import time_scale
-from analyzer.loop.oscillation import counting, detect
-from analyzer.loop.quality import prepare
+from analyzer.loop.identification.measure import time_scale
+from analyzer.loop.oscillation.detection import counting, detect
+from analyzer.loop.record.judged_stretch import controller_of, shown
+from analyzer.loop.record.quality import prepare
 from analyzer.loops.slips import slip
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import match, read_loops

@@ -16,7 +16,7 @@ import pandas as pd
 
 from analyzer.config import Config
 from analyzer.history.export import open_export
-from analyzer.loop.quality import prepare
+from analyzer.loop.record.quality import prepare
 from analyzer.loops.tags import match, read_loops
 from analyzer.night.chunk import assess_loop
 from proofs.common import command, command_line, publish, table

@@ -17,8 +17,8 @@ import numpy as np
 
 from analyzer.config import AdviceLimits, QualityLimits
 from analyzer.loop.assess import Assessment, assess
-from analyzer.loop.intervals import intervals
-from analyzer.loop.quality import prepare
+from analyzer.loop.identification.intervals import intervals
+from analyzer.loop.record.quality import prepare
 from identification.errors import NotAssessedError
 from identification.models import Estimate, Pid
 from identification.record import Floats

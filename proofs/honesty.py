@@ -20,8 +20,8 @@ from scipy.stats import ttest_ind
 from analyzer.comparison.before_after import LoopComparison, compare
 from analyzer.comparison.measures import MEASURES, ChangeVerdict, gridded, spans_around
 from analyzer.config import Config
-from analyzer.loop.assessments import hourly
-from analyzer.loop.oscillation import detect
+from analyzer.loop.oscillation.detection import detect
+from analyzer.loop.oscillation.figures import hourly
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
 from identification.record import LoopRecord
 from identification.simulation.closed_loop import closed_loop

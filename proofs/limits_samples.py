@@ -12,11 +12,11 @@ import numpy as np
 from analyzer.config import Config
 from analyzer.history.series import Series
 from analyzer.loop.assess import Assessment, assess
+from analyzer.loop.cause.fitness import unfit_for_cause
 from analyzer.loop.decisions import Cause, Finding
-from analyzer.loop.fitness import unfit_for_cause
-from analyzer.loop.measure import Measured, measure
-from analyzer.loop.oscillation import Oscillations, counting, detect
-from analyzer.loop.quality import Prepared, prepare
+from analyzer.loop.identification.measure import Measured, measure
+from analyzer.loop.oscillation.detection import Oscillations, counting, detect
+from analyzer.loop.record.quality import Prepared, prepare
 from analyzer.loops.spec import LoopSpec
 from identification.errors import TriageError
 from identification.models import Pid

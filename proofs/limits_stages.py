@@ -12,15 +12,15 @@ from analyzer.comparison.before_after import compare, grade
 from analyzer.comparison.before_after import follows as source_of
 from analyzer.comparison.measures import Span
 from analyzer.config import Config
-from analyzer.loop.advice import advise
+from analyzer.loop.advice.advise import advise
 from analyzer.loop.assess import assess, cause_of, verdict_by_measures
-from analyzer.loop.assessments import assess_span
-from analyzer.loop.dead_valve import dead_valve
+from analyzer.loop.cause.dead_valve import dead_valve
+from analyzer.loop.cause.fitness import at_limits
 from analyzer.loop.decisions import Finding, SignKind, Status, Swing
-from analyzer.loop.fitness import at_limits
-from analyzer.loop.judged_stretch import differing
-from analyzer.loop.oscillation import counting, detect, subthreshold_period
-from analyzer.loop.quality import prepare
+from analyzer.loop.oscillation.detection import counting, detect, subthreshold_period
+from analyzer.loop.oscillation.figures import assess_span
+from analyzer.loop.record.judged_stretch import differing
+from analyzer.loop.record.quality import prepare
 from analyzer.loops.changes import behaviour_change
 from analyzer.plantwide.night import followers_of, following, likely, swing_of, trace
 from analyzer.plantwide.wave import waves_of

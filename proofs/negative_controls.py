@@ -12,9 +12,9 @@ import numpy as np
 from analyzer.config import Config
 from analyzer.history.series import Series
 from analyzer.loop.assess import judged_where
-from analyzer.loop.cycling_span import detect_where_it_cycles
-from analyzer.loop.oscillation import counting
-from analyzer.loop.quality import prepare
+from analyzer.loop.oscillation.cycling_span import detect_where_it_cycles
+from analyzer.loop.oscillation.detection import counting
+from analyzer.loop.record.quality import prepare
 from analyzer.loops.spec import LoopSpec
 from proofs.common import command, command_line, publish, table
 from proofs.nulls import FAMILIES, record

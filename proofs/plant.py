@@ -17,7 +17,7 @@ from analyzer.config import Config, QualityLimits
 from analyzer.history.export import open_export
 from analyzer.history.series import Series
 from analyzer.loop.decisions import Cause, Finding, Status
-from analyzer.loop.quality import Prepared, prepare
+from analyzer.loop.record.quality import Prepared, prepare
 from analyzer.loops.spec import LoopSpec
 from analyzer.night import batch
 from analyzer.night.nights import Plant

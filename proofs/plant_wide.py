@@ -18,10 +18,10 @@ import numpy as np
 
 from analyzer.config import Config
 from analyzer.history.series import Series
-from analyzer.loop.advice import Advice
+from analyzer.loop.advice.advise import Advice
 from analyzer.loop.conclusion import concluded
 from analyzer.loop.decisions import Action, Cause, Finding, counts
-from analyzer.loop.quality import prepare
+from analyzer.loop.record.quality import prepare
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.chunk import assess_loop
 from analyzer.plantwide.night import traced_night

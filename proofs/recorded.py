@@ -17,8 +17,8 @@ import numpy as np
 
 from analyzer.loop.assess import assess
 from analyzer.loop.decisions import Cause, counts
-from analyzer.loop.oscillation import detect
-from analyzer.loop.quality import prepare
+from analyzer.loop.oscillation.detection import detect
+from analyzer.loop.record.quality import prepare
 from identification.errors import NotAssessedError
 from proofs.common import command, command_line, publish, table
 from proofs.plant import CONFIG, START_S, Sketch, Trends, prepared, series, simulate, spec

@@ -16,9 +16,12 @@ from types import ModuleType
 from typing import Any
 
 from analyzer.config import Config
-from analyzer.loop import assess, cause, fitness, oscillation
-from analyzer.loop.measure import Measured
-from analyzer.loop.oscillation import counting, detect
+from analyzer.loop import assess
+from analyzer.loop.cause import fitness
+from analyzer.loop.cause import verdict as cause
+from analyzer.loop.identification.measure import Measured
+from analyzer.loop.oscillation import detection as oscillation
+from analyzer.loop.oscillation.detection import counting, detect
 from identification.errors import NotAssessedError
 from proofs.common import command, command_line, publish, table
 from proofs.untidy.draw import draw
@@ -132,9 +135,9 @@ HELD = """\
 What holds the rules that gain nothing in these draws stands elsewhere:
 
 - *stickbands of any size*: without it a healthy slow loop's valve is blamed in a record of a day
-  (tests/analyzer/test_cause.py); the draws hold none as long.
+  (tests/analyzer/loop/test_cause.py); the draws hold none as long.
 - *PV that stands and jumps*: without it a valve is blamed behind a sensor that sticks
-  (tests/analyzer/test_sticking_sensor.py); the draws have no such sensor.
+  (tests/analyzer/loop/test_sticking_sensor.py); the draws have no such sensor.
 - *plays within PV's grid*: four of seven healthy valves that were told on calm loops stood on few steps of a grid
   (cause.grid_covered in analyzer/limits.toml).
 - *likely valves of compressed trends*: two of 30 such cycles of another cause looked like valves

@@ -22,7 +22,7 @@ import pyarrow.parquet as pq
 
 from analyzer import api
 from analyzer.loop.decisions import Cause
-from analyzer.loop.intervals import intervals
+from analyzer.loop.identification.intervals import intervals
 from benchmarks.world.__main__ import export
 from benchmarks.world.draw import Drawn, drawn, run
 from benchmarks.world.recorder import recorded

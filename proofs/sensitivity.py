@@ -17,7 +17,7 @@ import numpy as np
 
 from analyzer.loop.assess import assess
 from analyzer.loop.decisions import counts
-from analyzer.loop.oscillation import detect
+from analyzer.loop.oscillation.detection import detect
 from identification.errors import NotAssessedError
 from proofs.common import command, command_line, publish, table
 from proofs.plant import CONFIG, Sketch, Trends, prepared, simulate

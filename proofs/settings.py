@@ -15,10 +15,10 @@ import pandas as pd
 
 from analyzer.config import Config
 from analyzer.history.export import open_export
-from analyzer.loop.judged_stretch import controller_of, differing
-from analyzer.loop.measure import time_scale
-from analyzer.loop.oscillation import counting, detect
-from analyzer.loop.quality import prepare
+from analyzer.loop.identification.measure import time_scale
+from analyzer.loop.oscillation.detection import counting, detect
+from analyzer.loop.record.judged_stretch import controller_of, differing
+from analyzer.loop.record.quality import prepare
 from analyzer.loops.tags import match, read_loops
 from identification.models import Pid
 from proofs.common import command, command_line, publish, table

@@ -18,8 +18,8 @@ from scipy.special import erf
 from analyzer.config import Config
 from analyzer.history.series import Series
 from analyzer.loop.decisions import LacksError
-from analyzer.loop.experiments import learned
-from analyzer.loop.quality import prepare
+from analyzer.loop.experiments.found import learned
+from analyzer.loop.record.quality import prepare
 from analyzer.loops.spec import LoopSpec
 from proofs.step_test_plant import Truth, best_scatter, drawn, recorded
 

@@ -16,9 +16,9 @@ import numpy as np
 from analyzer.config import Config
 from analyzer.history.series import Series
 from analyzer.loop.assess import judged_where
-from analyzer.loop.cycling_span import detect_where_it_cycles
-from analyzer.loop.oscillation import counting
-from analyzer.loop.quality import Prepared, prepare
+from analyzer.loop.oscillation.cycling_span import detect_where_it_cycles
+from analyzer.loop.oscillation.detection import counting
+from analyzer.loop.record.quality import Prepared, prepare
 from analyzer.loops.spec import LoopSpec
 from identification.models import Pid
 from proofs.common import command, command_line, publish, table

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from analyzer.config import WearLimits
-from analyzer.loop.setpoint_moves import alike
+from analyzer.loop.oscillation.setpoint_moves import alike
 from identification.estimation.descent import NINETY
 from identification.record import Floats
 

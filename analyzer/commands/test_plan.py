@@ -22,7 +22,7 @@ def test_plan(asked: Asked, tag: str, store: Path | None) -> None:
 
     Example: triage test-plan export.parquet --loops loops.csv --loop TIC2106 --store store
     """
-    from analyzer.loop.test_plan import plan_lines
+    from analyzer.loop.experiments.test_plan import plan_lines
     from analyzer.night.opened import guarded
 
     for line in plan_lines(guarded(asked).last_night(tag), store):

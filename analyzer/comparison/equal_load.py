@@ -18,7 +18,7 @@ from analyzer.comparison.block_bootstrap import Floats
 from analyzer.comparison.loop_night import LoopNight, night_of, pid_of
 from analyzer.comparison.shared_process import Spectra, shared_process
 from analyzer.config import ComparisonLimits, FigureLimits
-from analyzer.loop.assessments import travel_of
+from analyzer.loop.oscillation.figures import travel_of
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction, Valve
 from identification.signals.robust import robust_deviation
 from tuning.forecast import in_digits, loop_in_digits, run, settled

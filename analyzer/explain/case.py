@@ -19,19 +19,19 @@ import numpy as np
 from analyzer.config import AdviceLimits, Config
 from analyzer.history.plant_clock import stamp
 from analyzer.history.series import Series
+from analyzer.loop.advice.tune import NEIGHBOURS
 from analyzer.loop.assess import judged_where
-from analyzer.loop.cause import NO_CAUSE, Verdict
-from analyzer.loop.cycling_span import detect_where_it_cycles
+from analyzer.loop.cause.fitness import at_limits, pv_that_jumps
+from analyzer.loop.cause.verdict import NO_CAUSE, Verdict
 from analyzer.loop.decisions import Cause, Fault
-from analyzer.loop.experiments import Learned, learned
-from analyzer.loop.fitness import at_limits, pv_that_jumps
-from analyzer.loop.intervals import intervals
-from analyzer.loop.judged_stretch import differing
-from analyzer.loop.measure import time_scale
-from analyzer.loop.oscillation import counting
-from analyzer.loop.quality import Prepared, prepare
-from analyzer.loop.sample_clock import onto_clock, snapped
-from analyzer.loop.tune import NEIGHBOURS
+from analyzer.loop.experiments.found import Learned, learned
+from analyzer.loop.identification.intervals import intervals
+from analyzer.loop.identification.measure import time_scale
+from analyzer.loop.oscillation.cycling_span import detect_where_it_cycles
+from analyzer.loop.oscillation.detection import counting
+from analyzer.loop.record.judged_stretch import differing
+from analyzer.loop.record.quality import Prepared, prepare
+from analyzer.loop.record.sample_clock import onto_clock, snapped
 from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import controller

@@ -14,7 +14,7 @@ import numpy as np
 from analyzer.columns import Row
 from analyzer.explain.case import Case
 from analyzer.explain.models import SCALE, UserModel, judged, plain_start, rescaled, span_note
-from analyzer.loop.experiments import Learned
+from analyzer.loop.experiments.found import Learned
 from analyzer.words.decision import as_data as decision_data
 from analyzer.words.experiments import in_a_clause
 from identification.controller.pi_regression import ControlLaw

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from analyzer.explain.case import Case
-from analyzer.loop.quality import Scale
+from analyzer.loop.record.quality import Scale
 from identification.errors import InputError
 from identification.mismatch.answer import restored, unanswered
 from identification.mismatch.explanation import Explanation

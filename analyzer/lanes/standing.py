@@ -9,8 +9,8 @@ import numpy as np
 
 from analyzer.config import Config, LaneLimits
 from analyzer.history.plant_clock import HOUR_S
-from analyzer.loop.assessments import hour_edges, noise_band
-from analyzer.loop.quality import Prepared
+from analyzer.loop.oscillation.figures import hour_edges, noise_band
+from analyzer.loop.record.quality import Prepared
 from identification.models import Pid
 from identification.record import LoopRecord
 from identification.signals.correlation import SMOOTHING, correlation_time

@@ -1,7 +1,7 @@
 """Choice of the action if several apply: the one place with their order of precedence.
 
-An assessment gives its own advice (analyzer/loop/advice.py). Its lanes, the loop that it follows, and the nights
-since its settings were changed may each replace that; analyzer/words/orders.py words the action.
+An assessment gives its own advice (analyzer/loop/advice/advise.py). Its lanes, the loop that it follows, and
+the nights since its settings were changed may each replace that; analyzer/words/orders.py words the action.
 """
 
 from __future__ import annotations

@@ -11,9 +11,10 @@ import numpy as np
 
 from analyzer.config import CauseLimits, Config
 from analyzer.history.plant_clock import HOUR_S
-from analyzer.loop.aliasing import is_own_period
-from analyzer.loop.assessments import Assessments, Hour, assess_span, hourly
-from analyzer.loop.cause import (
+from analyzer.loop.cause.dead_valve import dead_valve, with_dead_valve
+from analyzer.loop.cause.fitness import too_thin, unfit_for_cause, unfit_for_settings
+from analyzer.loop.cause.stick_slip import refine_stick_slip
+from analyzer.loop.cause.verdict import (
     NO_CAUSE,
     Verdict,
     cap_confidence,
@@ -23,20 +24,25 @@ from analyzer.loop.cause import (
     resolve_ambiguity,
     with_worn_valve,
 )
-from analyzer.loop.cycling_span import Span, detect_where_it_cycles
-from analyzer.loop.dead_valve import dead_valve, with_dead_valve
+from analyzer.loop.cause.worn_valve import WornValve
 from analyzer.loop.decisions import Cause, LacksError, MissingData, Requirement, RequirementKind
-from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
-from analyzer.loop.judged_stretch import Earlier, Shown, Stretch, as_recorded, judged_stretch, shown
-from analyzer.loop.measure import Measured, measure, ringing_period, time_scale
-from analyzer.loop.oscillation import Oscillation, Oscillations, counting, detect, subthreshold_period
+from analyzer.loop.identification.measure import Measured, measure, ringing_period, time_scale
+from analyzer.loop.identification.ringing import same_period
+from analyzer.loop.oscillation.aliasing import is_own_period
+from analyzer.loop.oscillation.cycling_span import Span, detect_where_it_cycles
+from analyzer.loop.oscillation.detection import (
+    Oscillation,
+    Oscillations,
+    counting,
+    detect,
+    subthreshold_period,
+)
+from analyzer.loop.oscillation.figures import Assessments, Hour, assess_span, hourly
+from analyzer.loop.oscillation.setpoint_moves import Move, moves
 from analyzer.loop.page_trends import BUCKETS, FINE_BUCKETS, close_view, thinned
-from analyzer.loop.quality import Prepared
-from analyzer.loop.ringing import same_period
-from analyzer.loop.setpoint_moves import Move, moves
-from analyzer.loop.shared_valve import Shared
-from analyzer.loop.stick_slip import refine_stick_slip
-from analyzer.loop.worn_valve import WornValve
+from analyzer.loop.record.judged_stretch import Earlier, Shown, Stretch, as_recorded, judged_stretch, shown
+from analyzer.loop.record.quality import Prepared
+from analyzer.loop.record.shared_valve import Shared
 from analyzer.plantwide.wave import Wave, waves_of
 from identification.controller.free_law import FreeLaw
 from identification.controller.gain_pieces import ScheduledGain

@@ -10,16 +10,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.config import AdviceLimits
-from analyzer.loop.advice import Advice
+from analyzer.loop.advice.advise import Advice
 from analyzer.loop.assess import Assessment
-from analyzer.loop.cause import Verdict
+from analyzer.loop.cause.verdict import Verdict
 from analyzer.loop.cost import RECORDED, STATED, loss
 from analyzer.loop.decisions import Action, Cause, Cell, Fault, Finding, Remedy, Requirement, Status, Swing
-from analyzer.loop.identified import gain_room
-from analyzer.loop.intervals import intervals, is_known
-from analyzer.loop.measure import Measured
-from analyzer.loop.oscillation import Oscillations
-from analyzer.loop.setpoint_moves import as_row
+from analyzer.loop.identification.identified import gain_room
+from analyzer.loop.identification.intervals import intervals, is_known
+from analyzer.loop.identification.measure import Measured
+from analyzer.loop.oscillation.detection import Oscillations
+from analyzer.loop.oscillation.setpoint_moves import as_row
 from analyzer.loops.spec import LoopSpec
 
 Known = dict[str, Cell]

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analyzer.loop.decisions import Cause
-from analyzer.loop.oscillation import Oscillations, counting
-from analyzer.loop.quality import Prepared
+from analyzer.loop.oscillation.detection import Oscillations, counting
+from analyzer.loop.record.quality import Prepared
 from identification.estimation.model import Fitted
 from identification.record import LoopRecord
 from identification.signals.turns import StemMarks, halves, turns_of

@@ -11,11 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from analyzer.config import CauseLimits, Config
-from analyzer.loop.cause import Verdict, agrees, fault_of, hidden_by_grid, jump_evidence, needed
+from analyzer.loop.cause.verdict import Verdict, agrees, fault_of, hidden_by_grid, jump_evidence, needed
 from analyzer.loop.decisions import Cause, Fault
-from analyzer.loop.intervals import DECODED, slope_deviation
-from analyzer.loop.measure import Measured
-from analyzer.loop.quality import Prepared
+from analyzer.loop.identification.intervals import DECODED, slope_deviation
+from analyzer.loop.identification.measure import Measured
+from analyzer.loop.record.quality import Prepared
 from identification.estimation.backlash_stiction import WIDTHS, width_profile
 from identification.estimation.descent import LEAST_JUMP
 from identification.estimation.gauss_newton import covariance

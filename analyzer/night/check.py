@@ -7,13 +7,13 @@ from collections.abc import Iterator, Sequence
 from analyzer.config import Config
 from analyzer.history.plant_clock import stamp
 from analyzer.loop.assess import hidden, unassessable
+from analyzer.loop.cause.fitness import too_thin, unfit_for_cause, unfit_for_settings
 from analyzer.loop.decisions import Requirement
-from analyzer.loop.experiments import Learned, found_in
-from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
-from analyzer.loop.judged_stretch import controller_of, differing
-from analyzer.loop.measure import time_scale
-from analyzer.loop.oscillation import counting, detect
-from analyzer.loop.quality import Prepared, prepare
+from analyzer.loop.experiments.found import Learned, found_in
+from analyzer.loop.identification.measure import time_scale
+from analyzer.loop.oscillation.detection import counting, detect
+from analyzer.loop.record.judged_stretch import controller_of, differing
+from analyzer.loop.record.quality import Prepared, prepare
 from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import no_loops

@@ -20,7 +20,13 @@ from analyzer.config import Config
 from analyzer.history.plant_clock import stamp
 from analyzer.history.series import Series
 from analyzer.lanes.standing import standing
-from analyzer.loop.advice import Advice, advise, advise_beyond_faults, on_recorded, with_controller_told
+from analyzer.loop.advice.advise import (
+    Advice,
+    advise,
+    advise_beyond_faults,
+    on_recorded,
+    with_controller_told,
+)
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.conclusion import FailedLoop, concluded
 from analyzer.loop.decisions import (
@@ -32,14 +38,14 @@ from analyzer.loop.decisions import (
     RequirementKind,
     Status,
 )
-from analyzer.loop.experiments import learned
-from analyzer.loop.experiments_row import by_experiment, with_experiment
-from analyzer.loop.field_indices import field_indices
-from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
-from analyzer.loop.oscillation import counting
+from analyzer.loop.experiments.finding import by_experiment, with_experiment
+from analyzer.loop.experiments.found import learned
+from analyzer.loop.oscillation.detection import counting
+from analyzer.loop.oscillation.field_indices import field_indices
 from analyzer.loop.page_trends import thinned, turn_events
-from analyzer.loop.quality import Prepared, prepare
-from analyzer.loop.sample_clock import interval
+from analyzer.loop.record.judged_stretch import Earlier, controller_of, earlier_settings
+from analyzer.loop.record.quality import Prepared, prepare
+from analyzer.loop.record.sample_clock import interval
 from analyzer.loop.witness import witness
 from analyzer.loops.changes import TuningChange, in_force, settings_from
 from analyzer.loops.spec import LoopSpec, controller_columns

@@ -13,8 +13,8 @@ from tempfile import TemporaryDirectory
 
 from analyzer.columns import BELIEVED, LISTED, RANKING, Row, names
 from analyzer.loop.assess import Assessment
-from analyzer.loop.oscillation import detect
-from analyzer.loop.quality import prepare
+from analyzer.loop.oscillation.detection import detect
+from analyzer.loop.record.quality import prepare
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.chunk import Task, assessed
 from analyzer.night.finish import finish_night

@@ -14,8 +14,8 @@ from analyzer.config import Config, NightLimits
 from analyzer.history.export import Export
 from analyzer.history.plant_clock import DAY_S, UTC_NAME, date_of, midnights
 from analyzer.history.series import Series, stamp_text
-from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
-from analyzer.loop.quality import Prepared, prepare
+from analyzer.loop.record.judged_stretch import Earlier, controller_of, earlier_settings
+from analyzer.loop.record.quality import Prepared, prepare
 from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.night.asked import ALWAYS, Span

@@ -13,7 +13,7 @@ import numpy as np
 
 from analyzer.config import Config
 from analyzer.history.series import Series
-from analyzer.loop.quality import prepare
+from analyzer.loop.record.quality import prepare
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.chunk import assess_loop
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction

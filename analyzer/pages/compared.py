@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.loop.settings_side_by_side import SPREAD, Comparison
+from analyzer.loop.advice.settings_side_by_side import SPREAD, Comparison
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated, derivative_as_stated, unit_ratio
 from analyzer.pages.words import NightDecision, number, page_table, signed, texts

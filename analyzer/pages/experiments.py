@@ -14,7 +14,7 @@ from analyzer.pages.words import Row, number
 from reports import pages as parts
 
 Kept = Mapping[str, Any]
-"""An experiment as stored (analyzer/loop/experiments.py)."""
+"""An experiment as stored (analyzer/loop/experiments/found.py)."""
 
 
 def experiments_section(row: Row) -> parts.Section | None:

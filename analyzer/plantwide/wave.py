@@ -15,7 +15,7 @@ import pyarrow as pa
 from scipy.fft import fft, ifft, irfft, next_fast_len
 
 from analyzer.config import PlantLimits
-from analyzer.loop.oscillation import Oscillations, peaks
+from analyzer.loop.oscillation.detection import Oscillations, peaks
 from identification.record import Floats
 from identification.signals.spectrum import Complex, Spectrum, locked_harmonic, peak_prominence
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from analyzer.history.plant_clock import stamp
-from analyzer.loop.experiments import Learned
+from analyzer.loop.experiments.found import Learned
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import sentences

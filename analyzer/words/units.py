@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from analyzer.columns import Row
 
 if TYPE_CHECKING:
-    from analyzer.loop.quality import Scale
+    from analyzer.loop.record.quality import Scale
     from analyzer.loops.spec import LoopSpec
     from identification.controller.free_law import FreeLaw
     from identification.controller.gain_pieces import ScheduledGain

@@ -13,12 +13,12 @@ import numpy as np
 
 from analyzer.config import Config
 from analyzer.history.export import open_export
-from analyzer.loop.advice import withheld
+from analyzer.loop.advice.advise import withheld
+from analyzer.loop.advice.tune import tune
 from analyzer.loop.assess import assess
 from analyzer.loop.decisions import Action
-from analyzer.loop.judged_stretch import controller_of
-from analyzer.loop.quality import prepare
-from analyzer.loop.tune import tune
+from analyzer.loop.record.judged_stretch import controller_of
+from analyzer.loop.record.quality import prepare
 from benchmarks.world.__main__ import export, spec_of, told
 from benchmarks.world.draw import Drawn, drawn, run
 from benchmarks.world.recorder import Recording, recorded

@@ -9,14 +9,14 @@ import pytest
 
 from analyzer.config import Config
 from analyzer.history.series import Series
-from analyzer.loop.advice import advise, sought_for, withheld
-from analyzer.loop.agreement import agreement
+from analyzer.loop.advice.advise import advise, sought_for, withheld
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.decisions import SignKind
-from analyzer.loop.identified import load_of
-from analyzer.loop.intervals import intervals
-from analyzer.loop.judged_stretch import controller_of
-from analyzer.loop.quality import prepare
+from analyzer.loop.identification.agreement import agreement
+from analyzer.loop.identification.identified import load_of
+from analyzer.loop.identification.intervals import intervals
+from analyzer.loop.record.judged_stretch import controller_of
+from analyzer.loop.record.quality import prepare
 from benchmarks.world.__main__ import spec_of
 from benchmarks.world.draw import HOURS, Drawn, drawn, run
 from benchmarks.world.recorder import recorded

@@ -11,7 +11,7 @@ import pytest
 
 from analyzer.explain import page as pages
 from reports.folder import write_html
-from tests.analyzer.explained import explanation
+from tests.analyzer.explain.explained import explanation
 from tests.browser.test_pages import browser, opened, pytestmark, wait
 
 __all__ = ["browser", "pytestmark"]

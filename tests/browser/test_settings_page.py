@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from analyzer.config import Config
-from analyzer.loop.settings_side_by_side import compared
+from analyzer.loop.advice.settings_side_by_side import compared
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller
 from analyzer.pages.compared import settings_page

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analyzer.loop.settings_side_by_side import compared
+from analyzer.loop.advice.settings_side_by_side import compared
 from analyzer.loops.spec import LoopSpec
 from analyzer.pages import compared as page
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction

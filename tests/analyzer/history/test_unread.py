@@ -10,7 +10,7 @@ import pytest
 from analyzer.config import QualityLimits
 from analyzer.history.export import ReadOptions, open_export
 from analyzer.history.values import parsed
-from analyzer.loop.quality import prepare
+from analyzer.loop.record.quality import prepare
 from analyzer.loops.spec import LoopSpec
 from identification.errors import InputError, NotAssessedError
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from analyzer.loop.decisions import Cause, Finding
-from analyzer.loop.oscillation import detect
+from analyzer.loop.oscillation.detection import detect
 from analyzer.plantwide.groups import Group, groups_of
 from analyzer.plantwide.night import Traced, followers_of, may_follow, trace
 from analyzer.plantwide.wave import Wave, waves_in, waves_of, waves_table

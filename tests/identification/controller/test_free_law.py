@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analyzer.config import Config
-from analyzer.loop.judged_stretch import recorded
+from analyzer.loop.record.judged_stretch import recorded
 from identification.controller.free_law import FreeLaw, free_law
 from identification.controller.law_comparison import compare_laws
 from identification.controller.law_ways import fastest

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from analyzer.config import Config
-from analyzer.loop.measure import Measured, measure
-from analyzer.loop.oscillation import counting, detect
+from analyzer.loop.identification.measure import Measured, measure
+from analyzer.loop.oscillation.detection import counting, detect
 from benchmarks.world.draw import Drawn, run
 from benchmarks.world.recorder import recorded
 from benchmarks.world.simulate import BACKLASH, Controller, Process, Valve

@@ -14,8 +14,8 @@ from analyzer.config import Config
 from analyzer.history.export import open_export
 from analyzer.loop.assess import assess
 from analyzer.loop.decisions import Cause, Fault
-from analyzer.loop.judged_stretch import controller_of
-from analyzer.loop.quality import prepare
+from analyzer.loop.record.judged_stretch import controller_of
+from analyzer.loop.record.quality import prepare
 from benchmarks.world.__main__ import export, spec_of
 from benchmarks.world.draw import drawn
 from benchmarks.world.pairs import varied

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analyzer.loop.assess import assess
-from analyzer.loop.quality import prepare
+from analyzer.loop.record.quality import prepare
 from identification.estimation.stem_position import seen
 from proofs.plant import CONFIG, START_S, Sketch, Trends, series, simulate, spec
 

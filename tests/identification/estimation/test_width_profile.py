@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from analyzer.loop.measure import Measured, measure
-from analyzer.loop.oscillation import counting, detect
+from analyzer.loop.identification.measure import Measured, measure
+from analyzer.loop.oscillation.detection import counting, detect
 from identification.estimation.backlash_stiction import WIDTHS, width_profile
 from proofs.plant import CONFIG, Sketch, prepared, simulate
 

@@ -1,0 +1,1 @@
+"""New settings of one loop, and `triage tune`."""

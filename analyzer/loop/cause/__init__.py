@@ -1,0 +1,1 @@
+"""The cause of an oscillation and the fault of the valve."""

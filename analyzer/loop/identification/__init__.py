@@ -1,0 +1,1 @@
+"""Process and valve of one loop, fitted to its record."""

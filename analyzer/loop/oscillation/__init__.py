@@ -1,0 +1,1 @@
+"""Does the loop oscillate? Periods, amplitude and significance, and its performance figures."""
