@@ -16,13 +16,13 @@ PARTS = {
     "ranking": "The ranking: `triage rank`, names and order a contract",
     "listed": "Further columns of `triage rank --format csv` and `json`",
     "noted": "Notes, last in `triage rank --format csv` and `json`",
-    "stored": "Further columns of the store: `nights/*.parquet`, a row a loop",
-    "hour": "Only for hours: `hours/*.parquet`, a row a loop and hour",
-    "group": "Groups that share an oscillation: `groups/*.parquet`, a row a loop and group",
+    "stored": "Further columns of the store: `nights/*.parquet`, a row per loop",
+    "hour": "Only for hours: `hours/*.parquet`, a row per loop and hour",
+    "group": "Groups that share an oscillation: `groups/*.parquet`, a row per loop and group",
     "group_list": "Groups as listed: `triage rank --groups --format csv` and `json`, a row a group",
-    "compared": "Settings compared: `compared/*.parquet`, a row a loop with a comparison, newest night",
-    "believed": "Beliefs: `beliefs/*.parquet`, a row a loop and night, with the ranking by all nights",
-    "explanation": "Explanations: `explained/*.parquet`, a row a loop that was explained",
+    "compared": "Settings compared: `compared/*.parquet`, a row per loop with a comparison, newest night",
+    "believed": "Beliefs: `beliefs/*.parquet`, a row per loop and night, with the ranking by all nights",
+    "explanation": "Explanations: `explained/*.parquet`, a row per loop that was explained",
 }
 TITLES = ("column", "holds", "title", "unit", "from", "h", "meaning")
 

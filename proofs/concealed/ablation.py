@@ -125,11 +125,12 @@ def section(rows: pd.DataFrame) -> str:
     settings = f"{(rows.kp_error.abs() < 0.02).sum()} and {(rows.ti_error.abs() < 0.02).sum()} of {len(rows)}"
     head = ["level", "right ahead, fitted recording", "right no worse, later one", "misfit, wrong over right"]
     parts = [
-        "## Ablation: the best wrong effect in the right one's place",
-        "`python proofs/concealed/ablation.py CASES --out docs/evidence/PROOF.md`. Every row is fitted whole\n"
-        "and at its best size, which is stricter than a wrong effect of the right one's size. Gains are compared\n"
-        "after the penalty for constants and search. Some effects have others as special cases: stick-slip has\n"
-        'backlash, two valves have a stop. A wrong one may then be as good on later data; "no worse" is within\n2 %.',
+        "## Ablation: the best wrong effect instead of the right one",
+        "`python proofs/concealed/ablation.py CASES --out docs/evidence/PROOF.md`. Every effect is fitted\n"
+        "completely and at its best size. This is stricter than a wrong effect at the size of the right one.\n"
+        "Gains are compared after the penalty for constants and search. Some effects have others as special\n"
+        "cases: stick-slip has backlash, two valves have a stop. A wrong one may then be as good on later data;\n"
+        '"no worse" is within 2 %.',
         table(head, lines),
         f"Lost on the fitted recording: {worst or 'none'}.",
         "The controller's Kp and Ti were identified from SP, PV and OP of the same cases. They are within 2 % in "

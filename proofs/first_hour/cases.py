@@ -168,7 +168,10 @@ MISTAKES = (
     Mistake("the file begins with a byte order mark", _bom, 0, "1 of 1 loops assessed"),
     Mistake("semicolons and decimal commas", _semicolons, 0, "decimal comma"),
     Mistake(
-        "one sample in four minutes of a loop that cycles with five", _minute, 0, "1 of 1 loops assessed"
+        "one sample every four minutes of a loop with a cycle of five minutes",
+        _minute,
+        0,
+        "1 of 1 loops assessed",
     ),
     Mistake("one hour", _one_hour, 0, "1 of 1 loops assessed"),
     Mistake("a hundred samples", _few, 2, "needs 200 good PV samples, has 100"),
@@ -188,7 +191,10 @@ MISTAKES = (
 )
 """Each is answered in one line, or by a night whose list says what the trends can show."""
 LISTED = {
-    "one sample in four minutes of a loop that cycles with five": ("needs data", "needs a sample every"),
+    "one sample every four minutes of a loop with a cycle of five minutes": (
+        "needs data",
+        "needs a sample every",
+    ),
     "one hour": ("needs data", "new settings need 2 good hours"),
     "no OP in the export": ("needs data", "needs OP"),
     "settings in loops.csv that were changed long ago": ("check settings", "are not those of the controller"),
