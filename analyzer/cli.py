@@ -51,7 +51,7 @@ def check(asked: Asked) -> None:
     lost = 0
     for line, bad in check_lines(asked):
         lost += bad
-        click.echo(visible(line))  # one line, whatever characters a tag contains
+        click.echo(visible(line))  # one line, also if a tag contains control characters
     sys.exit(options.SOME_LOST if lost else 0)
 
 
@@ -71,7 +71,7 @@ def check(asked: Asked) -> None:
     "--lane",
     type=click.Choice([lane.replace(" ", "-") for lane in Lane]),
     callback=lambda _ctx, _param, value: None if value is None else Lane(value.replace("-", " ")),
-    help="Only loops of this lane, by its figure.",
+    help="Only loops of this lane, sorted by its figure.",
 )
 @click.option("--groups", is_flag=True, help="Loops that share an oscillation, and where each starts.")
 @click.option("--all", "everything", is_flag=True, help="Also loops that notes hide from the table.")

@@ -101,11 +101,11 @@ class ChangeLimits(Limits, section="changes"):
 
 
 class WorkerLimits(Limits, section="workers"):
-    """Limits of time and memory for one loop, after which the night goes on without it."""
+    """Limits of time and memory for one loop; a loop that exceeds them is given up."""
 
 
 class OpeningLimits(Limits, section="opening"):
-    """What finding out about an export may cost before it is given up."""
+    """Limits of time and memory for opening an export, above which it is given up."""
 
 
 @dataclass(frozen=True, slots=True)

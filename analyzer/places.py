@@ -67,7 +67,8 @@ def place(text: str) -> Path:
         found = UPath(text, **OPTIONS.get(urlsplit(text).scheme, {}))
         _ = found.fs
     except (ImportError, ValueError) as error:
-        raise InputError(f"{text}: no storage of that kind here", "the extra 'remote'", NEEDED) from error
+        seen = f"{text}: this kind of storage is not supported"
+        raise InputError(seen, "the extra 'remote'", NEEDED) from error
     be_patient(cast(Path, found))
     return cast(Path, found)
 

@@ -27,8 +27,8 @@ def _name_of_kernels() -> str:
 
 
 def _places() -> Iterator[Path]:
-    """Possible folders for kernels, best first: as configured, beside the code, and the cache folder of a service or
-    user."""
+    """Possible folders for kernels, best first: as configured, next to the code, and the cache folder of a
+    service or user."""
     if stated := os.environ.get(KERNELS):
         yield Path(stated).parent if Path(stated).name.startswith("kernels-") else Path(stated)
     yield Path(__file__).parent / "__pycache__"
@@ -50,7 +50,8 @@ def _is_writable(folder: Path) -> bool:
 def _keep_kernels() -> None:
     """Give numba a writable folder: without one, the import of a kernel is an error.
 
-    The folder is beside the code or elsewhere; the last resort is a temporary folder of this process. Kernels
+    The folder is next to the code or elsewhere; the last choice is a temporary folder of this process.
+    Kernels
     compiled at installation are copied there. If no folder can be made, kernels are compiled and not kept.
     """
     name, beside = _name_of_kernels(), Path(__file__).parent / "__pycache__"

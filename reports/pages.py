@@ -217,7 +217,8 @@ class Trend(Named):
 
 @dataclass(frozen=True, slots=True)
 class Beside(Named):
-    """Trends of which a reader shows up to `most` below each other on one time axis; ours: as fit on a screen."""
+    """Trends of which a reader can show up to `most` below each other on one time axis; ours: as many as
+    fit on a screen."""
 
     trends: tuple[Trend, ...]
     caption: str = ""

@@ -95,7 +95,7 @@ def as_file(block: Picture, zone: str = "UTC") -> str:
     wide = ROOM if len(shown) > 1 else width
     body, top = _headed(block, wide)
     drawn, foot = _laid(shown, top, wide)
-    inner = re.sub(r"</?a\b[^>]*>", "", "".join([*body, *drawn]))  # a picture beside a text has no links
+    inner = re.sub(r"</?a\b[^>]*>", "", "".join([*body, *drawn]))  # a picture next to a text has no links
     box = f"{digits(-RIM)} 0 {digits(wide + 2 * RIM)} {digits(foot)}"
     size = f'width="{digits(wide + 2 * RIM)}" height="{digits(foot)}" viewBox="{box}"'
     head = f'<svg xmlns="http://www.w3.org/2000/svg" {size} role="img" aria-label="{escape(block.title)}">'

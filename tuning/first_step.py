@@ -18,14 +18,14 @@ the integrator with dead time has 5 to 7, true plants about 3.5 (benchmarks.worl
 
 
 def calmer_step(old: Pid, seen: ObservedRinging, limits: TuningLimits = LIMITS) -> Step | None:
-    """The step that `recommend` takes from the ringing alone, without a model; None if there is none within the
-    price in error, or the controller has integral action alone."""
+    """The step that `recommend` takes from the ringing alone, without a model. None if no step stays
+    within the allowed increase in error, or if the controller has integral action alone."""
     return calmest(old, steps(old, seen, None), limits) if old.kp else None
 
 
 def calmest(old: Pid, tried: Sequence[Step], limits: TuningLimits) -> Step | None:
-    """The most robust step within the price in error; among equals that of least error, with a higher gain only if
-    there is no other."""
+    """The most robust step within the allowed increase in error; among equals that of least error. Its
+    gain is higher only if there is no other step."""
     within = [x for x in tried if x.error <= limits.tight_price]
 
     def rank(x: Step) -> tuple[bool, float, float]:

@@ -159,8 +159,9 @@ def _tight(
 def _least_of_both(
     found: Sequence[tuple[Pid, float]], cases: _Cases, limits: TuningLimits
 ) -> tuple[Pid, float] | None:
-    """Of the settings that raise the error on no model those with the least product of error and travel, if any; None
-    if a model does not ring as recorded: what it lacks is in its load, and no settings would calm it."""
+    """Of the settings that raise the error on no model, those with the least product of error and travel,
+    if any. None if a model does not ring as recorded: its load then contains the missing part, and no
+    settings would remove it."""
     if cases.least_reproduced < limits.reproduced:
         return None
     tests = [cases.test(new) for new, _ in found]

@@ -102,8 +102,8 @@ def bench(
     limits: TuningLimits,
     indistinguishable: Sequence[LoadedLoop] = (),
 ) -> Bench:
-    """The present tuning on every loop, as a reference for candidates; indistinguishable, other loops that the record
-    cannot tell from the first, each with its own load."""
+    """The present tuning on every loop, as a reference for candidates; indistinguishable, other loops that
+    the record cannot distinguish from the first, each with its own load."""
     cut = in_digits(load[-limits.most_steps :])
     loops = tuple(replace(one, controller=loop.controller) for one in (loop, *others))
     loads = tuple(cut if k % 2 == 0 else np.ascontiguousarray(cut[::-1]) for k in range(len(loops)))

@@ -35,24 +35,29 @@ REPETITIONS = 60
 """Number of stored repetitions of a programme's phase: some weeks of daily batches, a few days of hourly
 ones."""
 LEAST_DEVIATION = 0.01
-"""Least standard deviation of the logarithm of a constant from one night: a process is no better known than
-that."""
+"""Least standard deviation of the logarithm of a constant from one night; no process is known more
+precisely."""
 
 NEEDED, EARLIER = 10.0, 0.1
 """Required evidence [nat], and standard deviation of a width's logarithm, of nights stored by earlier versions."""
 CONSTANTS = ("slope", "time_constant_s", "gain", "dead_time_s", "width", "slip_jump")
 """Constants that are pooled over nights."""
 OF_VALVE = ("width", "slip_jump")
-"""Those that a repair changes."""
+"""Constants that a repair of the valve changes."""
 GIST = attrgetter("cause", "fault", "action", "source")
 """Attributes in which two decisions differ."""
 
 
 @dataclass(frozen=True, slots=True)
 class NightDecision:
-    """The decision on a loop in a night: cause and confidence [%] of each, fault of the valve, the loop that it
-    follows, action and due time, the pair of settings, and whether it differs from the decision by the night
-    alone."""
+    """The decision on a loop in a night.
+
+    cause, and the confidence in each cause [%]; fault of the valve; source, the loop that it follows;
+    action and its due time; pair, the settings.
+
+    own is True if the decision equals that by this night alone. calmed is True if new settings removed
+    most of a cycle, so that the repair can wait.
+    """
 
     cause: Cause = Cause.UNDECIDED
     confidence: Mapping[Cause, float] = field(default_factory=dict)
@@ -274,8 +279,8 @@ def tell(now: Belief, row: Row, limits: BeliefLimits) -> NightDecision:
 
 
 def _left_alone(told: NightDecision) -> NightDecision:
-    """Decision for a loop with a worn valve and far less of a cycle since its settings were changed: no further
-    settings, and the repair at the next shutdown."""
+    """Decision for a loop with a worn valve whose cycle became much smaller after a change of settings. It
+    has no further settings; the repair is due at the next shutdown."""
     if not action.is_urgent(told.action, told.due):
         return told
     return replace(told, action=Action.REPAIR_VALVE, due=Due.SHUTDOWN, pair=None, calmed=True)

@@ -1,8 +1,8 @@
 """Joint result of the nights under one pair of settings: the cause of the cycle, the loop's source, and the action.
 
-A night's odds have two errors: one varies from night to night, the other is the same every night. The mean over
-nights keeps the second alone, so the pooled odds may exceed one night's, but not without limit: k = (b + n) / (b + n
-/ m) of m nights, with b and n the variances of both.
+A night's log odds have two errors: one varies from night to night (variance n), the other is the same every
+night (variance b). The mean over m nights reduces only the first. The pooled log odds are therefore this mean
+times k = (b + n) / (b + n / m), which has a limit.
 
 The action is constant until something changes: by votes of the nights, and one fixed pair of settings. Every pair
 advised by a night was tested on that night's model and load. The pair nearest to the median of all nights is
@@ -22,12 +22,13 @@ from analyzer.config import BeliefLimits
 from analyzer.loop.decisions import CAUSES, Action, Cause, counts
 
 PAIRS = 15  # Number of pairs of settings that are stored: two weeks
-LEAST_PCT = 0.5  # Confidence below which a cause is as good as excluded [%]
+LEAST_PCT = 0.5  # Least confidence that a night counts for a cause [%]
 SETTLE_NIGHTS = 3
-"""Nights with advised settings from which on the median pair is kept [nights]: a median needs three."""
+"""Number of nights with advised settings from which the median pair is kept [nights]; a median needs
+three."""
 SETTLE_RATIO = 1.2
-"""Ratio by which the middle of the pairs must differ from the pair that is kept: what an engineer would not
-retype a setting for."""
+"""Least ratio between the median of the pairs and the reported pair for a replacement. No engineer changes
+a setting for a smaller one."""
 RECENT = 8  # Nights in which a change is searched for: a week
 
 WITH_PAIR = ("kp_new", "ti_new", "advice", "expected_period_s", "expected_pv_amplitude_pct")
@@ -46,8 +47,11 @@ class CycleBelief:
 
     since, the first night under them; nights, those that were assessed; weight, nights that oscillated, older ones
     with lower weight; odds, sums of the log confidence of the causes in the order of CAUSES; cause, the decided one;
-    sources, nights in which it followed each of other loops; loud, whether it oscillates by all nights; top, the
-    largest significance [% h].
+    sources, nights in which it followed each of other loops; loud, whether it oscillates by all nights; top,
+    the largest significance [% h]; usual, log of the usual significance.
+
+    off is the number of consecutive nights far above (positive) or below (negative) the usual significance.
+    shift is the ratio of a new usual significance to the old one in the night that confirms it, otherwise 0.
     """
 
     since: str = ""
@@ -134,8 +138,8 @@ def _log_confidence(row: Row, limits: BeliefLimits) -> tuple[float, ...]:
 
 
 def _cause_named(now: CycleBelief, row: Row, limits: BeliefLimits) -> Cause:
-    """The decided cause: that of the first night, then the one that the nights make likely, until they no longer
-    do."""
+    """The decided cause: first that of the first night, later the cause that the nights make likely, as
+    long as they do."""
     if now.nights == 1:
         return Cause(row["cause"])
     found = now.chances(limits.between)

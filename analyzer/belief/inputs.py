@@ -17,7 +17,7 @@ from analyzer.store.table import mark_of
 FOLLOWS = b"follows"
 """Metadata of a table of beliefs: the digest of their inputs."""
 ENDED = timedelta(days=2)
-"""A night has ended so long after the midnight that it is named for, whatever the time zone."""
+"""Time after the midnight of its date at which a night has ended in every time zone."""
 
 
 def inputs_of(

@@ -52,7 +52,8 @@ class ValveBelief:
 
     @property
     def profile(self) -> Floats:
-        """Evidence for each of WIDTHS [nat], shape of WIDTHS: of all nights but the best, or of a sufficient one."""
+        """Evidence for each of WIDTHS [nat], shape of WIDTHS: of all nights without the best one, or of a
+        single night that is sufficient alone."""
         if not self.summed:
             return np.zeros(WIDTHS.size)
         return np.maximum(np.subtract(self.summed, self.best), self.alone)
@@ -119,8 +120,8 @@ def doubt(said: Witness, cause: Cause, oscillates: bool, config: Config) -> Doub
 
 
 def weighed(said: Witness, wrong_by: float, against: float, limits: BeliefLimits) -> Floats:
-    """Evidence of a night for each width [nat]: beyond its possible error, evidence at the threshold of a fault
-    counts `conviction`, and no night counts for more than `most`."""
+    """Evidence of a night for each width [nat], beyond its possible error. Evidence at the threshold of a
+    fault counts as `conviction`; no night counts for more than `most`."""
     found = np.asarray(said["profile"], dtype=np.float64) / max(said["needed"], 1e-9)
     found = np.maximum(found - wrong_by, 0.0) + np.minimum(found + against, 0.0)
     found *= limits.conviction

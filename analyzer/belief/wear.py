@@ -47,8 +47,8 @@ def wear(widths: Sequence[Width], limits: WearLimits) -> dict[str, Any] | None:
 
 
 def bend(days: Floats, width: Floats, deviation: Floats, limits: WearLimits) -> float | None:
-    """The day from which a width, or another figure, grows: the best of all bends, if it fits better than a constant;
-    None otherwise. Days, figure and its standard deviation are of shape (n,)."""
+    """The day from which a width, or another figure, grows; None if a line with one bend fits no better than
+    a constant. Days, figure and its standard deviation are of shape (n,)."""
     weight = 1.0 / deviation
     flat = _left(np.ones((days.size, 1)), width, weight)[0]
     best, least, slope = None, math.inf, 0.0

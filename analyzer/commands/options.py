@@ -33,8 +33,8 @@ accident."""
 
 Command = Callable[..., Any]
 SOME_LOST, NOTHING_DONE, AGAIN = 1, 2, 75
-"""Exit status if some loops failed, if nothing could be done, and if shared storage failed for so long that a run
-ended: the same command may succeed later (EX_TEMPFAIL of sysexits)."""
+"""Exit status if some loops failed, if nothing could be done, and if a run ended because shared storage
+failed. After the last one the same command may succeed later (EX_TEMPFAIL of sysexits)."""
 MOST_SAID = 600
 """Maximum characters of an error line."""
 
@@ -69,7 +69,7 @@ def what_went_wrong(error: Exception) -> str | None:
     if isinstance(error, TriageError):
         return one_line(str(error))
     if isinstance(error, MemoryError):
-        return "takes more memory than there is; give fewer loops, nights or files"
+        return "the command needs more memory than is available; give fewer loops, nights or files"
     if isinstance(error, OSError) and error.filename is None and (error.errno is None or is_outage(error)):
         return (
             f"{one_line(str(error))}; check URL, endpoint and credentials of the storage, or try again later"
@@ -180,7 +180,7 @@ TIMES = ("%Y-%m-%d", *(f"%Y-%m-%d{between}%H:%M{end}" for between in "T " for en
 
 def finding(command: Command) -> Command:
     """--find-loops, for commands that take their loops from the export without a loops.csv."""
-    said = "Without --loops: look for loops in the data too, where the tags' names show none."
+    said = "Without --loops: search the data for loops that the tags' names do not show."
     return click.option("--find-loops", "finding", is_flag=True, help=said)(command)
 
 
@@ -227,7 +227,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "--day-first/--month-first": {"default": None},
     "--good-quality": {"multiple": True},
 }
-"""Those of them that are not plain text."""
+"""Export options whose value is not plain text."""
 
 
 def export_options(command: Command) -> Command:

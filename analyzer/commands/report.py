@@ -104,7 +104,7 @@ def report(
         why = "; ".join(f"{tag}: {reason}" for tag, reason in missing) or "no change found"
         raise InputError(why, "loops and times that the store holds", "check the tags and times")
     span = "The stated spans" if before or after else f"{days:g} days"
-    subtitle = f"{span} before against after the change, from {store.name}."
+    subtitle = f"{span} before and after the change, from {store.name}."
     page = changes_page(found, missing, subtitle, named["find"], zone)
     write(kept, [page], form, single_file, out)
     for tag, reason in missing:

@@ -47,11 +47,12 @@ if TYPE_CHECKING:
     from analyzer.store.store import Store
 
 STOPPED = 128
-"""Exit status of a run stopped by a signal, less the signal's number: as shells and schedulers expect."""
+"""The exit status of a run that a signal stopped is this plus the signal's number, as shells and
+schedulers expect."""
 FEW = 10
 """Notes on the read data that are printed; the others are counted."""
 PLAIN = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._:/+-%")
-"""Characters of values without quotes."""
+"""Characters of values that are logged without quotes."""
 
 
 def logfmt(value: object) -> str:
@@ -195,7 +196,7 @@ def _for_all_workers(asked: Asked, store: Path, scheduler: str | None) -> Asked:
     if not is_remote(store) and not store.is_absolute():
         seen = f"--store {store} with --scheduler: each worker would write its own store"
         raise InputError(
-            seen, "an absolute path, or a URL, that all machines share", f"say {store.resolve()}"
+            seen, "an absolute path, or a URL, that all machines share", f"state --store {store.resolve()}"
         )
     return replace(asked, export=tuple(p if is_remote(p) else p.absolute() for p in asked.export))
 
@@ -271,4 +272,4 @@ def _explain_night(plant: Plant, store: Store, night: Night, jobs: int, resume: 
     with bar("explained") as progress:
         rows = explain_flagged(plant, store, night, jobs, resume, progress)
     named = sum(r["verdict"] not in ("none", "unexplained") for r in rows)
-    click.echo(f"{len(rows)} flagged loops explained, {named} with a name", err=True)
+    click.echo(f"{len(rows)} flagged loops explained, {named} with a named effect", err=True)

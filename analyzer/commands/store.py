@@ -66,7 +66,7 @@ def check_store(path: Path, config: Path | None) -> None:
     for problem in (*store_care.problems(kept), *unfounded(kept, limits)):
         found += 1
         click.echo(f"{problem.seen}: {problem.remedy}")
-    click.echo(f"{path}: {store_care.size_text(kept)}; " + (f"{found} to look at" if found else "all whole"))
+    click.echo(f"{path}: {store_care.size_text(kept)}; " + (f"problems: {found}" if found else "no problem"))
     sys.exit(SOME_LOST if found else 0)
 
 

@@ -54,7 +54,7 @@ class LoopComparison:
 
     @property
     def primary(self) -> tuple[Change, ...]:
-        """The study's four."""
+        """The changes of the study's four figures."""
         return tuple(c for c in self.changes if c.measure.primary)
 
 

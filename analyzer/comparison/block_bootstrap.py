@@ -16,7 +16,7 @@ from scipy.special import ndtri, stdtrit
 Floats = NDArray[np.float64]
 
 BLOCK_H = 24
-"""Hours drawn together [h]: a day, so that each replicate holds as many nights as days; ours."""
+"""Hours that are drawn together [h]: a day, so that each replicate has equally many nights and days; ours."""
 REPLICATES = 2000
 """Replicates per side; the ends of a 95 % interval then vary by 3 % of its width between seeds; ours."""
 DRIFTS = np.array([0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.97])

@@ -104,8 +104,9 @@ class Weeks:
 
     @property
     def cured(self) -> bool:
-        """Whether a faulty valve shows its fault in few nights after, and did in most before; a loop that still
-        cycles hides the fault."""
+        """Whether the fault of a valve was removed: most nights before the change show it, and few nights
+        after it. A night with a cycle after the change counts as one with the fault, because a cycle hides
+        it."""
         was = sum(n.worn_alone for n in self.before) / len(self.before)
         is_now = sum(n.worn_alone or n.cycles for n in self.after) / len(self.after)
         return any(n.at_fault for n in self.before) and was > 0.5 and is_now <= 0.5 * was

@@ -1,7 +1,7 @@
 """Explanation of a recording, with storage, pages and text.
 
-The package is callable and then is `analyzer.api.explain`: once any of its modules is imported, it occupies the name
-`triage.explain` of `import analyzer as triage`.
+A call of the package is a call of `analyzer.api.explain`. After the import of one of its modules, the package
+has the name `triage.explain` in `import analyzer as triage`, so it must be callable.
 """
 
 import sys

@@ -56,11 +56,11 @@ STRETCH_SAMPLES = 15000
 """Samples of the most informative stretch of a longer one: as much time, because a long recording contains
 more that requires an effect."""
 NIGHT_S, LONGER = 86400.0, 1.5
-"""Length of a night [s], and of a recording [nights] from which its last night alone is judged: ours, a day and some
-hours of the next are still explained as one."""
+"""Length of a night [s], and of a recording [nights] from which its last night alone is judged: ours: a
+day with some hours of the next day is still one recording."""
 PART_SAMPLES = 300
-"""Samples of PV from which a part under other settings is judged: a noise model that looks 25 back needs
-twelve times that."""
+"""Samples of PV from which a part under other settings is judged: a noise model that reaches 25 samples
+back needs twelve times as many."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,9 +83,12 @@ def tags_of(spec: LoopSpec, specs: Sequence[LoopSpec]) -> list[str]:
 
 
 def stated_law(spec: LoopSpec, prepared: Prepared, period_s: float, config: Config) -> StatedSettings | None:
-    """The controller as stated, integral time in samples, confirmed if rows are slower than its scan and a night
-    finds no others; None if it is unknown, not a PI, or one whose gain changed by its schedule. period_s, of the
-    loop's cycle, 0 without one."""
+    """The stated controller with its integral time in samples; None if it is unknown, no PI controller, or
+    one whose schedule changed its gain. It is confirmed if rows are slower than its scan and the record
+    shows no other settings.
+
+    period_s : period of the loop's cycle [s], 0 without one.
+    """
     pid = controller(spec, prepared.scale.span, prepared.gain_share)
     if pid is None or pid.td_s > 0 or not math.isfinite(pid.ti_s) or prepared.record.gain_share is not None:
         return None
@@ -160,8 +163,8 @@ def as_decided(verdict: Verdict, fault: Fault | None) -> Verdict:
 
 
 def as_given(prepared: Prepared) -> Prepared:
-    """A loop that shares a valve with the output of a select, of either controller; half a split range without the
-    time in which the other half moves PV."""
+    """A loop that shares a valve. Behind a select its OP is the one that the valve gets, from either
+    controller. A half of a split range is without the time in which the other half moves PV."""
     r, shared = prepared.record, prepared.shared
     if shared is None:
         return prepared

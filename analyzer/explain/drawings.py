@@ -73,7 +73,7 @@ def signals(e: Explained) -> list[tuple[str, str, int, Floats]]:
     out = [] if s.sp is None else [("SP", "sp", 0, s.sp)]
     out.append(("PV, clock set right" if e.found.late_s else "PV recorded", "recorded", 0, pv))
     out += [(LABELS[k], k, 0, x) for k, x in simulated.items()]
-    out += [(f"left by {LABELS[k]}", k, 1, pv - x) for k, x in simulated.items()]
+    out += [(f"residual of {LABELS[k]}", k, 1, pv - x) for k, x in simulated.items()]
     return [*out, ("OP", "op", 2, s.op)]
 
 
@@ -126,7 +126,7 @@ def misfit_panels(e: Explained) -> Panels:
     known = {f.name: f for f in at.features}
     along = (feature_plot(e, g, known.get(g.name)) for g in at.groups if "axis" in FEATURES[g.name])
     plots = *along, spectrum_plot(e)
-    return Panels("misfit", "The misfit along what the loop was doing", plots, NOTES["misfit"])
+    return Panels("misfit", "Misfit over each feature, and its spectrum", plots, NOTES["misfit"])
 
 
 def feature_plot(e: Explained, g: Group, f: Feature | None) -> Plot:

@@ -205,7 +205,7 @@ def simulated(c: Case, data: dict[str, Any], stamps: Floats, closed: bool) -> tu
     except (ZeroDivisionError, OverflowError, FloatingPointError) as error:
         raise InputError(f"{c.spec.loop}: {error}", RUNS, "save the model again") from error
     if not (np.abs(pv).max() <= RUNAWAY_PCT and np.abs(op).max() <= RUNAWAY_PCT):  # false of NaN
-        raise InputError(f"{c.spec.loop}: PV or OP runs away", RUNS, "save the model again")
+        raise InputError(f"{c.spec.loop}: the simulated PV or OP diverges", RUNS, "save the model again")
     at = r.start_s + r.time_s
     pv_at = np.interp(stamps, at, scale.low + pv * scale.span / 100.0)
     return pv_at, np.interp(stamps, at, scale.op_low + op * scale.op_span / 100.0)

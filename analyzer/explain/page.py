@@ -94,7 +94,7 @@ def _tiles(e: Explained) -> list[tuple[str, str, str]]:
         tiles.append((share(held), "of the misfit on held-out data removed", "better"))
     for first in d["effects"][:1]:
         if first["alternatives"]:
-            alike = "other names fit as well or look alike"
+            alike = "other effects fit as well or are indistinguishable"
             tiles.append((str(len(first["alternatives"])), alike, "incomparable"))
     return tiles
 
@@ -124,9 +124,9 @@ def _controller_blocks(e: Explained) -> tuple[Block, ...]:
     ti_s = law.kp / law.ki * s.dt_s if law.ki else None
     facts = (
         ("Kp as stated, in percent", number(s.stated.kp)),
-        ("Kp that gives OP", number(law.kp)),
+        ("Kp identified, in percent", number(law.kp)),
         ("Ti as stated", number_text(s.stated.ti * s.dt_s, "s")),
-        ("Ti that gives OP", number_text(ti_s, "s")),
+        ("Ti identified", number_text(ti_s, "s")),
         ("Share of OP explained", share(law.explained)),
     )
     return (Facts(facts), drawn)

@@ -18,9 +18,9 @@ from identification.mismatch.words import discriminating_test, is_along, place
 from reports.pages import Cell, Table
 
 RATIO_ALONE = 10.0
-"""Factor by which a constant of the baseline model may move before gain and time constant are reported only
-by their ratio: an integrating level moved its gain from 0.114 to 2099, of which the record knows the slope
-alone."""
+"""Factor by which a constant of the baseline model may change before only the ratio of gain and time
+constant is reported. The gain of an integrating level changed from 0.114 to 2099; its record determines
+only the slope."""
 HARDLY = 0.05  # Relative change of the baseline model's constants under which they count as kept
 
 Data = Mapping[str, Any]

@@ -37,7 +37,7 @@ SETTINGS = ("kp", "ti", "td", "td_filter", "pv_filter_s", "gain_unit")
 
 HEAD = (
     "# A draft. Check first: rows found by data, then ranges that are only recorded (column ranges), then settings.",
-    f"# Rows behind # are less sure than {SURE_PCT:g} %: remove the mark where they are right.",
+    f"# Rows after a # have a confidence below {SURE_PCT:g} %: remove the # if the row is correct.",
 )
 
 

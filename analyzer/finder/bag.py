@@ -13,16 +13,19 @@ from analyzer.finder.held import LEAST_MOVES, SLOW_BLOCKS, answers, nearness, tr
 from analyzer.finder.law import Matrix, blocks
 
 FOLLOWS = 0.3
-"""Correlation of these averages from which one may be the set point of the other: proofs/finder.md."""
+"""Correlation of averages over long blocks from which one tag may be the set point of the other:
+proofs/finder.md."""
 ABOUT = 0.7  # Distance of their means over the larger spread of both, at most: proofs/finder.md
 SET_POINTS = 2  # Tags that are tried as a set point of each [tags]: proofs/finder.md
 HELD = 2.0
-"""Nearness (natural log) of a set point that moves from which a tag is held at it: proofs/finder.md."""
-HELD_ALONE = 1.0  # How much nearer it must be than to any other tag: proofs/finder.md
+"""Least nearness (natural log) to a moving set point of a tag that is controlled at it: proofs/finder.md."""
+HELD_ALONE = 1.0  # Least margin of its nearness to that of any other tag: proofs/finder.md
 ANSWERS = 8.0
-"""Standard errors from which a tag moves at once with a set point [standard errors]: proofs/finder.md."""
+"""Significance from which a tag moves in the same sample as a set point [standard errors]:
+proofs/finder.md."""
 ANSWERS_ALONE = 2.5
-"""How much surer it must be than any other tag, and than with any other set point: proofs/finder.md."""
+"""Least ratio of its significance to that of any other tag, and to that with any other set point:
+proofs/finder.md."""
 UNLIKE = -0.05
 """Log of a tag's slow moves over those of its error below which it is not held at a set point that moves:
 proofs/finder.md."""

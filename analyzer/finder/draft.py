@@ -92,7 +92,7 @@ def _with_relations(held: Sampled, rows: Sequence[Row]) -> list[Row]:
             said.append(f"{', '.join(others.tags[j] for j in halves_of[i])}: a half of its split range?")
         rests = at_rest(ops[:, i])
         if rests >= LIMITED_SHARE:
-            said.append(f"OP rests {100 * rests:.0f} % of the time: in manual, or at a limit")
+            said.append(f"OP is constant for {100 * rests:.0f} % of the time: in manual, or at a limit")
         scan = scan_of(ops[:, i])
         if scan is not None:
             said.append(f"OP moves every {scan * held.dt_s:g} s: scan_s?")
@@ -163,7 +163,7 @@ def _stated(held: Sampled, spec: LoopSpec, with_tags: LoopSpec | None) -> Row:
         return Row(spec, "stated", 100.0, f"stated; no settings: {_law(own, pair)}")
     settings = {name: shown[name] for name in SETTINGS if name in shown}
     found = replace(spec, **settings, ti_unit="s", stated=spec.stated | {*settings, "ti_unit"})
-    return Row(found, RECORDED, SURE_PCT, f"stated but for its settings; {_law(own, pair)}")
+    return Row(found, RECORDED, SURE_PCT, f"stated except for its settings; {_law(own, pair)}")
 
 
 def found_told(rows: Sequence[Row]) -> tuple[str, ...]:
@@ -218,8 +218,8 @@ def _row(held: Sampled, pair: FoundPair, outputs: dict[bytes, str], beside: dict
         position=beside.get("position"),
         mode=beside.get("mode"),
     )
-    says = f"{_law(held, pair)}; {100 * pair.noise:.0f} % of their noise is one; next best tag "
-    says += f"{100 * pair.runner_up / max(pair.weight, 1e-9):.0f} % as like"
+    says = f"{_law(held, pair)}; {100 * pair.noise:.0f} % of their noise is common; the next best tag has "
+    says += f"{100 * pair.runner_up / max(pair.weight, 1e-9):.0f} % of this pair's weight"
     says += "" if pair.sp is None else f"; {spec.sp} is where PV is held"
     says += f"; {spec.op} moves at once when {spec.sp} does" if pair.answers else ""
     says += f"; {spec.position} has the value of {spec.op}" if spec.position else ""
@@ -279,7 +279,7 @@ def _beyond(shown: dict[str, Any], kind: str) -> str:
     said = f"; a derivative of {shown['td']:.3g} s" if "td" in shown else ""
     said += f"; a filter of PV of {shown['pv_filter_s']:.3g} s" if "pv_filter_s" in shown else ""
     if not kind and 0.0 < shown.get("ti", 0.0) <= FAST_S:
-        said += f"; its integral acts in {shown['ti']:.2g} s, as of a flow or a pressure: type?"
+        said += f"; its integral time is {shown['ti']:.2g} s, as in a flow or pressure loop: type?"
     return said
 
 

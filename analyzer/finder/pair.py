@@ -27,9 +27,9 @@ SURE_PCT = 90.0
 [%]: proofs/finder.md."""
 SUREST_PCT = 99.0  # Largest probability reported [%]: proofs/finder.md
 OTHER = 0.9
-"""Share that PV explains of OP with SP, of that of the best other tag, from which a pair is sure: of
-benchmarks/world, bags of the seeds 49 to 56, a sensor that follows PV had .83, no right pair less than .94
-(proofs/finder.md)."""
+"""Least ratio of the share of OP that PV and SP explain to that of the best other tag, for a certain pair.
+In benchmarks/world (bags of seeds 49 to 56) a sensor that follows PV had .83, and no right pair less than
+.94 (proofs/finder.md)."""
 ACTS = 5.0  # Standard errors of the integral from which it acts [standard errors]: proofs/finder.md
 LAW_TOLD = 0.9
 """Share of the moves that the law must explain before its settings are written: proofs/finder.md."""
@@ -38,8 +38,8 @@ ALONE = 0.1  # Integral time over the length of the record from which P acts alo
 ACTING = 0.5
 """Share of the weight and of the noise that is enough if a set point supports a pair: proofs/finder.md."""
 DIRECT = 0.5
-"""Evidence for a pair whose OP rises with PV if the law does not show which is OP: a follower looks so:
-proofs/finder.md."""
+"""Required evidence for a pair whose OP rises with PV and whose law does not show which tag is OP. A
+follower of PV appears the same: proofs/finder.md."""
 
 
 @dataclass(frozen=True, slots=True)

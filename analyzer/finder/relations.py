@@ -23,7 +23,8 @@ REST = 20
 COMPARED = 200
 """Samples at which outputs are compared."""
 SHARED = (0.05, 0.95)
-"""Share of the time in which outputs with a common valve are equal: beyond it they are never, or one signal."""
+"""Range of the share of time in which two outputs with a common valve are equal. Below it they are
+unrelated; above it they are one signal."""
 AS_ONE = 0.8
 """Least share of the moves of an output, equal to another, after which it is equal again; ours: most, for a
 controller that tracks is equal until it takes the valve."""
@@ -48,8 +49,8 @@ def ratios_to(set_points: Matrix, pvs: Matrix, own: Sequence[int]) -> list[int |
 
 
 def masters_of(set_points: Matrix, outputs: Matrix, own: Sequence[int]) -> list[int | None]:
-    """Of each set point that moves, shape (n, m), the output, a column of shape (n, k), that it is in another scale;
-    None if none, or if several outputs are alike. own : the columns of the loops' own outputs."""
+    """The output, a column of shape (n, k), of which each moving set point, shape (n, m), is a scaled copy.
+    None if there is none, or if several outputs are alike. own : the columns of the loops' own outputs."""
     agree = _correlations(set_points, outputs)
     agree[np.arange(len(own)), own] = 0.0
     best = agree.argmax(axis=1)

@@ -13,9 +13,9 @@ from identification.record import Floats, LoopRecord
 SLOPES = 3
 """Latest differences of PV's moves in the first look: a filtered derivative acts on several."""
 MORE = 0.25
-"""Share that these explain of what gain and integral leave of OP's moves, from which the whole law is fitted; ours:
-.28 to 1 of controllers with a derivative or a filter of PV at 1 s, at most .10 of others at 1 and 10 s
-(proofs/controllers_plant.py, seed 51)."""
+"""Share of the residual of gain and integral that these explain, from which the whole law is fitted; ours.
+It is .28 to 1 for controllers with a derivative or a filter of PV at 1 s. It is at most .10 for others at
+1 and 10 s (proofs/controllers_plant.py, seed 51)."""
 LEAST = 200
 """Samples from which the law is fitted; ours."""
 LATEST = 8640

@@ -12,9 +12,9 @@ from analyzer.finder.scores import Scores
 RESOLVED = 0.7
 """Correlation of neighbouring averages from which their order shows cause and effect: proofs/finder.md."""
 ERRORS = 25.0
-"""Standard errors of the law one way round over the other that count as one [standard errors]: of
-benchmarks/world, bags of the seeds 49 to 56, and plants the direction is right in 243 of 244 loops from 30
-standard errors on, and wrong in 7 of 14 below (proofs/finder.md)."""
+"""Difference of the law's two directions that counts as one unit of evidence [standard errors]. In
+benchmarks/world (bags of seeds 49 to 56) and plants the direction is right in 243 of 244 loops from 30
+standard errors on. Below, it is wrong in 7 of 14 (proofs/finder.md)."""
 SELDOM = 0.7  # Moves of a set point over those of its PV, at most: proofs/finder.md
 LATER = 6  # Samples within which PV follows OP, and a set point does not [samples]: proofs/finder.md
 DRIFT = 4.0  # Weight of a factor e between the slow shares of OP and PV: proofs/finder.md

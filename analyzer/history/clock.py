@@ -29,10 +29,11 @@ AUTUMN_SAMPLES = 12
 """Samples in the hours about an autumn change from which their number shows whether an hour came twice: one
 in five minutes."""
 IN_SPRING = 0.25
-"""Samples in the hour that spring leaves out, over those of its neighbours, beyond which a clock stays in
-winter time: 0 where it is changed, 1 where not."""
+"""Ratio of the samples in the hour that is skipped in spring to those in adjacent hours, above which a
+clock keeps winter time. It is 0 for a clock with summer time and 1 for one without."""
 IN_AUTUMN = 1.5
-"""The same in the hour that autumn repeats, below which it does: 2 where it is changed, 1 where not."""
+"""The same ratio for the hour that is repeated in autumn, below which a clock keeps winter time. It is 2
+for a clock with summer time and 1 for one without."""
 TYPICAL_STEPS = 3.0
 """Typical steps that a step over the change may take where the clock does not run backwards."""
 LEAST_STEP_S = 1e-5
@@ -76,7 +77,7 @@ ELAPSED = TimeScale("hours, minutes and seconds since the start", 0, 0, 1.0)
 """A clock in text that counts from the start, such as 25:10:03."""
 OF_DAY = TimeScale("times of day with no date, from 1970-01-01 on, a day more at each midnight", 0, 0, 1.0)
 """A clock in text without a date, such as 23:00:00."""
-WITHOUT_LEAP = "so read, the stamps run without a leap"
+WITHOUT_LEAP = "in this order the stamps increase without a jump"
 MIDNIGHT = r"[ T]0?0:00:00(?:\.0+)?$"
 COUNTED = r"^\s*(?P<h>\d{1,5}):(?P<m>[0-5]\d):(?P<s>[0-5]\d(?:[.,]\d+)?)\s*$"
 

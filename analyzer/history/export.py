@@ -270,10 +270,10 @@ def _faults_told(path: Path) -> Iterator[None]:
     try:
         yield
     except MemoryError as error:
-        seen = f"{path}: takes more memory than there is"
-        raise InputError(seen, "files that fit", "export it in parts") from error
+        seen = f"{path}: needs more memory than is available"
+        raise InputError(seen, "files that fit into memory", "export it in parts") from error
     except NoStampError as error:
-        expected = "stamps of our time that the time zone has"
+        expected = "dates and times that exist in the time zone"
         raise InputError(f"{path}: no readable time stamp", expected, "check dates and --timezone") from error
     except KeyError as error:
         seen = f"{path}: has no column {error} any more"

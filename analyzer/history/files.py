@@ -31,8 +31,8 @@ ENDS_BYTES = 65536
 """Part at both ends of a file that identifies it together with its size [bytes]: headers, footers and the
 newest samples are there, and a folder of thousands of files is known in a second."""
 UNPACKED_TIMES = 200.0
-"""Times that a file may be larger unpacked than packed, beyond unpacked_bytes: exports of a plant at rest
-shrink to a hundredth, and what shrinks further is made to fill a disk."""
+"""Largest ratio of unpacked to packed size of a file above unpacked_bytes. Exports of an idle plant shrink
+to a hundredth; a file that shrinks further is made to fill a disk."""
 UNPACKED_BYTES = 100000000.0  # Size up to which anything is unpacked [bytes]
 DISK_SHARE = 0.8  # Share of the disk's room that an unpacked file may take: the night needs the rest
 
@@ -132,7 +132,7 @@ def require_unchanged(marks: Mapping[Path, Mark]) -> None:
         try:
             same, seen = mark_of(path) == mark, f"{path}: was written to while it was read"
         except OSError as error:
-            same, seen = False, f"{path}: was taken away while it was read ({error.strerror or error})"
+            same, seen = False, f"{path}: was removed while it was read ({error.strerror or error})"
         if not same:
             remedy = "nothing of it was kept; run it when the historian has finished"
             raise ChangedError(seen, "an export that stays as it is until the run ends", remedy)
@@ -248,7 +248,7 @@ def _archive_member(path: Path, folder: Path) -> Path:
             raise InputError(seen, "an archive of one file", "unpack it and name the folder")
         if held[0].flag_bits & 1:
             seen = f"{path}: an archive with a password"
-            raise InputError(seen, "one without", "unpack it and name the file")
+            raise InputError(seen, "an archive without a password", "unpack it and name the file")
         _check_size(path, held[0].file_size, 0, folder)
         out = folder / Path(held[0].filename.replace("\\", "/")).name
         with archive.open(held[0]) as source:
@@ -277,7 +277,7 @@ def _check_size(path: Path, size: int, written: int, folder: Path) -> None:
     room = shutil.disk_usage(folder).free + written
     if size > UNPACKED_BYTES and size > DISK_SHARE * room:
         remedy = "unpack it elsewhere and name the result"
-        raise InputError(f"{path}: no room to unpack it", "free disk", remedy)
+        raise InputError(f"{path}: no room to unpack it", "free space on the disk", remedy)
 
 
 def sheets_as_text(path: Path, folder: Path) -> list[Path]:

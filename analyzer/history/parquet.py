@@ -41,13 +41,13 @@ ROWS_A_BYTE = 20.0
 """Files of more are not read [rows/byte]: if any value changes there are 3 at most, in any encoding; a file
 of nothing but constants may have 90."""
 PROBED_BYTES = 4000000
-"""Size below which a Parquet file is read through when it is opened [bytes]: it takes 50 ms, and of larger
-files the limits of a run's workers hold."""
+"""Size below which a Parquet file is read completely when it is opened [bytes]; this takes 50 ms. For
+larger files the limits of a run's workers apply."""
 PROBE_S = 10.0  # Time that this may take by the clock [s]
 LONGEST_TEXT = 1000.0
-"""Mean length of the texts of a column in a row group, and MUCH_TEXT, beyond which together a Parquet file is
-not read [bytes]: names, stamps and states are short, and a few texts of megabytes unpack from nothing to
-gigabytes."""
+"""Mean length of texts in a row group of a column [bytes]. A Parquet file with longer ones is not read if
+they exceed MUCH_TEXT together. Names, stamps and states are short; a few texts of megabytes unpack from
+nothing to gigabytes."""
 MUCH_TEXT = 10000000
 """See LONGEST_TEXT [bytes]: a list of ten thousand tags, which is complete before a group of few rows, has a
 twentieth of it."""

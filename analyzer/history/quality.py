@@ -45,7 +45,7 @@ class Scheme(StrEnum):
     UA = "codes with 0 good"
     CONFIDENCE = "confidence in percent, good from 50"
     FLAG = "flags, 1 good and all else bad"
-    ONE_GOOD = "codes with 1 good, because most are; state --good-quality 0 if it is that"
+    ONE_GOOD = "codes with 1 good, because most samples have 1; state --good-quality 0 if 0 is good"
     BAD_FLAG = "flags of what is bad: 0, false and blank good"
     PCS7 = "PCS 7 codes, 128 and above good"
     IGNITION = "Ignition codes, 192 to 255 good"

@@ -20,8 +20,8 @@ from analyzer.history.files import own_scratch
 from identification.errors import InputError
 
 NAME_LENGTH = 200
-"""Part of a name that is read [characters]: no tag has more, and patterns take the square of a name's
-length."""
+"""Characters of a name that are read. No tag has more, and the time of a pattern grows with the square of
+the length."""
 
 HEAD_ROWS = 1000
 """Rows from which a table's format is detected."""

@@ -20,9 +20,9 @@ AVERAGING = "level"
 """Loop type that is slow on purpose: a level buffers flow."""
 PARTS, PART_TI = 8, 20.0
 """Largest number of parts of a record for the correlation time, and the least length of one in integral times. While
-set point or load are on a ramp, any PI loop has a constant error. Of 24 healthy loops of benchmarks/world (seeds 665
-to 667) eight are sluggish by the whole of a day with three ramps of the load, one by the parts; of 24 sluggish ones
-18 and 12, of a day without ramps 11 and 10."""
+set point or load are on a ramp, any PI loop has a constant error. In benchmarks/world (seeds 665 to 667)
+eight of 24 loops without a fault are called sluggish by a day with three ramps of the load. By its parts
+one is. Of 24 sluggish loops 18 and 12 are called so; on a day without ramps 11 and 10."""
 
 
 def _percent(part: np.ndarray, whole: np.ndarray) -> float | None:

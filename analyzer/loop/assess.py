@@ -206,8 +206,9 @@ def _known_without_op(figures: Assessments, op: bool) -> Assessments:
 def hidden(
     record: LoopRecord, found: Oscillations, controller: Pid | None, config: Config
 ) -> Requirement | None:
-    """Requirement if the loop's cycles are too fast for the sampling, so that oscillations seen or not seen are no
-    evidence; None if not. A stated integral time counts only if the record shows no other."""
+    """Required sampling if the loop may cycle too fast for the record; None if not. In such a record
+    neither an oscillation nor its absence is evidence. A stated integral time is used only if the record
+    shows no other."""
     samples = config.oscillation.samples
     if controller is not None and config.advice.cycle_per_ti * controller.ti_s < samples * record.dt_s:
         scale_s = time_scale(record, counting(found), controller)
@@ -265,9 +266,9 @@ def _judge_stretch(prepared: Prepared, stretch: Stretch, config: Config, kind: s
 
 
 def _acting(seen: Shown, stated: Pid | None) -> Pid | None:
-    """The controller that acts on a record: the recorded one where it differs from the stated one, else the stated
-    one completed. Where none is stated a recorded one with integral action: a copy of PV follows a proportional law
-    too."""
+    """The controller that acts on a record: the recorded one if it differs from the stated one, otherwise
+    the stated one, completed. If none is stated, the recorded one must have integral action, because a
+    copy of PV also follows a proportional law."""
     if stated is None and seen.beside is not None and not seen.beside.ki:
         return None
     return seen.other or seen.beside or stated
@@ -299,7 +300,8 @@ def assess(
 ) -> Assessment:
     """Assess one loop. Raises LacksError, a NotAssessedError, if the record is not sufficient.
 
-    Figures, hours, waves and trend are of the whole record; oscillations and verdict of the stretch that is judged.
+    Figures, hours, waves and trend are of the whole record; oscillations and verdict are of the judged
+    stretch.
     The controller has the stated settings [%, s], those in force at the record's end; kind is the loop's type (flow,
     level, ...), empty if not stated; earlier, settings in force earlier in the record, oldest first.
     """

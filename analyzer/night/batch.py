@@ -39,8 +39,8 @@ from analyzer.store.table import OF_A_NIGHT, DamagedError
 from identification.errors import InputError
 
 CHUNKS, FEWEST, MOST = 16, 4, 32
-"""Tasks of a small run, and loops per task: enough that a task's four small tables are worth it, few enough for a
-smooth progress bar and a simultaneous end of the workers."""
+"""Number of tasks of a small run; fewest and most loops per task. Fewer loops would not justify the four
+small tables of a task. With more the progress bar would jump, and workers would end at different times."""
 PACKAGES = ("identification", "tuning", "analyzer", "reports")
 Identity = Mapping[str, Any]
 """A run as stored with its pieces: fingerprint, and texts for people (export, loops, begun)."""
@@ -250,7 +250,8 @@ def _require_one_clock(store: Store, zone: str, replaced: Sequence[str]) -> None
         kept = store.stated_zone(stay[-1:])
     if kept is not None and kept != zone:
         seen = f"--timezone {zone}: the nights of {store.path} are of {kept}"
-        raise InputError(seen, "one clock in one store", f"state --timezone {kept}, or give another --store")
+        remedy = f"state --timezone {kept}, or give another --store"
+        raise InputError(seen, "one time zone in one store", remedy)
 
 
 def _require_kept(store: Store, night: str, key: str) -> None:

@@ -46,7 +46,7 @@ def _fit_for(lacking: Requirement | None, spec: LoopSpec, prepared: Prepared, co
         unseen = unseen if recorded is None else hidden(prepared.record, found, recorded, config)
         stated = recorded or stated
     if unseen is not None:
-        return f"fit only for its figures: {unseen}"
+        return f"fit only for the figures of the assessment: {unseen}"
     unfit = unfit_for_cause(prepared, None, config)
     if unfit is not None:
         return f"fit for oscillation and assessments; not for the cause: {unfit}"

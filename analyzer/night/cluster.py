@@ -23,7 +23,7 @@ QUIET_S = 60.0
 ANSWER_S = 10.0  # Time in which a scheduler answers [s]
 GIVEN_UP_S = 900.0
 """Time without workers, or without an answer of the scheduler, after which a run ends [s]: as long as
-machines take to come up."""
+machines need to start."""
 
 GO_ON = (
     "finished work is kept in the store: start the scheduler and workers, then the same command with --resume"
@@ -46,7 +46,7 @@ class Cluster(Executor[T, R]):
         try:
             from distributed import Client
         except ImportError as error:
-            seen = f"--scheduler {self._address}: no Dask here"
+            seen = f"--scheduler {self._address}: Dask is not installed"
             raise InputError(seen, "the extra 'cluster'", "pip install 'loop-triage[cluster]'") from error
         try:
             asked = {"timeout": ANSWER_S, "set_as_default": False}
@@ -117,7 +117,7 @@ class Cluster(Executor[T, R]):
             yield
         except (CancelledError, CommClosedError) as error:
             seen, expected = (
-                f"--scheduler {self._address}: lost in mid-run",
+                f"--scheduler {self._address}: connection lost during the run",
                 "a scheduler that runs until the run ends",
             )
             raise InputError(seen, expected, GO_ON) from error

@@ -50,7 +50,7 @@ def opened(asked: Asked) -> Plant:
         specs, notes = match(stated, source.tags)
         own = unknown_columns(stated)
         if own:
-            kept = f"{asked.loops}: columns {', '.join(own)} have no meaning here and are kept as the plant's own"
+            kept = f"{asked.loops}: columns {', '.join(own)} are not used and are kept as the plant's own"
             notes = (kept, *notes)
     specs, currents = in_milliamperes(source, specs)
     notes = (*notes, *currents, *_of_no_loop(asked.changes, specs))

@@ -1,6 +1,7 @@
 """Compile all kernels once, so that the first night is as fast as the second: python -m analyzer.night.warm_up
 
-Kernels are stored beside the code, or in numba's cache directory if that is not writable; an installation for many
+Kernels are stored next to the code,
+or in numba's cache directory if that is not writable; an installation for many
 users runs this as its last step.
 """
 

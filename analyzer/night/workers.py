@@ -44,7 +44,8 @@ NEW_S = 43_200.0
 """Age up to which a server's folder is kept [s], because its process may be alive and remove it itself: longer than a
 night's run, shorter than a day."""
 SERVER_GONE = 255
-"""Exit status of workers whose server ended, which alone knows theirs (multiprocessing.popen_forkserver)."""
+"""Exit status reported for workers whose server ended; only the server knows their own
+(multiprocessing.popen_forkserver)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -59,7 +59,7 @@ def outcome(found: LoopComparison) -> str:
     if found.reference is not None and found.reference.of:
         text += f"; the change of {found.reference.loops} unchanged loops of its area is subtracted"
     if found.source_loop:
-        text += f"; the cause lies in the neighbour {found.source_loop}, whose oscillation it follows"
+        text += f"; it follows the oscillation of the neighbour {found.source_loop}, which is the cause"
     return text
 
 
@@ -123,7 +123,7 @@ def _outcome_tiles(cases: Sequence[ChangeCase]) -> parts.Tiles:
     counts = Counter(known[grade(c.found)]["tile"] for c in cases)
     tones = {o["tile"]: o["tone"] for o in known.values()}
     shown = ((str(counts[tile]), tile, tone) for tile, tone in tones.items() if counts[tile])
-    return parts.Tiles(((str(len(cases)), "changes looked at", ""), *shown))
+    return parts.Tiles(((str(len(cases)), "changes compared", ""), *shown))
 
 
 def _row(change: Change, found: LoopComparison, first: bool) -> tuple[words.NightDecision, ...]:
@@ -298,7 +298,7 @@ def _average(cases: Sequence[ChangeCase], measure: Measure) -> parts.IntervalBar
 def average_chart(cases: Sequence[ChangeCase]) -> parts.IntervalChart:
     """Average change of loops that can be compared (the study's Figure 13)."""
     bars = tuple(_average(cases, m) for m in PRIMARY)
-    caption = "Mean over the loops that can be compared; loops that were not better count as they are."
+    caption = "Mean over all comparable loops, including those that did not improve."
     return parts.IntervalChart("average-change", "Average change", "% of before", bars, caption)
 
 
@@ -325,4 +325,4 @@ def changes_page(
         parts.Section("Other figures", (figures(cases, False, "other-figures"),), closed=True),
         parts.Section("How the figures are made", (method,), closed=True),
     )
-    return parts.Page("before-after", "What the changes brought", subtitle, sections, zone=zone)
+    return parts.Page("before-after", "Effects of the changes", subtitle, sections, zone=zone)

@@ -63,7 +63,7 @@ def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
         offers = "; ".join(
             _offers(c, [f"{n}: {_priced(c, n)}" for n in OFFERED if n in c.shown], "a repaired valve", unit)
         )
-        said = "No settings are recommended: none is better at no cost on all possible loops."
+        said = "No settings are recommended: on all loops that the data allow, none is better without a cost."
         return f"{said} {f'To choose between: {offers}.' if offers else ''}"
     scale, ratio = c.pv_span / 100.0, _times(new, now)
     travel, error = (
@@ -77,7 +77,7 @@ def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
     if ratio is None:
         return f"{text}."
     so = "; the cost is that" if ratio > WORSE else ", and"
-    return f"{text}{so} the integrated error after a lasting load is {number(ratio)} times as large."
+    return f"{text}{so} the integral of the error after a load step is {number(ratio)} times as large."
 
 
 def choices(c: Comparison, spec: LoopSpec) -> list[str]:
@@ -119,7 +119,8 @@ def _priced(c: Comparison, name: str) -> str:
     """Gains and losses of settings, on the worst of all loops consistent with the data, and on a load step."""
     found = c.everywhere[name]
     travel, error = map(_against_now_pct, (found.worst_travel, found.worst_error))
-    return f"stem travel {travel}, error {error} at worst, a load step peaks {number(c.peaks[name])} times as high"
+    peak = f"peak after a load step {number(c.peaks[name])} times the present one"
+    return f"stem travel {travel}, error {error} at worst, {peak}"
 
 
 def _against_now_pct(ratio: float) -> str:
@@ -174,7 +175,7 @@ def panels(c: Comparison, unit: str) -> parts.Panels:
         words = f"stem travel {number(t.stem_travel)} %/h, error {number(scale * t.error)} {unit}"
         name, axis = f"tried-{slug(t.name)}", f"SP − PV [{unit}]"
         plots.append(parts.Plot(name, t.name, "minutes", axis, (line,), (), words, reach=(-most, most)))
-    return parts.Panels("tried", "The error under each of them, on the same load", tuple(plots))
+    return parts.Panels("tried", "Error with each of the settings, on the same load", tuple(plots))
 
 
 def travel_field(
@@ -184,7 +185,7 @@ def travel_field(
 
     moves, rest : what travels, and the text for settings at rest.
     """
-    swings = f"limit cycle, the darker the more {moves} travels"
+    swings = f"limit cycle (darker: {moves} travels more)"
     keys = (("swings", swings), ("calm", f"no limit cycle{rest}"), ("unstable", "unstable"))
     cells = np.abs(found.kp), found.ti_s, 3600.0 * found.travel, found.rests, found.unstable
     return parts.Field("travel-map", title, "Kp [%/%]", "Ti [s]", *cells, tuple(places), keys)

@@ -165,7 +165,7 @@ def group_page(g: GroupView, trends: Mapping[str, Thinned], night: ShownNight) -
     facts = [("Period", duration(g.period_s)), ("Loops", str(len(g.rows)))]
     if g.source is not None:
         facts += [("Fix first", g.source["loop"]), ("Action there", action_there(g))]
-    facts.append(("Others gain", f"{number(g.gain_pct)} % of span"))
+    facts.append(("Error in others", f"{number(g.gain_pct)} % of span"))
     facts.append(("It starts elsewhere", f"{g.unseen_pct:.0f} %"))
     sections = parts.there(
         parts.Section("What and where", (words.lead(sentence(g)), parts.Facts(tuple(facts)), graph(g))),

@@ -33,7 +33,7 @@ MOST_SURE_PCT = 99.0  # Largest confidence shown [%]: nothing is certain
 
 WEEK = 7
 LEVELS = frozenset({"sp_mean_pct", "pv_mean_pct"})
-"""Figures that are positions, not sizes: in their own unit zero is different."""
+"""Figures that are positions, not sizes: 0 % is not zero in the loop's own unit."""
 CYCLES = {
     "recorded": "",
     "predicted by the model": "predicted_",
@@ -105,7 +105,7 @@ def _links(
         yield "Its group", f"group-{row['group']}.html"
     if row["source_loop"]:
         pair = ",".join(quote(name, safe="") for name in (row["source_loop"], row["loop"]))
-        yield f"Beside {row['source_loop']}", f"{BESIDE}.html#{pair}"
+        yield f"Compare with {row['source_loop']}", f"{BESIDE}.html#{pair}"
 
 
 def _first_section(row: Row, thin: Thinned | None) -> parts.Section:
@@ -206,7 +206,8 @@ def _picture_section(thin: Thinned | None, row: Row) -> parts.Section | None:
         return None
     last = thin.between(row["start_s"] or 0.0, float("inf"))
     rhythm = loop_pictures.rhythm_plots(last, row["period_s"])
-    return parts.Section("PV over OP, and its rhythm", (loop_pictures.pv_over_op(last, row), *rhythm))
+    title = "PV over OP, autocorrelation and spectrum"
+    return parts.Section(title, (loop_pictures.pv_over_op(last, row), *rhythm))
 
 
 def _moves(row: Row) -> parts.Section | None:

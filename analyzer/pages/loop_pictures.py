@@ -15,8 +15,8 @@ from reports.pages import Band, Floats, Line, Mark, Panels, Plot, Sparkline, Tex
 SPARK_BUCKETS = 100
 """Buckets of a sparkline: a pixel and a fifth each."""
 CAPTION = (
-    "Least and greatest of each bucket of {step}. Drag, or the wheel with Ctrl, zooms; shift-drag or arrows move; "
-    "two fingers do both; double click shows all."
+    "Minimum and maximum of each interval of {step}. Zoom: drag, or the mouse wheel with Ctrl. "
+    "Move: drag with Shift, or the arrow keys. Two fingers zoom and move. All: double click."
 )
 LEAST_PCT = 2.0
 """Minimum height of an axis [% of span]; ours: a smaller one would show noise like an oscillation."""

@@ -47,7 +47,7 @@ CAUSE_STYLES: Mapping[str, str] = {
 SHOWN = keys("list")
 """Columns for people, in order; new settings are in the cells of the old ones."""
 WITH_UNITS = frozenset({"period_s", "kp", "ti"})
-"""Numbers shown with their units, and so as texts."""
+"""Numbers that are shown as texts, with their units."""
 LEAST_REASON = 44
 """Minimum characters of a line of the reason."""
 

@@ -163,10 +163,10 @@ def work_page(store: Store, night: ShownNight) -> Page:
         return work.state in FINISHED, work.due or "9999", -work.since_s, row["loop"]
 
     rows = sorted((r for r in night.rows if r["loop"] in works), key=urgency)
-    note = f"Since: nights after the day of the note, next to the {BEFORE_WORK} before it."
+    note = f"Since: nights after the day of the note, compared with the {BEFORE_WORK} nights before it."
     empty = Text(('Nothing is noted: triage note STORE LOOP "..." --state open --due DATE.',))
     sections = there(
-        section(f"Won since {night.name[:7]}-01", won(night, works, parted)),
+        section(f"Improvement since {night.name[:7]}-01", won(night, works, parted)),
         Section("Work", (night.table("work", rows, own, note=note) if rows else empty,)),
     )
     links = (ALL_LOOPS, ("As CSV", f"csv/{WORK}-work-list.csv"))

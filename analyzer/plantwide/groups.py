@@ -19,7 +19,7 @@ from identification.record import Floats
 from identification.signals.cross_spectrum import Whole, band, chance_coherence, coherences, drift, tapered
 
 HINTS = 4
-"""Loops with a hint of an oscillation from which it counts although none shows it alone:
+"""Number of loops with a hint of an oscillation from which it counts if no loop shows it alone:
 proofs/plant_wide.py."""
 HEARD = 6  # Clearest loops of a group that a further loop has to predict [loops]
 ASKED = 12  # Loops of a group that are tested for the loops they move with, the most coherent first

@@ -32,13 +32,14 @@ from analyzer.plantwide.source import Candidate, Lags, candidates_of
 from analyzer.plantwide.wave import Wave
 
 LAG_KNOWN = 0.5
-"""Standard deviation of a lag over the lag up to which it is reported: two deviations from nothing."""
+"""Largest ratio of a lag's standard deviation to the lag for a report: the lag is then two deviations from
+zero."""
 MOST_IN_TREE = 40
 """Loops of a group up to which the path from loop to loop is reported [loops]: in larger groups all are
 linked to the source."""
 BY_WAY = 0.02
-"""Coherence surplus of a loop with another follower over that with the source, for a path by that follower:
-less is chance."""
+"""Least excess of a loop's coherence with another follower over that with the source, for a path through
+that follower; less is chance."""
 
 READ = ("usable_h", "evidence", "average_absolute_error_pct")
 """Columns of a loop that are read here, in addition to attributes of a Finding."""

@@ -90,7 +90,7 @@ def _in_steps(total: Floats, kept: Floats) -> Small:
 
 
 def links_of(moves: Sequence[Moves], limits: PlantLimits) -> dict[str, Link]:
-    """The loop to which each one is linked, if one stands out.
+    """The loop to which each one is linked, if one agrees clearly best.
 
     Outputs are compared first: the PV of a master's process, or of another slave, moves with the set point as well.
     """

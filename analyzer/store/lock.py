@@ -36,7 +36,7 @@ SETTLE_S = 2.0
 """Time after which a lock taken over from a dead run is tested again [s]: another run may take it over at the
 same moment."""
 ALIVE_S = 60.0  # How often a holder of shared storage renews its lock [s]
-DEAD_S = 600.0  # Age from which its signature is a dead run's [s]: ten that failed to come
+DEAD_S = 600.0  # Age from which its signature is that of a dead run [s]: ten renewals are missing
 LEFT_OVER_S = 86400.0  # Age from which unfinished files count as remains of a process that died [s]
 
 LOCK, OWNER = "run.lock", "run.owner.json"

@@ -59,7 +59,8 @@ def user() -> str:
 
 
 def add(store: Path, note: Note) -> None:
-    """Append a note to a store, on its own line whatever precedes it. Raises OSError if it could not be written
+    """Append a note to a store, on its own line also after an incomplete one.
+    Raises OSError if it could not be written
     completely, on a full disk for example."""
     line = (json.dumps(asdict(note), ensure_ascii=False) + "\n").encode("utf-8")
     if is_remote(store):  # an object cannot be appended to

@@ -115,7 +115,7 @@ def belief_reason(now: Belief, row: Row) -> str:
     sure = f"confirmed by {nights} nights" if worn else None
     over = f"{nights} nights: {width_text(now)}, confirmed since {now.valve.certain}" if worn else None
     differs = not (t.own or t.calmed) and row["cause"] != t.cause
-    alone = f"this night alone: {sentences('alone')[row['cause']]}" if differs else None
+    alone = f"cause by this night alone: {sentences('alone')[row['cause']]}" if differs else None
     text = _calmed(now) if t.calmed else row["reason"] if t.own else _together(now, row)
     first, *others = (text or "").split("; ")
     return joined(first, sure, *others, over, alone)
@@ -150,9 +150,9 @@ def _together(now: Belief, row: Row) -> str:
         return f"{cycle}: follows {t.source} in most of {nights}; fix that loop first"
     beside = "; the valve is also worn" if t.fault in IS else ""
     said = {
-        Cause.VALVE: f": caused by the valve, by {nights}" if cycles else "",
-        Cause.TUNING: f": tuned too tight, by {nights}",
-        Cause.LOAD: f": external disturbance, by {nights}{beside}",
+        Cause.VALVE: f": caused by the valve (from {nights})" if cycles else "",
+        Cause.TUNING: f": tuned too tight (from {nights})",
+        Cause.LOAD: f": external disturbance (from {nights}){beside}",
         Cause.UNDECIDED: f"; cause undecided: {nights} do not agree",
     }
     return cycle + said.get(t.cause, "")
@@ -191,7 +191,7 @@ def _swing_news(before: Belief, now: Belief, row: Row) -> tuple[str, str] | None
         return (what if cycles else "stopped oscillating") + after, "better"
     if now.cycle.shift > 0.0:
         more, tone = ("more", "worse") if now.cycle.shift > 1.0 else ("less", "better")
-        return f"oscillates {more} than it used to: {_sizes(now.last)}", tone
+        return f"oscillates {more} than before: {_sizes(now.last)}", tone
     return None
 
 

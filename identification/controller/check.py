@@ -132,7 +132,7 @@ def ruled(x: Trends, e: Floats, said: StatedSettings, found: ControlLaw) -> Find
 
 
 def logic(x: Trends, e: Floats, said: StatedSettings) -> Finding | None:
-    """Stretches in which OP is constant although the law requires moves, whatever the error."""
+    """Stretches in which OP is constant although the law requires moves, for any error."""
     path, limits = np.cumsum(due_moves(e, said.kp, said.ti)), x.limits
     least = limits.stuck_move * max(op_step(x.op), 0.02)
     where = np.zeros(x.op.size, dtype=bool)
@@ -180,8 +180,9 @@ def settings(found: ControlLaw, said: StatedSettings, limits: ControllerLimits) 
 def judge(x: Trends, said: StatedSettings) -> tuple[Finding | None, ControlLaw | None]:
     """The first finding about clock or controller, and the identified law.
 
-    said : confirmed settings are not reported; on a thinned recording only clearly wrong ones are, because the law is
-    not visible in detail; nothing at all where its integral acts between the samples.
+    said : the stated settings. Confirmed ones are not reported. On a thinned recording only clearly wrong
+    ones are, because the law is not visible in detail. If the integral acts between the samples, nothing is
+    reported.
     """
     limits, thinned = x.limits, said.thinned(x.limits)
     if thinned and said.ti < limits.thinned_ti:

@@ -45,8 +45,8 @@ T_NINETY = 1.895
 DIGITS = 0.005
 """Least half-width of an interval's log: settings are entered with three digits."""
 UNSEEN = 1.0
-"""Log error of a setting over the root of the share that the law does not explain, within which nine of ten are;
-ours, on seeds 41 and 42 of proofs/controllers.py."""
+"""Ratio of the log error of a setting to the root of the unexplained share: nine of ten are smaller. Ours,
+on seeds 41 and 42 of proofs/controllers.py."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +73,8 @@ class FreeLaw:
 def free_law(record: LoopRecord, scale_s: float) -> FreeLaw | None:
     """The law that OP follows; None where OP follows none.
 
-    record : SP, PV and OP [% of span]. scale_s : time scale on which the loop moves [s]. A law that explains little
-    is returned too: the caller asks for its share.
+    record : SP, PV and OP [% of span]. scale_s : time scale on which the loop moves [s]. A law that explains
+    little is returned too: the caller checks its share.
     """
     first = fit_pi(record, scale_s)
     if first is None or first.kp == 0.0:
@@ -110,7 +110,7 @@ def _law(x: Look, seen: Seen, along: Floats, pid: Pid) -> FreeLaw:
 
 
 def _clearest(x: Look, start: Pid) -> Seen | None:
-    """The variant, simplest first, that none reproduces OP clearly better than."""
+    """The simplest variant of the law; no other one reproduces OP clearly better."""
     best: Seen | None = None
     for seen in _variants(x, start):
         lawful = seen.is_law(gains_of(start))

@@ -151,8 +151,8 @@ def best_of(record: LoopRecord, period_s: float, laws: Sequence[Pid]) -> Pid:
 
 
 def _settled(best: Seen, given: Seen, gains: Floats) -> bool:
-    """Whether another law reproduces OP fully and the stated one is far off, so that more variants are useless; asked
-    only after a longer filter of PV is no better for the stated one."""
+    """Whether another law reproduces OP fully and the stated one is far off, so that more variants are
+    useless. It is tested only if a longer filter of PV does not improve the stated one."""
     left = best.left_over_all(best.free)
     return left < SMALL and given.left_over_all(gains) > max(10.0 * left, GIVES)
 

@@ -37,7 +37,7 @@ REACH = 4
 ENOUGH = 1.25
 """Largest ratio of the residual of a stated law to that of the freest law, if that reproduces OP, to be in
 force without a further test."""
-GIVES = 0.1  # What the freest law leaves at some length where it gives OP
+GIVES = 0.1  # Largest residual of the freest law, at its best length, if it reproduces OP
 PV_FILTERS = (0.0, 1.0, 2.0, 3.0, 5.0, 8.0, 13.0, 21.0)
 """Filters of PV before the controller that are tried [samples]: none is far from one of them."""
 SLOPE_FILTERS = (0.0, 2.0, 8.0)  # Filters of the slope that are tried [samples]
@@ -51,8 +51,9 @@ FILTER_PARTS = (4.0, 6.0, 8.0, 10.0, 16.0)
 """N of the derivative filters tried with a derivative time Td, with time constants Td/N: systems have 4 to
 20."""
 PLAINLY_BETTER = 0.7
-"""Log reduction of OP's residual from which another form of the law is reported instead of the stated one: of
-18 laws stated truly the wrong form left 0.8 to 6.0 more, none less (proofs/controllers.py)."""
+"""Log reduction of OP's residual from which another form of the law is reported instead of the stated one.
+For 18 correctly stated laws the log residual of the wrong form was higher by 0.8 to 6.0
+(proofs/controllers.py)."""
 LONGER = 4  # Times that a length of increments is longer than the one before
 LEAST_REACH = 256
 """Least value of the longest increments, independently of the stated integral time [samples]: what is stated
@@ -65,10 +66,11 @@ RATE_STEPS = 20.0
 """OP's fastest move over its smallest, from which it may be a limit of its rate: an OP that moves by few of
 its steps has a fastest move that is not rare."""
 NEAR_RATE = 0.9  # Share of OP's fastest move from which further moves are examined
-GAPS = (0.1, 0.25, 0.5, 1.0, 1.5, 2.2, 3.3, 5.0, 8.0)  # Gaps begun with [medians of the error]
+GAPS = (0.1, 0.25, 0.5, 1.0, 1.5, 2.2, 3.3, 5.0, 8.0)  # Initial gaps of the search [medians of the error]
 GAPS_APART = 2.0
-"""How far about the best of these gaps a better one is looked for, as a factor: beyond the next of them."""
-GAP_WITHIN = 0.05  # To what share of itself a gap is found
+"""Factor about the best of these gaps within which a better one is searched for; it reaches beyond the
+next of them."""
+GAP_WITHIN = 0.05  # Relative precision of a gap
 GAP_GAINS = (0.0, 0.3)  # Gains inside a gap that are tried, over the gain outside: none, and a reduced one
 
 ON_ERROR = ((1.0, 1.0), (1.0, 0.0), (0.0, 0.0))
@@ -356,8 +358,8 @@ def _set_point_weight(x: Look, seen: Seen, gains: Floats) -> float:
 
 
 def _clearer(x: Look, seen: Seen, way: Way, stated: Pid) -> Way:
-    """Its properties, or those with the filter of PV with which the stated gains reproduce OP clearly better than in
-    the variant seen: where little of OP is noise, gains agree with the record whatever filters it."""
+    """The properties of the variant seen, or those with a filter of PV with which the stated gains
+    reproduce OP clearly better. If little of OP is noise, gains agree with the record under any filter."""
     own = seen.poorness(gains_of(stated))
     if stated.td_s or stated.pv_filter_s or own < np.log(SMALL) + PLAINLY_BETTER:
         return way

@@ -21,11 +21,12 @@ SHIFTS = (-2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11
 FILTERS = (0.5, 1.0, 2.0, 4.0, 8.0)
 """Time constants of a filter between PV and the controller that are tried [samples]."""
 GUESSES = (10.0, 40.0, 160.0, 640.0)
-"""Integral times begun with where none is stated [samples]: each finds any within four of itself."""
+"""Integral times from which the search starts if none is stated [samples]; each one finds those within a
+factor of four."""
 LATE_STEP = 0.25  # Part of a sample to which lateness is estimated [samples]
 OWN = (1, 2, 3)  # Moves of OP's own past that predict its next one [samples]
 SEEN = (1, 2, 4, 8)
-"""Samples back from which PV's way to now is looked at [samples]: as far as a proportional action reaches."""
+"""Delays over which the change of PV up to now is used [samples]: as long as a proportional action lasts."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,9 +21,9 @@ LONGEST_INTEGRAL = 10.0
 tenth of what the gain gives."""
 INCREMENTS = 50  # Increments from which a length of them counts
 LEVEL_OF = 16
-"""Lengths of an increment over which the integral's drift is taken as an error of SP's or PV's record that
-stays: an error of SP's record that stays for hours is no other law (test_rounded_setpoint.py); increments are
-far shorter."""
+"""Lengths of an increment over which a drift of the integral is attributed to a constant error in the
+record of SP or PV. A constant error of SP over hours is not a different law (test_rounded_setpoint.py);
+increments are far shorter."""
 CLAMPED = 4  # Ratio of OP's time at a clamp to that at the next value: a sine does so 2.4 times
 END_SAMPLES = 5
 """Samples at the next value that are added [samples]: those of an OP without steps are one each."""

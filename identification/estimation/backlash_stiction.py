@@ -40,10 +40,10 @@ SCREENED = 3.0
 """Gain in log likelihood from which the screening of backlash is followed by its whole search [nat]: a third
 of what a verdict needs."""
 SMALL = (0.06, 0.12, 0.2, 0.3)
-"""Small stickbands tried first [of OP's range]: at the period a small backlash with a long dead time responds
-like a large one with a short one, and the scan ranks the first before; with only the best of all followed, 3
-of 20 oscillating loops lost 10 nat and more, and two backlashes all their evidence; with the best of each
-part 3 of 209 lose as much."""
+"""Small stickbands tried first [of OP's range]. At the period a small backlash with a long dead time
+responds like a large one with a short dead time. The scan ranks the small one first. If only the best of
+all is followed, 3 of 20 oscillating loops lose 10 nat or more, and two backlashes lose all evidence. With
+the best of each part 3 of 209 lose as much."""
 MIDDLE = (0.42, 0.55)  # The same between small and large [of OP's range]: as SMALL
 LARGE = (0.7, 0.85, 1.0)
 """The same of large ones: a valve much wider than OP's range would not move at all [of OP's range]: as
@@ -84,7 +84,8 @@ NEAR_DEAD = (-1.6, -1.2, -0.8, -0.4, 0.0, 0.4, 0.8, 1.2, 1.6)
 """The same for dead times, next to the one found [blocks]: as NEAR_WIDTHS."""
 REFINED_MOST = 3  # Largest number of repetitions: for time
 REFINED_WORTH = 5.0
-"""Gain of one time from which it is repeated [nat]: as a slip jump has to bring (cause.evidence_jump)."""
+"""Gain of one repetition from which another follows [nat]: the evidence required for a slip jump
+(cause.evidence_jump)."""
 
 
 def fit_linear(window: Problem, period_s: float) -> Fitted:

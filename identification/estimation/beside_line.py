@@ -87,7 +87,7 @@ def with_width(near: SmoothFit, window: Problem, period_s: float) -> SmoothFit:
 
 
 def in_window(found: BesideLine, window: Problem, period_s: float) -> SmoothFit:
-    """The joint model behind a faulty valve fitted anew in another window, with its width refined."""
+    """The joint model behind a faulty valve, fitted again in another window, with its width refined."""
     process = found.worn.process
     begins = [(process.time_constant_s, max(process.dead_time_s - window.half_block_s, 0.0))]
     return with_width(fit_line(window, period_s, (), begins, found.worn.law), window, period_s)

@@ -26,8 +26,9 @@ LEAST_JUMP = 2.0
 STRETCHES = 30
 """Stretches of a record whose scores are compared: a window of 1,800 blocks holds thirty periods."""
 INTERVALS_WIDER = 1.35
-"""Ratio of errors to those from curvature and scores: no model is the plant, and slips hidden or made by OP's
-resolution leave the likelihood rough: the 90 % quantile of their ratio is 2.25 over 58 simulated loops with
+"""Ratio of the true errors to those from curvature and scores. No model equals the plant, and OP's resolution
+hides or adds slips, so the likelihood is not smooth. The 90 % quantile of the ratio is 2.25 over 58 simulated
+loops with
 backlash (proofs/coverage.py, seed 9) and 2.1 over 170 sealed effects (proofs/concealed/intervals.py, seed
 501), where it should be 1.64; the pages of both commands list other seeds."""
 

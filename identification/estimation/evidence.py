@@ -64,10 +64,11 @@ def with_load_step(fit: Fitted, answering: Mask, noise: Floats) -> Fitted:
 def with_second_lag(fit: Fitted) -> Fitted:
     """The linear fit behind a second lag on OP, if the gain exceeds the penalty of its constant.
 
-    Backlash takes the small fast moves out of OP, as a lag does. Where OP moves much within a block, as under the set
-    point of a master, backlash explains a second lag of the process, or a dead time within a block, better than no
-    fault: of a sound valve of benchmarks/world (seed 661) by 103 nat, where a second lag explains 533 nat. Of 27 worn
-    ones (seed 662) a second lag explains 50 nat at most but for one, backlash 73 to 1,600.
+    Backlash takes the small fast moves out of OP, as a lag does. OP moves much within a block under the set
+    point of a master. Then backlash imitates a second lag of the process, or a dead time within a block. For
+    a valve without a fault (benchmarks/world, seed 661) backlash gains 103 nat and a second lag 533 nat. For
+    27 worn valves (seed 662) backlash gains 73 to 1,600 nat, and a second lag at most 50 nat with one
+    exception.
     """
     window, step_s = fit.p, fit.p.step_s
     longest_s = max(window.dt_s, fit.dead_time_s)

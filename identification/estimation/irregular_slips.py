@@ -32,10 +32,10 @@ SCREENED = 8  # Paths side by side while these are tried: for time
 CARRIED = 16  # Paths side by side later: for time
 ROUNDS = 5  # Rounds of decoding and fitting: of six followed by hand the last turns gained a few nat
 HOPELESS = 0.15
-"""Largest deficit of a path to the backlash, per judged block, after two rounds of decoding and fitting, to
-be continued [nat / block]: after two rounds the worst of 40 simulated sticking stems that were found was .04
-behind; tanks behind backlash .21 and more. After one round a sticking valve of the sample mill is .39 behind,
-and is found."""
+"""Largest deficit of a path to the backlash after two rounds of decoding and fitting, for which it is
+continued [nat / judged block]. After two rounds the worst of 40 identified simulated sticking stems had
+.04; tanks behind backlash had .21 or more. A sticking valve of the sample mill has .39 after one round,
+and is identified."""
 HOT = (8.0, 4.0, 2.0, 1.0)
 """Times the innovations' variance in the first rounds, in which the process is not known yet."""
 FEWEST = 6  # Slips of a path at least: three cycles
@@ -43,7 +43,8 @@ RESTS = 0.9
 """Longest rest of a stem while the process is not known: a stem at rest explains nothing [periods]."""
 STEPS = (0.15, 0.08, 0.04)  # Relative steps of the search for the friction in the end
 DEAD_STEPS = 8.0
-"""Dead time that a step of one takes [blocks]: a stem that lets go later is like one behind a longer pipe."""
+"""Change of the dead time in a step of one [blocks]. A stem that slips later is equivalent to a longer
+dead time."""
 WORTH = 1.0  # Gain of a step from which it is taken [nat]
 MOST_MOVES = 40  # Steps that are taken at most, for time: on 9 simulated stems some five were
 

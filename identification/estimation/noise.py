@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from identification.record import Floats, Mask
 
 GENERIC = 0.95
-"""First coefficient of an uninformed noise model: nearly a difference: a noise model that was fitted with
-another valve takes that valve's side, so candidates are ranked by both."""
+"""First coefficient of the generic noise model, which is nearly a difference. A noise model fitted with
+one valve favours that valve, so candidates are ranked under both."""
 FEWEST_EDGES = 4  # Fewest edges of the groups of lags
 JUDGED = 0.5  # Share of the good samples that have to be judged
 LONGEST_LAG = 12  # Least length of a record, in its longest lag

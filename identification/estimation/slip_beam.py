@@ -20,8 +20,8 @@ FAR = 3.5
 """Standard deviations below the mean distance from which a slip is possible [deviations]: about rare."""
 RARE = 1e-4  # Probability of a slip under which no path is begun for it: 9 nat, what an outlier costs
 STUCK = 100.0
-"""Log-probability penalty for a stem at rest for longer than required [nat]: on simulated stems parking for
-good cost less than the wrong dead time did at first, and cost three of six their slips."""
+"""Log-probability penalty for a stem at rest for longer than required [nat]. Without it, a simulated stem
+that always rests cost less than a wrong dead time at first. Three of six stems then had no slips."""
 WAITING = 12
 """Largest number of a path's slips without a response of PV yet: a dead time of six cycles is no dead
 time."""

@@ -338,7 +338,8 @@ def _loads(period_s: float) -> list[Floats]:
 
 
 def with_harmonics(lined: SmoothFit, window: Problem, period_s: float) -> SmoothFit:
-    """The fit under a load with a line, found at a period [s], fitted anew under one whose line has harmonics too."""
+    """The fit under a load with a line found at a period [s], fitted again under a load whose line also
+    has harmonics."""
     count = LINE + len(HARMONICS)
     case = _case(window, lined.law, period_s, count)
     starts = [np.append(lined.theta, len(HARMONICS) * [height]) for height in (-1.0, 2.0)]

@@ -86,9 +86,8 @@ def by_hand(record: LoopRecord, manual: Mask) -> tuple[Experiment, ...]:
 
 
 def _in_span(record: LoopRecord, first: int, last: int) -> Experiment | None:
-    """The experiment of one manual span, with margins before and after its moves as long as they last; None where OP
-    or PV is constant, or where a controller moves OP whatever the mode signal: OP switches when PV crosses a level,
-    or moves to and fro at most samples."""
+    """The experiment of one manual span, with margins before and after its moves as long as they last; n
+    switches when PV crosses a level, or moves up and down at most samples."""
     op, pv = record.op[first:last], record.pv[first:last]
     moves = np.flatnonzero(np.diff(op) != 0.0) + 1
     size = float(np.ptp(op))

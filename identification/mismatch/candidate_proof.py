@@ -17,8 +17,8 @@ from identification.simulation.parameters import Slot
 HELD_OUT_LOSS = -1.0
 """Gain on the held-out part under which an effect falls [nat]: chance moves it by about a half."""
 HELD_OUT_SHARE = 0.1
-"""Share of its whole gain by which it may fall below that: two thirds of a record know a slow effect's
-constants less well."""
+"""Further loss that is allowed, as a share of the whole gain: two thirds of a record determine a slow
+effect's constants less precisely."""
 SPREAD = 0.15
 """Share of the gain that must remain when the best tenth of the record is left out (loads excepted)."""
 ONE_MOVE = 0.8

@@ -64,9 +64,9 @@ gains that travel wears half had .4."""
 OUTSIDE_SHARE = 0.3
 """Part of the named effects' gain that unnamed physics has to exceed to be reported with them."""
 OUTSIDE_NEAR = 0.75
-"""Gain of an effect with a name, over that of physics without one, from which the name is taken: of 14 sealed
-cases of such physics the best name came to .61 at most, of six vessels that overflow to .85 and more of what
-a load does that PV as recorded switches."""
+"""Least ratio of the gain of a named effect to that of unnamed physics, for the name to be reported. In 14
+sealed cases of such physics the best name has .61 at most. In six vessels that overflow it has .85 or more
+of the gain of a load that recorded PV switches."""
 PROVEN = 3  # Candidates that are put to the proof, best first, until one passes: bounds the time
 
 
@@ -161,9 +161,10 @@ def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
 def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explanation, list[Candidate]]:
     """Effects added while one passes, first a valve identified from the cycles, and the candidates of the last round.
 
-    An effect without a name, which uses recorded PV, is excluded in a loop that cycles, because delayed PV predicts
-    PV whatever causes the cycle, and in an experiment, because it is judged by simulation, and a model with recorded
-    PV as input is no simulation. Behind a faulty valve in a record without every scan no further effect is tried: OP
+    An effect without a name uses recorded PV. It is excluded in a loop that cycles, because delayed PV
+    predicts PV for any cause of the cycle. It is excluded in an experiment, which is judged by simulation,
+    because a model with recorded PV as input is no simulation.
+    Behind a faulty valve in a record without every scan no further effect is tried: OP
     moves the valve between the rows too, and what the model lacks there takes other names.
     """
     candidates = list[Candidate]()
@@ -248,7 +249,7 @@ def as_a_set(found: Explanation, tell: Progress, s: Recording) -> Explanation:
 
 
 def replacement_step(found: Explanation, tell: Progress, s: Recording) -> Explanation:
-    """Replace each effect once by whatever gains more together with the others: another effect or another variant.
+    """Replace each effect once by another effect or another variant that gains more together with the others.
 
     Effects are added one at a time, so the first may have been accepted instead of two that act together. In an
     experiment no time-bound effect replaces a lasting one, because a load course can absorb any model error.

@@ -118,8 +118,8 @@ class Explanation:
 
 
 def ends(finding: Finding | None) -> Ends:
-    """Which further tests a finding allows. After a controller finding the physics is still tested, because PV
-    responds to OP whatever moved OP."""
+    """Which further tests a finding allows. After a controller finding the physics is still tested,
+    because PV responds to OP independently of what moved it."""
     return Ends.NOTHING if finding is None else fault(finding.name).ends
 
 

@@ -24,19 +24,20 @@ ORDERS = 400
 """Permutations of the blocks that give the distribution of an independent residual: a p-value of 0.05 is
 known within 0.01, and 20,000 samples take under a second."""
 CHANCE = 0.02
-"""Chance, over all features together, of calling any on a residual that is tied to none: one page in
-fifty."""
+"""Probability that any feature is reported for a residual that depends on none: one page in fifty."""
 BLOCK_MEMORIES = 3.0
-"""Length of a block in memories of the loop: within it what the loop remembers stays in order."""
+"""Length of a block in memories of the loop (dead time plus time constant): a permutation keeps the order
+within it."""
 SHORTEST_BLOCK = 30  # Fewest samples of a block [samples]
 MOST_BLOCKS = 150  # Most blocks: more only cost memory
 FEWEST_BLOCKS = 10
-"""Blocks below which no order says anything; a record shorter than this is located by nothing."""
+"""Fewest blocks for a permutation test; the misfit of a shorter record is not located."""
 PIECES = 4
-"""Straight pieces over a level or over time: a step at any place is followed, ten columns are not spent."""
+"""Number of linear pieces over a level or over time: enough to follow a step at any place, with few
+columns."""
 PROFILE_PARTS = 12  # Parts of a feature's profile, of as many samples each
 TURN_SHARE = 0.01
-"""Least travel back, in terms of OP's range, that counts as a turn: less shows nothing about a valve."""
+"""Least OP reversal, relative to OP's range; a smaller one shows nothing about a valve."""
 OP_LEVELS = 12
 """Values that OP must take for an end of its own range to be a limit: a test signal between two is at
 none."""

@@ -64,7 +64,7 @@ HISTORY = Effect(
 RATE = Effect(
     name="gain-with-rate",
     block=Block.VALVE,
-    sentence="faster moves have more effect, a sudden one of 10 % by {hurry} of itself, for {hurry_s}",
+    sentence="fast moves have more effect: a sudden move of 10 % adds {hurry} times its size for {hurry_s}",
     check="Look for a booster, a relief port or a feed that overshoots, and compare fast and slow moves of OP.",
     acts=(Act(HURRY, 0.0, Signal.FLOW, hurried),),
     curve=flow_after_step,
@@ -89,7 +89,7 @@ RECYCLE = Effect(
         Variant(
             (
                 Param(Slot.RETURNED, "returned", "", -2.0, 2.0, title="Share that comes back"),
-                Param(Slot.RETURNS_S, "returns_s", "s", 0.5, 20.0, "T", True, title="Way back"),
+                Param(Slot.RETURNS_S, "returns_s", "s", 0.5, 20.0, "T", True, title="Return time"),
             ),
             tuple({Slot.RETURNS_S: way} for way in WAYS),
             linear=Slot.RETURNED,

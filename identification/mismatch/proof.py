@@ -46,7 +46,7 @@ SPREADS = 0.03
 deviation]: the residual there is noise."""
 FEWEST_BLOCKS = 5
 """Fewest blocks of a comparison of squared errors: with fewer its standard error is not known within a half."""
-LEAST_FIT = 1.0  # Fit on held-out data from which a model goes with PV [%]: a stem that never moves has 0
+LEAST_FIT = 1.0  # Least fit on held-out data of a model that follows PV [%]; a stem that never moves has 0
 WINDOW_TIMES = 2.0
 """Length of the windows in which a model is judged if a run over all data shows only the load, in T + L of
 the baseline model: over simulated sealed cases the right effect then removes misfit in all but one, at 5 and
@@ -346,8 +346,9 @@ def held_out(
     band: Band | None = None,
     every_scan: bool = True,
 ) -> HeldOut:
-    """Fit both models again to the first part of the record and compare them on the rest: over the whole of it and,
-    where the load dominates the difference, over windows of some time constants of the baseline model. A baseline
+    """Fit both models again to the first part of the record and compare them on the rest. They are compared
+    over all of it and, if the load dominates the difference, over windows of some time constants of the
+    baseline model. A baseline
     model compared with itself is compared over the whole only.
 
     cycle : samples of a cycle if the loop's cycles show a valve with friction, otherwise 0; the models are then also

@@ -120,7 +120,8 @@ def straightened(x: Floats, share: float, limits: RecorderLimits) -> bool:
 
 
 def least_jump(pv: Floats, limits: RecorderLimits = LIMITS.recorder) -> float:
-    """The smallest move [% PV] of a trend that is held, if it is large beside the trend's range too; otherwise 0."""
+    """The smallest move [% PV] of a trend that is held, if it is also large relative to the trend's range;
+    otherwise 0."""
     jump = held_move(pv, limits)
     low, high = np.quantile(pv, [0.05, 0.95]) if jump else (0.0, 0.0)
     return jump if jump > limits.jump_share * float(high - low) else 0.0

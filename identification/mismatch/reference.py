@@ -70,8 +70,8 @@ class LoopSignals:
     """Signals of the influence classes, for a model of constants c, shape (SIZE,): flow `through` the valve [% OP],
     the same and earlier PV [% PV] about their means, shape (n,) each, and the time constant [s].
 
-    Errors of an experiment are simulation errors and are correlated in time, so recorded PV predicts them whatever
-    their cause: there PV is the simulated one.
+    Errors of an experiment are simulation errors and are correlated in time, so recorded PV predicts them for
+    any cause. In an experiment PV is therefore the simulated one.
     """
 
     def __init__(self, p: Problem, c: Floats) -> None:

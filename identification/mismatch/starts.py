@@ -27,8 +27,8 @@ MODES_KEPT = 2  # Starts with two modes that are kept under each noise model: bo
 LINES = 4  # Lines of the spectrum at which an oscillating load is tried: bounds the time
 LINE_SIDE = 25  # Half of the lines whose median is a line's surroundings [lines]
 PV_JUMPS = 2.0
-"""Times that jumps of PV itself must explain more than load steps before they are believed: in steps that
-came through the process up to 1.2, in bursts of a sensor from 4 on."""
+"""Least ratio of what jumps of PV itself explain to what load steps explain, for jumps to be accepted. It
+is at most 1.2 for steps through the process and at least 4 for bursts of a sensor."""
 STEP_NEAR = 3  # How far from a step's place its onset is looked for [samples]
 JUMP_LATE = 20  # How much later than a step's place the onset of a jump of PV is looked for [samples]
 GAP_SAMPLES = 5  # Missing samples from which OP may have moved unseen [samples]: an outlier is one or two

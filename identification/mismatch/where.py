@@ -19,8 +19,8 @@ from identification.record import Floats
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
 
-LEAST_MEMORY = 2  # What a loop is taken to remember at least [samples]
-SPAN_PARTS = 40  # Parts of the record that spans are made of
+LEAST_MEMORY = 2  # Least memory assumed for a loop [samples]
+SPAN_PARTS = 40  # Number of parts of the record from which spans are formed
 CARRIED = 0.5  # Share of the gain that the named spans carry together
 ONE_WAY = 3.0
 """Ratio of the residual in one direction of OP to that in the other, from which that direction is

@@ -91,7 +91,7 @@ def reason(said: Answer) -> str:
         return f"{said.note or outside or TOLD['no_name']} {located_sentence(said.where)}".strip()
     first = _filled(said.effects[0]) if said.effects else TOLD["nothing_left"]
     others = f"Then also: {', '.join(e.name for e in said.effects[1:])}." if len(said.effects) > 1 else ""
-    caution = f"The figures are rough: it {said.caution}." if said.caution else ""
+    caution = f"The figures are rough: the recording {said.caution}." if said.caution else ""
     return " ".join(filter(None, (first, others, caution, said.shown)))
 
 
@@ -121,9 +121,9 @@ def place(feature: Mapping[str, Any]) -> str:
 def located_sentence(where: Mapping[str, Any]) -> str:
     """Location of the misfit in one sentence; empty if unknown."""
     features = where.get("features", [])
-    carrying = [place(f) if is_along(f) else f"located at {place(f)}" for f in features if f["carries"]]
+    carrying = [place(f) if is_along(f) else f"is located at {place(f)}" for f in features if f["carries"]]
     if carrying:
-        return f"Residual {'; '.join(carrying[:3])}."
+        return f"The residual {'; '.join(carrying[:3])}."
     return TOLD["tied_to_nothing"] if features else ""
 
 

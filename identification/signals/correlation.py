@@ -14,10 +14,11 @@ LEVEL = 1.5
 """Size to which every half-cycle is clipped, in medians of the band's absolute value: a sine is not clipped
 (its peak is 1.41 medians), only what exceeds the loop's usual half-cycles."""
 SMOOTHING = 0.1
-"""Share of the loop's own time over which the error is averaged before its correlation time is computed:
-noise is not swiftness."""
+"""Share of the loop's own time over which the error is averaged before its correlation time is computed,
+because noise would shorten it."""
 COARSEST = 0.2
-"""Interval of samples beyond which, in the loop's own time, one sample's noise looks like correlation."""
+"""Largest sample interval relative to the loop's own time; above it the noise of one sample looks like
+correlation."""
 HARRIS_LAGS = 15  # Lags of the predictor of minimum variance
 HARRIS_STEP = 6  # Samples per dead time that the error is thinned to: so that the lags span a few dead times
 HARRIS_MOST = 4000  # Samples that the predictor uses at most, the latest [samples]

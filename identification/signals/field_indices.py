@@ -88,7 +88,8 @@ def _centred(x: Floats, period: float) -> Floats | None:
 
 
 def cross_correlation(op: Floats, pv: Floats, period: float) -> Values | None:
-    """Oddness of the cross-correlation of OP and PV: by the lags of the zero crossings beside lag 0, and by heights.
+    """Oddness of the cross-correlation of OP and PV: by the lags of the zero crossings on either side of lag
+    0, and by heights.
 
     Both are 0 for an even one (PV opposed to OP: a load, or tight tuning) and 1 for an odd one (a quarter of a cycle
     apart: a sticking valve), in loops whose process is no integrator (Horch 1999, Control Engineering Practice 7).

@@ -180,8 +180,9 @@ def first_slip(op: Floats, law: StemLaw) -> float:
 def stem_position(op: Floats, valve: Valve, start: float | None = None) -> Floats:
     """Stem position [% OP], shape (n,), behind any valve of models.py.
 
-    start : stem position before the first sample [% OP], None: op[0], the middle of the backlash. J = 0 is backlash
-    of width S, whatever the motion; a stem that rests, with S = J, is the relay of the describing function, height
+    start : stem position before the first sample [% OP], None: op[0], the middle of the backlash. J = 0 is
+    backlash of width S for any motion;
+    a stem that rests, with S = J, is the relay of the describing function, height
     and hysteresis S/2.
     """
     law = law_of(valve)

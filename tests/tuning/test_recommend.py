@@ -131,7 +131,7 @@ def test_integrating_level_is_told_what_would_end_the_cycle(proposals):
     assert len(found) >= 4
     for p in found:
         assert p.after.cycle.period_s > p.before.cycle.period_s
-        assert "P alone or a gap" in p.reason
+        assert "P control or a gap" in p.reason
 
 
 def test_study_level_loop():
@@ -282,7 +282,7 @@ def test_wide_play_is_for_the_workshop():
     assert p.action == "repair valve"
     assert p.controller is None
     assert p.meanwhile is not None
-    assert "beyond tuning" in p.reason
+    assert "cannot compensate" in p.reason
 
 
 def test_abstentions_say_why():

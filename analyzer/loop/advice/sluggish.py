@@ -4,7 +4,8 @@ its process allows, or moved by an external cycle that it could reject.
 The process is identified at a finer clock than slow settings require. A calm loop gets new settings if SIMC's for
 every process that the record allows reject loads several times faster, and reduce the error considerably in
 simulation. If not, but the likeliest process permits several times as much and every process that the record allows
-twice the present gain, that is advised as a first step: the next set point moves then tell more. Against an external
+twice the present gain, that is advised as a first step: the next set point moves then give more information.
+Against an external
 cycle those robust settings are advised that reduce the error considerably under the load of the night, on every
 process that the record allows, with the least product of error and travel.
 """

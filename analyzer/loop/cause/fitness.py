@@ -18,8 +18,9 @@ from identification.record import LoopRecord
 HELD, MOVES = 4, 20
 """Least samples of a constant PV, and least moves of OP in all of them, that show to what it responds; ours."""
 AGAINST = 0.1
-"""Share of OP's moves within a constant PV against their usual sign from which it responds to another PV; ours: 0 of
-sensors that stick by .3 to 3 %, .17 to .5 in 34 of 37 loops of benchmarks/world (seeds 621, 622) by exception."""
+"""Share of OP moves of unusual sign while PV is constant, from which OP responds to an unrecorded PV;
+ours. It is 0 for sensors that stick by .3 to 3 %. It is .17 to .5 in 34 of 37 loops recorded by exception
+in benchmarks/world (seeds 621, 622)."""
 
 
 def unfit_for_cause(

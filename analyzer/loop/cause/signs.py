@@ -1,4 +1,4 @@
-"""The signs of the cause of a cycle, beside the likelihoods of its models."""
+"""The signs of the cause of a cycle, in addition to the likelihoods of its models."""
 
 from __future__ import annotations
 

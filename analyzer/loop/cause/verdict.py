@@ -49,7 +49,7 @@ from tuning.frequency_response import loop_response
 NO_MODEL = Requirement(None, RequirementKind.MODEL)
 CAUSE_IN_MANUAL = Requirement(MissingData.MANUAL_TEST, RequirementKind.CAUSE_IN_MANUAL)
 OTHERS = 2
-"""Further periods of the error at which a periodic load is sought: ours."""
+"""Number of further periods of the error at which a periodic load is searched for; ours."""
 SIGN_TEST = 1.645
 """Excess of agreeing half-cycles, in standard errors, of one in twenty valves without a fault (normal quantile)."""
 
@@ -194,8 +194,8 @@ def judge(
     m: Measured, oscillation: Oscillation | None, limits: CauseLimits, beside: WornValve | None = None
 ) -> Verdict:
     """The cause of the cycle: that whose model is more likely than the others, and than a smooth load, by the penalty
-    of its constants. If a measure is unknown no cause is named. beside : the valve in the whole record, if that can
-    be asked."""
+    of its constants. If a measure is unknown no cause is named. beside : the valve in the whole record,
+    None if it was not examined."""
     if oscillation is None:
         return _quiet(m, limits, beside)
     if m.ringing is None or any(math.isnan(x) for x in (m.evidence, m.jump, m.size, m.kurtosis)):
@@ -354,8 +354,9 @@ def _too_coarse(prepared: Prepared, oscillation: Oscillation, limits: CauseLimit
 
 
 def with_worn_valve(verdict: Verdict, worn: WornValve, others_s: Sequence[float] = ()) -> Verdict:
-    """The verdict on a loop that cycles for another cause, its valve worn if that is seen beside the load: the valve
-    needs repair regardless of the cause. others_s : further periods of the error [s]."""
+    """The verdict on a loop that cycles for another cause. Its valve is reported as worn if that is
+    identified in addition to the load, because the valve needs repair regardless of the cause.
+    others_s : further periods of the error [s]."""
     m = verdict.measured
     if verdict.cause is Cause.UNDECIDED and m is not None and not worn.is_seen:
         return _beside_another_cycle(verdict, m, worn, others_s)
@@ -370,8 +371,8 @@ def with_worn_valve(verdict: Verdict, worn: WornValve, others_s: Sequence[float]
 def _beside_another_cycle(
     verdict: Verdict, m: Measured, worn: WornValve, others_s: Sequence[float]
 ) -> Verdict:
-    """The verdict on an undecided cycle: its cause is the valve if that is seen beside a load of another period,
-    which leaves this cycle to the valve."""
+    """The verdict on an undecided cycle. Its cause is the valve if a fault is identified together with a
+    load of another period, which cannot explain this cycle."""
     for other in (replace(worn, period_s=period_s) for period_s in others_s[:OTHERS]):
         if not other.is_seen:
             continue

@@ -1,4 +1,5 @@
-"""Is the valve worn, whatever makes the cycle? The joint model of load and backlash on the whole record.
+"""Test for a worn valve, independent of the cause of the cycle: a joint model of load and backlash on the
+whole record.
 
 A periodic load has harmonics as a worn valve does, and where it moves OP by less than the backlash the stem is moved
 only by the slower part of OP. Both are decided on the whole record: a stretch of a few dozen cycles holds a few such
@@ -52,12 +53,14 @@ class WornValve:
 
     @property
     def is_seen(self) -> bool:
-        """Whether backlash is seen beside any load: one that OP crosses and that changes its stem's motion."""
+        """Whether backlash is identified in addition to any load: OP crosses it, and it changes the stem's
+        motion."""
         return self.has_evidence and self._is_crossed
 
     @property
     def has_evidence(self) -> bool:
-        """Whether backlash of any width has enough evidence beside the load, on which half-cycles agree."""
+        """Whether backlash of any width has enough evidence in addition to the load, and half-cycles agree
+        on it."""
         if self._is_hidden:
             return False
         trials, limits = self.found.trials, self.limits

@@ -26,14 +26,14 @@ from identification.record import Floats, LoopRecord, Mask
 from identification.signals.robust import robust_deviation
 from tuning.from_test import FromTest, corners, settings_from
 
-MOST = 6  # Experiments of a record that are modelled, the largest [experiments]: a second of work each
+MOST = 6  # Largest number of modelled experiments of a record [experiments]; each takes a second
 AS_GOOD = 1.3
 """Factor between present and new gain, or integral time, from which new ones are proposed: less is within the
 accuracy of a test."""
 POINTS = 120  # Points of a response that a night stores for its page [points]: a picture shows no more
 MOST_A_NIGHT = 2
-"""Experiments of a loop that a night models, the largest [experiments]: two seconds of work each, for one
-loop of many."""
+"""Largest number of experiments of a loop that a night models [experiments]; each takes two seconds, in
+one loop of many."""
 
 CONSTANTS = {"gain": "gain", "slope_pct_per_s": "slope", "lags_s": "time_constant_s"}
 """Constants of a model, and their names in the belief."""

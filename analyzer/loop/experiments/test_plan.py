@@ -124,7 +124,7 @@ def plan_lines(one: PlantLoop, store: Path | None) -> Iterator[str]:
         raise NotAssessedError(f"{spec.loop}: needs a record in which PV moves")
     scale = prepared.scale
     own = [scale.op_low + 0.01 * scale.op_span * x for x in plan.levels_pct]
-    yield f"{spec.loop}: what is known comes from {known.source}"
+    yield f"{spec.loop}: basis of the test: {known.source}"
     yield from _size_lines(plan, known)
     yield SAID["levels"].format(" → ".join(number(x) for x in own), spec.op_unit, duration(plan.hold_s))
     yield SAID["whole"].format(duration(plan.duration_s))

@@ -49,8 +49,9 @@ class Agreement:
     def worst(self, limits: AdviceLimits) -> tuple[str, float] | None:
         """The figure farthest beyond its limit, and its ratio; None if all agree.
 
-        The cycle of a worn valve under a load is irregular: a number of n reversals scatters by sqrt(n) at most, and
-        two such standard errors are allowed beside the limit. Stem travel, a sum over as many moves, is allowed as
+        The cycle of a worn valve under a load is irregular: a number of n reversals scatters by sqrt(n) at
+        most. Two such standard errors are allowed in addition to the limit.
+        Stem travel, a sum over as many moves, is allowed as
         much. The error is a mean over them, which scatter by half of their mean.
         """
         scatter = 2.0 * math.sqrt(sum(1.0 / max(n, LEAST) for n in self.counted))

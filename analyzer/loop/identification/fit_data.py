@@ -17,11 +17,11 @@ from identification.record import Floats, LoopRecord, Mask
 BRIDGED = 0.05
 """Holes of a record up to this long are bridged by a straight line before a model is fitted [periods]: a sine
 leaves 1 % of its amplitude over them; single missing rows left no worn valve assessed."""
-FEW_MORE = 0.1  # Share of a stretch that may be out of use beyond the least for the set point's moves in it
+FEW_MORE = 0.1  # Further share of unusable samples in a stretch with more set point moves
 
 LIVELIER = 2.0
-"""Energy of the cycle in a stretch, over that in the latest one, from which that stretch is fitted instead: ours, a
-cycle of constant size differs by less."""
+"""Least ratio of the cycle's energy in a stretch to that in the latest one, for the former to be fitted;
+ours. A cycle of constant size varies less."""
 
 
 def fit_stretch(record: LoopRecord, n: int, period: float, calm: bool = False) -> int:

@@ -35,8 +35,9 @@ INTEGRATING = 10.0
 """Time constant over a cycle's period [-] from which a lag acts on it as an integrator: its phase is within a degree
 of -90 degrees."""
 WIDER = 1.4
-"""True width of a valve over the width fitted to a record of one row in several scans, a possible value [-]; ours: in
-the two loops of benchmarks/world (seeds 97, 99, every 10 s) whose settings raised the error it was 1.15 and 1.43."""
+"""Assumed ratio of a valve's true width to the width fitted to a record of one row in several scans [-];
+ours. In two loops of benchmarks/world (seeds 97, 99, every 10 s), whose settings raised the error, it was
+1.15 and 1.43."""
 MOST_OF_SWING = 0.8
 """Largest width over OP's range in a cycle that is tried [-]; ours: the stem does not move at 1, and near it noise
 decides whether it does."""

@@ -59,8 +59,8 @@ LATER = 0.6
 """Part of the dead time that the smallest stickband would add, by which the upper end is extended: 94 in 100
 of the same lie within half of the way up."""
 LEAST_SHARE = 0.02
-"""Least half width of slope, gain and time constant, in their own size: a window in blocks of the plant is no
-exact model of it: of 60 loops with set point moves (seed 605) slopes err by 2.1 % in nine of ten with
+"""Least half width of slope, gain and time constant relative to their value, because data in blocks are no
+exact model. In nine of ten of 60 loops with set point moves (seed 605) slopes err by at most 2.1 %, with
 reported deviations of .4 %."""
 LEAST_BLOCK = 0.025
 """Least half width of a dead time [blocks]: on the same loops they err by .01 to .06 blocks."""

@@ -32,9 +32,9 @@ while a loop without a fault under a sine, explained as ringing, has 34 and more
 POORLY_DAMPED = 2.0
 """Peak of the sensitivity above which a loop is poorly damped [-] (Astrom, Hagglund 2006: 1.4 to 2)."""
 OF_RINGING = 2.0
-"""Evidence for a valve fault, over the penalty of its constants, in a loop that rings without it [-]: ours, a sound
-valve of benchmarks/world (seed 542) has 1.6, worn ones of proofs/untidy_loops.py (seed 16) 2.6 and 3.6, a weak one
-1.8."""
+"""Least ratio of the evidence for a valve fault to the penalty of its constants in a loop that rings
+without it [-]; ours. A valve without a fault has 1.6 (benchmarks/world, seed 542). Worn ones have 2.6 and
+3.6, a weakly worn one 1.8 (proofs/untidy_loops.py, seed 16)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +99,8 @@ class Ringing:
         A cause that cannot make such a cycle is below the smooth load by the penalty, and so is the smooth load where
         its loop rings and the cycle is more regular than ringing. A line without evidence of its own is a cause only
         of a cycle that returns as such a line does, and keeps its size longer than likely ringing. A line that
-        explains less than a valve fault is no cause, unless it remains beside the fault; then a fault that explains
-        no more than the line is none.
+        explains less than a valve fault is no cause, unless it remains in addition to the fault; then a fault
+        that explains no more than the line is no cause.
         """
         none = -self.penalty
         rings, regular = self.rings(limits), self.is_as_regular(m, limits)
@@ -137,7 +137,7 @@ class Ringing:
         return self.keeps_phase(limits) and self.line_nat >= self.penalty
 
     def has_line(self, limits: CauseLimits) -> bool:
-        """Whether such a line gains enough to speak against a ringing loop."""
+        """Whether the gain of such a line is sufficient evidence against a ringing loop."""
         return self.keeps_phase(limits) and self.line_nat >= self.line_needed(limits)
 
     @property
@@ -146,7 +146,7 @@ class Ringing:
         return 1.5 * math.log(self.smooth.count)
 
     def line_needed(self, limits: CauseLimits) -> float:
-        """Gain from which a line speaks against a ringing loop [nat]: the penalty, and a floor."""
+        """Gain from which a line is evidence against a ringing loop [nat]: the penalty plus a floor."""
         return limits.line_floor + self.penalty
 
     def rings(self, limits: CauseLimits) -> bool:

@@ -133,7 +133,7 @@ class Shown:
 
 
 def shown(record: LoopRecord, stated: Pid | None, scale_s: float, limits: SettingsLimits) -> Shown:
-    """Evidence of a record about its controller, from the whole of it or its later half.
+    """Evidence of a record about its controller, from all of it or from its later half.
 
     Settings changed within the record appear in its later half, and those are in force. scale_s is the period, or
     another time scale of the loop [s].
@@ -174,8 +174,9 @@ def differing(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsL
 
 
 def recorded(record: LoopRecord, scale_s: float, limits: SettingsLimits) -> FreeLaw | None:
-    """The law identified in a record whatever is stated; None if none explains nearly all of OP, if its gain differs
-    between parts of a range, or if its integral acts, or its filter of PV is longer, than the samples show."""
+    """The law identified in a record, independently of the stated one. None if no law explains nearly all
+    of OP, or if its gain differs between parts of a range. None also if its integral time is too short, or
+    its filter of PV too long, for the samples."""
     law = free_law(record, scale_s)
     known = limits.explained_alone, limits.ti_samples, limits.filter_of_ti
     return law if law is not None and law.is_clear(record.dt_s, *known) else None

@@ -8,7 +8,7 @@ PLAY = Param(Slot.STICKBAND, "backlash_pct", "% OP", 1e-4, 2.0, "op", True, titl
 EFFECT = Effect(
     name="backlash",
     block=Block.VALVE,
-    sentence="After each OP reversal the valve waits through a backlash of {backlash_pct}: check the linkage.",
+    sentence="After an OP reversal the stem does not move within a backlash of {backlash_pct}: check the linkage.",
     check="Look at linkage, actuator and positioner feedback; stroke the valve both ways in small steps.",
     tests={
         "stiction": (
@@ -24,7 +24,7 @@ EFFECT = Effect(
             " delays both."
         ),
         "direction-asymmetry": "Two more moves in one direction: the first takes up the backlash.",
-        "controller-gap": "Whether OP itself is constant: then it is the controller and not the valve.",
+        "controller-gap": "Check whether OP itself is constant: then the controller is the cause.",
     },
     friction=Friction.PLAY,
     curve=stem_over_op,

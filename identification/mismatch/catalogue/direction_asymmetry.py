@@ -18,7 +18,7 @@ EFFECT = Effect(
     name="direction-asymmetry",
     block=Block.PROCESS,
     sentence="PV rises and falls at different speeds (ratio of the time constants {ratio_down_up}).",
-    check="Check whether heating and cooling, filling and draining take different ways.",
+    check="Check whether heating and cooling, or filling and draining, use different equipment.",
     derived=ratio,
     titles={"ratio_down_up": "Time constant down over up"},
     curve=lambda d: pv_response(d, back=True),

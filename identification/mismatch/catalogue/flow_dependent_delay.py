@@ -22,8 +22,8 @@ def delay_over_flow(d: Drawing) -> Picture:
 EFFECT = Effect(
     name="flow-dependent-delay",
     block=Block.PROCESS,
-    sentence="The dead time shrinks when the flow grows (share {flow_share}).",
-    check="Schedule on flow, or tune at the least flow.",
+    sentence="The dead time decreases when the flow increases (share {flow_share}).",
+    check="Schedule the settings on flow, or tune the loop at the smallest flow.",
     tests={"clock-offset": "Steps at two flows: an offset of clocks is the same at both."},
     curve=delay_over_flow,
     variants=(Variant((SHARE,), each(Slot.PIPE, 0.3, 1.0)),),

@@ -9,7 +9,7 @@ DRIFT = Param(Slot.DRIFT, "gain_drift", "per record", -1.9, 1.9, title="Gain dri
 EFFECT = Effect(
     name="gain-drift",
     block=Block.PROCESS,
-    sentence="The process gain changed by {gain_drift} over the recording.",
+    sentence="The process gain drifts over the recording (relative change {gain_drift}).",
     check="Find out what fouled, wore or changed over the recording.",
     timed=True,
     curve=lambda d: gain_course(d, lambda x, c: 1.0 + c[Slot.DRIFT] * x.clock),

@@ -13,11 +13,11 @@ EFFECT = Effect(
     name="inverse-response",
     block=Block.PROCESS,
     needs="every scan",
-    sentence="After a move of OP, PV first goes the wrong way.",
-    check="Expected of boilers, reboilers and the like; tune slower than the wrong-way part lasts.",
+    sentence="After a move of OP, PV first moves in the opposite direction (inverse response).",
+    check="This is normal for boilers and reboilers; tune the loop slower than the inverse response.",
     tests={
-        "flow-dependent-delay": "Steps at two flow levels; the wrong way shows at both.",
-        "positioner": "Three steps of OP apart in time: the wrong way must show in each.",
+        "flow-dependent-delay": "Steps at two flow levels: an inverse response appears at both.",
+        "positioner": "Three separate steps of OP: an inverse response must appear after each.",
     },
     curve=lambda d: pv_response(d, faster=Slot.MODE_T),
     variants=(

@@ -23,7 +23,7 @@ EFFECT = Effect(
     sentence="A load came in as a step ({size}); neither OP nor SP caused it.",
     check="Find out what was switched at that time.",
     tests={
-        "gain-drift": "A step of OP after the event: a load moved the bias, a drift the gain.",
+        "gain-drift": "A step of OP after the event: a load changes the bias, a drift changes the gain.",
         "controller-logic": "The controller's event log at that time.",
     },
     needs="steps",

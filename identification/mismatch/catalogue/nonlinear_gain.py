@@ -14,10 +14,10 @@ EFFECT = Effect(
     sentence="The process gain changes with PV (by {gain_slope}).",
     check="Schedule the controller's gain on PV, or tune for where the gain is highest.",
     tests={
-        "gain-drift": "Go back to the PV of the start and step again: drift stays, a nonlinear gain returns.",
+        "gain-drift": "Go back to the PV of the start and step again: drift keeps the new gain, PV restores it.",
         "sqrt-outflow": "Vary the inflow at one level: the root follows the level, geometry the place.",
         "direction-asymmetry": "Steps up and down over the same span of PV.",
-        "flow-dependent-delay": "Steps at two flows at the same PV: the dead time moves, or the gain does.",
+        "flow-dependent-delay": "Steps at two flows at the same PV: the dead time or the gain changes.",
     },
     indistinguishable=("valve-characteristic",),
     curve=gain_over_pv,

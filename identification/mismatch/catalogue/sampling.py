@@ -40,7 +40,7 @@ def spacings(found: Finding, s: Recording, _: Floats) -> Picture:
 EFFECT = Fault(
     name="sampling",
     block=Block.RECORDER,
-    sentence="The polling scatters by {jitter_samples} samples; do not trust fast motion of PV.",
+    sentence="The time stamps scatter by {jitter_samples}; fast motion of PV is not reliable.",
     check="Poll at a fixed rate, or record at the controller.",
     caption="Time between samples: a regular recorder has one narrow peak.",
     order=1,

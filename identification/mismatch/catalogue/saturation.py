@@ -9,7 +9,7 @@ LOWER = Param(Slot.STOP_LO, "low_limit_pct", "% OP", 0.0, 1.0, "opspan", title="
 EFFECT = Effect(
     name="saturation",
     block=Block.VALVE,
-    sentence="Beyond {limit} the valve does nothing more.",
+    sentence="Beyond {limit} a move of OP has no further effect.",
     check="Look at the mechanical stop, a throttled hand valve, or a pump at its end.",
     local=True,
     spoken={"limit": (UPPER.name, LOWER.name)},

@@ -12,18 +12,18 @@ PAIRS: tuple[Start, ...] = tuple({Slot.T2: t, Slot.T3: 0.5 * t} for t in (1.5, 4
 EFFECT = Effect(
     name="second-lag",
     block=Block.PROCESS,
-    sentence="Something adds a lag of {second_lag_s}; the transmitter's damping would look the same.",
+    sentence="The process has another lag of {second_lag_s}; transmitter damping would have the same effect.",
     check="Find out what is between valve and transmitter; look at the transmitter's damping.",
     tests={
         "sensor-lag": (
-            "Nothing in SP, PV and OP does: a hand-held gauge or the transmitter's damping setting; "
-            "with the damping changed, a sensor's lag changes and the process's stays."
+            "SP, PV and OP cannot distinguish them: use a separate gauge, or change the transmitter's "
+            "damping; then only a sensor's lag changes."
         ),
         "inverse-response": "One clean step of OP in manual, sampled at a tenth of the lag or faster.",
         "slow-mode": "A step of OP held for five of the longer time constants.",
         "rate-limit": "A step of OP twice as large: a slewing valve takes twice as long, a lag does not.",
         "positioner": "A recorded stem position; or steps of OP of several sizes, because a lag scales.",
-        "clock-offset": "The controller: does OP respond to PV before PV moves?",
+        "clock-offset": "Check whether OP responds before the recorded PV moves: then the two clocks differ.",
     },
     indistinguishable=("sensor-lag",),
     curve=lambda d: pv_response(d, faster=Slot.T2),

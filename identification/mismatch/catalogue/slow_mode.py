@@ -12,7 +12,7 @@ EFFECT = Effect(
     sentence="A share of {slow_share} of each move arrives late, with a time constant of {slow_time_constant_s}.",
     check="Find out which mass or recycle warms or fills slowly; tune for the fast part.",
     tests={
-        "gain-drift": "Steps of both signs: a slow mode creeps with the step, drift does not know its sign.",
+        "gain-drift": "Steps of both signs: a slow mode follows the sign of the step, a drift does not.",
         "load-step": "The same step again: a slow mode comes back with it, a load does not.",
         "integrator": "Hold OP for five of the longest time constants and see whether PV settles.",
     },

@@ -30,7 +30,7 @@ def as_friction_leaves_it(own: Parameters) -> dict[str, Estimate]:
 EFFECT = Effect(
     name="stiction",
     block=Block.VALVE,
-    sentence="The valve sticks: it holds through {stickband_pct} of travel and then jumps {slip_jump_pct}.",
+    sentence="The valve sticks: OP has to move by {stickband_pct}, then the stem jumps by {slip_jump_pct}.",
     check="Look at packing and actuator; stroke the valve in steps under the stickband and watch the stem.",
     tests={"positioner": "A recorded stem position, or a stem watched by eye while OP ramps slowly."},
     indistinguishable=("positioner",),

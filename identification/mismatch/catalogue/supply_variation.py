@@ -17,7 +17,10 @@ EFFECT = Effect(
     sentence="The supply to the valve varies and changes gain and bias together.",
     check="Look at the supply's pressure or temperature over the same hours.",
     tests={
-        "gain-drift": "A longer recording: a supply comes back, fouling does not; other loops show it too.",
+        "gain-drift": (
+            "A longer recording: a supply returns to its earlier value, fouling does not; other loops show the "
+            "supply too."
+        ),
         "load-step": "The supply's own pressure or temperature trend.",
         "coupling": "The supply's own trend next to the other loop's OP.",
     },

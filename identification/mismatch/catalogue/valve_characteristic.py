@@ -9,14 +9,14 @@ EFFECT = Effect(
     name="valve-characteristic",
     block=Block.VALVE,
     sentence="The valve's gain changes along its stroke (curve {curve}).",
-    check="Bend the signal back in the controller or positioner, or tune for the steepest part.",
+    check="Linearize the signal in the controller or positioner, or tune for the steepest part.",
     tests={
         "nonlinear-gain": (
             "The same PV at another OP: move the load, or another stream, and step OP again at the same PV."
         ),
-        "saturation": "Steps of OP near the end of the stroke: zero answer, or a smaller one.",
+        "saturation": "Steps of OP near the end of the stroke: saturation gives no response, a curve some.",
         "split-range": "Steps on both sides of the suspected point: only a second valve changes the lag.",
-        "gain-drift": "Go back to the OP of the start and step again: drift stays, a curve returns.",
+        "gain-drift": "Go back to the OP of the start and step again: drift keeps the new gain, OP restores it.",
     },
     indistinguishable=("nonlinear-gain",),
     curve=flow_over_op,

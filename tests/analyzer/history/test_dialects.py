@@ -120,7 +120,7 @@ def test_day_or_month_by_the_run_of_the_stamps(tmp_path: Path, written: str) -> 
     """Without such a day that order counts in which time runs on without a leap."""
     table = day("2024-02-01 23:59:45")
     (tmp_path / "x.csv").write_text(as_text(table, written, ",", ".", ""))
-    assert any("without a leap" in note for note in assert_read(tmp_path / "x.csv", table))
+    assert any("without a jump" in note for note in assert_read(tmp_path / "x.csv", table))
 
 
 def test_day_or_month_by_another_file(tmp_path: Path) -> None:

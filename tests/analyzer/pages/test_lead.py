@@ -73,7 +73,7 @@ def test_a_valve_that_can_wait_is_told_last():
     rows = [row("A", 0.0, **VALVE | {"due": "next shutdown"}), row("B", 0.1, **VALVE | {"due": "now"})]
     assert first_things(rows) == (
         "Stroke the valve of B: it has stiction.",
-        "At the next shutdown look at the valve of A: worn, and it can wait until then.",
+        "At the next shutdown look at the valve of A: it is worn, and its repair can wait until then.",
     )
 
 
@@ -82,7 +82,7 @@ def test_what_is_not_stated_is_not_compared() -> None:
     ask = {"action": "check settings", "cause": "tuning"}
     rows = [row("A", 9.0, **ask), row("B", 5.0, **ask, kp=None), row("C", 4.0, **ask, ti=None)]
     assert first_things(rows) == (
-        "Compare the settings of A with loops.csv: the trends show others.",
+        "Compare the settings of A with loops.csv: the trends show other settings.",
         "State Kp and Ti of B and C in loops.csv, as their controllers have them: new settings need them.",
     )
 
@@ -123,4 +123,4 @@ def test_a_loop_that_swings_from_limit_to_limit_is_not_sent_to_the_valves_size()
     still = row("TIC2", 0.0, action="check limit", lanes="at limit")
     said = first_things([tight, still])
     assert said[0].startswith("Halve the gain of CH3 or go to manual")
-    assert said[1] == "Find out why OP of TIC2 is at its limit: valve size, or its supply."
+    assert said[1] == "Find out why OP of TIC2 is at its limit: check the valve's size and supply."

@@ -242,7 +242,7 @@ def test_a_follower_is_laid_beside_its_source() -> None:
     known = {"loop": "A 1", "night": "2026-03-02", "status": "ok", "source_loop": "B,2"}
     row = row_of(known)
     links = loop.loop_page([row | dict.fromkeys(set(loop.COLUMNS) - set(row))], None).links
-    assert ("Beside B,2", "side-by-side.html#B%2C2,A%201") in links
+    assert ("Compare with B,2", "side-by-side.html#B%2C2,A%201") in links
 
 
 def test_loops_side_by_side_stand_in_their_own_units(tmp_path: Path) -> None:

@@ -45,7 +45,7 @@ STORED = [
     {
         "points_to": "valve",
         "strength": 0.5,
-        "text": "most stretches between moves of the stem agree",
+        "text": "most stretches between moves of the stem show this fault",
         "name": "",
         "figures": "",
     },

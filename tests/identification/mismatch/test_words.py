@@ -45,5 +45,5 @@ def test_place_is_said_by_size_with_its_range() -> None:
     bias = {"name": "pv_level", "by": "sign", "range": [1.0, 2.0], "carries": True}
     text = located_sentence({"features": [size, bias]})
     assert "60 to 80 % of OP" in text
-    assert "Residual located at 60 to 80 % of OP; depends on PV level (bias)." in text
+    assert "The residual is located at 60 to 80 % of OP; depends on PV level (bias)." in text
     assert located_sentence({}) == ""
