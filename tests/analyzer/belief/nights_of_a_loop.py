@@ -1,4 +1,4 @@
-"""Rows of one loop night by night, as tests of beliefs need them."""
+"""Rows of one loop night by night, for the tests of beliefs."""
 
 from __future__ import annotations
 
@@ -28,21 +28,30 @@ LOAD: dict[str, Any] = {
 
 
 def witness(width: float, evidence: float, against: float = 100.0, deviation: float = 0.05) -> str:
-    """What a night says of a play: most evidence [nat] at its width [% OP], less beside, some against wide ones."""
+    """Evidence of one night for backlash [nat]: highest at its width [% OP], lower at neighbouring widths, and
+    `against` [nat] against much wider ones.
+    """
     off = np.abs(np.log(WIDTHS / width))
     profile = np.where(1.6 * width < WIDTHS, -against, evidence * np.maximum(1.0 - off, 0.0))
-    said = {"profile": profile.round(1).tolist(), "needed": 10.0, "op_range": 2 * width, "jump": [0.0, 5.0]}
-    return json.dumps({**said, "width": [width, deviation]} if evidence > 0 else said)
+    stated_part = {
+        "profile": profile.round(1).tolist(),
+        "needed": 10.0,
+        "op_range": 2 * width,
+        "jump": [0.0, 5.0],
+    }
+    return json.dumps({**stated_part, "width": [width, deviation]} if evidence > 0 else stated_part)
 
 
-def sound(against: float = 100.0) -> str:
-    """What a night of a sound valve says: nothing for any width, and something against all that would show."""
+def no_fault(against: float = 100.0) -> str:
+    """Evidence of one night of a valve without fault: zero at small widths, `against` [nat] against each width that
+    would be visible.
+    """
     profile = np.where(WIDTHS > 0.3, -against, 0.0)
     return json.dumps({"profile": profile.tolist(), "needed": 10.0, "op_range": 2.0, "jump": [0.0, 0.0]})
 
 
 def row(night: int, *given: dict[str, Any], **more: Any) -> dict[str, Any]:
-    """The row of a night, counted from 0, of a loop that cycles where nothing else is said."""
+    """The row of a night, counted from 0; the loop oscillates unless the given values state otherwise."""
     start_s = 1_772_409_600.0 + DAY_S * night
     usual = {
         "oscillating_pct": 95.0,

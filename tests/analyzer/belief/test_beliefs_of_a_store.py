@@ -1,4 +1,4 @@
-"""Beliefs follow from the nights of a store, whatever the order of runs."""
+"""Beliefs depend on the nights of a store and not on the order of the runs."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ CONFIG = Config()
 
 
 def keep(store: Store, night: dict[str, Any], *others: dict[str, Any]) -> None:
-    """Keep a night of the loop L, and of others, and settle what is believed since."""
+    """Store a night of the loop L and of other loops, and compute the beliefs after it."""
     rows = [row_of({k: v for k, v in r.items() if k != "extra"}, NIGHTS) for r in (night, *others)]
     store.write("nights", night["night"], rows_table(rows, NIGHTS))
     settle(store, night["night"], CONFIG)
@@ -38,12 +38,12 @@ def believed(store: Store) -> dict[str, list[dict[str, Any]]]:
 
 
 def ten_nights() -> list[dict[str, Any]]:
-    """Ten nights of a loop whose small play no night tells by itself, with a retune in their midst."""
+    """Ten nights of a loop with a small backlash that no single night proves, with a retune after the sixth night."""
     return [row(k, CALM, witness=witness(0.8, 6.0), ti=100.0 if k < 6 else 400.0) for k in range(10)]
 
 
 def store_of(path: Path, rows: Sequence[dict[str, Any]]) -> Store:
-    """A store that was run night by night in some order."""
+    """A store whose nights were run one by one in the given order."""
     store = Store(path)
     for r in rows:
         keep(store, r)
@@ -51,7 +51,7 @@ def store_of(path: Path, rows: Sequence[dict[str, Any]]) -> Store:
 
 
 def test_the_order_of_runs_does_not_matter(tmp_path: Path) -> None:
-    """Nights in order, backwards, one of them late, and one of them twice give the same beliefs."""
+    """Nights in order, in reverse order, with one late night, and with two nights run twice give the same beliefs."""
     rows = ten_nights()
     first = believed(store_of(tmp_path / "a", rows))
     assert believed(store_of(tmp_path / "b", rows[::-1])) == first
@@ -59,8 +59,10 @@ def test_the_order_of_runs_does_not_matter(tmp_path: Path) -> None:
     assert believed(store_of(tmp_path / "d", [*rows, rows[4], rows[9]])) == first
 
 
-def test_one_command_makes_them_anew_and_check_sees_where_they_differ(tmp_path: Path) -> None:
-    """Beliefs that are gone, or say another thing than the nights, are named and made anew."""
+def test_one_command_computes_beliefs_again_and_check_names_the_differences(tmp_path: Path) -> None:
+    """The check names beliefs that are missing or that differ from the nights, and one command computes them
+    again.
+    """
     store = store_of(tmp_path / "s", ten_nights())
     first = believed(store)
     assert unfounded(store, CONFIG) == []
@@ -76,8 +78,9 @@ def test_one_command_makes_them_anew_and_check_sees_where_they_differ(tmp_path: 
 
 
 def test_check_computes_one_night_of_beliefs_that_carry_their_inputs(tmp_path, monkeypatch) -> None:
-    """Of ten nights the newest alone is computed again, also after the oldest ones are deleted and after a note on a
-    later repair; another limit computes all."""
+    """Of ten nights only the newest is computed again, also after the oldest nights are deleted and after a note on a
+    later repair. Another limit causes all nights to be computed.
+    """
     store, counted = store_of(tmp_path / "s", ten_nights()), []
 
     def counting(before: Any, row: Any, *more: Any) -> Any:
@@ -98,29 +101,37 @@ def test_check_computes_one_night_of_beliefs_that_carry_their_inputs(tmp_path, m
 
 @pytest.mark.parametrize("k", [0, 4, 9])
 def test_check_sees_a_night_that_was_written_again(k: int, tmp_path: Path) -> None:
-    """A night whose table has changed since its beliefs were computed is found, whichever it is."""
+    """The check finds any night whose table has changed since its beliefs were computed."""
     rows = ten_nights()
     store = store_of(tmp_path / "s", rows)
-    anew = row_of({**row(k, WORN, backlash_pct=2.0), "night": rows[k]["night"]}, NIGHTS)
-    store.write("nights", rows[k]["night"], rows_table([anew], NIGHTS))
+    again = row_of({**row(k, WORN, backlash_pct=2.0), "night": rows[k]["night"]}, NIGHTS)
+    store.write("nights", rows[k]["night"], rows_table([again], NIGHTS))
     named = [p.seen for p in unfounded(store, CONFIG)]
     assert any(rows[k]["night"] in seen for seen in named)
 
 
-def test_a_store_of_an_earlier_version_is_taken_in(tmp_path: Path) -> None:
-    """Nights without beliefs and without witnesses are enough for the next run to know the valve."""
+def test_a_store_of_an_earlier_version_is_used(tmp_path: Path) -> None:
+    """Nights without stored beliefs and without stored evidence are enough for the next run to find the valve
+    fault.
+    """
     store = Store(tmp_path / "s")
     for k in range(4):
         old = row(k, WORN, backlash_pct=2.0, evidence=40.0)
         store.write("nights", old["night"], rows_table([row_of(old, NIGHTS)], NIGHTS))
     keep(store, row(4, CALM, witness=witness(2.0, 0.0, 0.0)))
-    (told,) = store.rows("nights", "2026-03-06", ("cause", "action", "due", "worn_pct", "certain_since"))
-    assert (told["cause"], told["action"], told["due"]) == ("valve", "repair valve", "next shutdown")
-    assert told["certain_since"] == "2026-03-02"
+    (reported,) = store.rows("nights", "2026-03-06", ("cause", "action", "due", "worn_pct", "certain_since"))
+    assert (reported["cause"], reported["action"], reported["due"]) == (
+        "valve",
+        "repair valve",
+        "next shutdown",
+    )
+    assert reported["certain_since"] == "2026-03-02"
 
 
-def test_what_is_told_rests_on_the_nights_and_figures_on_their_own(tmp_path: Path) -> None:
-    """The list tells the fault that the nights found together; the night's own row still says what it saw."""
+def test_the_verdict_uses_all_nights_and_the_figures_use_one_night(tmp_path: Path) -> None:
+    """The list shows the fault that all nights found together; the stored row of a night still contains that night's
+    own result.
+    """
     store = store_of(tmp_path / "s", ten_nights())
     (listed,), _ = ranked(store)
     assert (listed["cause"], listed["valve_fault"], listed["backlash_pct"]) == (
@@ -137,8 +148,8 @@ def test_what_is_told_rests_on_the_nights_and_figures_on_their_own(tmp_path: Pat
     )
 
 
-def test_a_loop_that_is_not_seen_for_some_nights_is_remembered(tmp_path: Path) -> None:
-    """Nights in manual, and nights of another part of the plant, neither add nor end anything."""
+def test_a_loop_keeps_its_belief_over_nights_without_assessment(tmp_path: Path) -> None:
+    """Nights in manual, and nights that contain only other loops, neither add evidence nor end a belief."""
     rows, other = ten_nights(), {**row(0, CALM), "loop": "M"}
     store = Store(tmp_path / "s")
     for k, r in enumerate(rows):
@@ -151,15 +162,16 @@ def test_a_loop_that_is_not_seen_for_some_nights_is_remembered(tmp_path: Path) -
             keep(store, {**other, "night": r["night"]})
         else:
             keep(store, r)
-    (told,) = store.rows("nights", "2026-03-11", ("cause", "worn_nights"), ["L"])
-    assert (told["cause"], told["worn_nights"]) == ("valve", 8.0)
+    (reported,) = store.rows("nights", "2026-03-11", ("cause", "worn_nights"), ["L"])
+    assert (reported["cause"], reported["worn_nights"]) == ("valve", 8.0)
     (by_hand,) = store.rows("nights", "2026-03-09", ("cause", "status"), ["L"])
     assert by_hand == {"cause": None, "status": "not assessed"}
 
 
-def test_a_repair_that_is_noted_late_counts_when_beliefs_are_made_anew(tmp_path: Path) -> None:
-    """A note on a repair ends the belief in the night that it falls into, which is of two valves, and nowhere
-    else."""
+def test_a_late_note_on_a_repair_counts_when_beliefs_are_computed_again(tmp_path: Path) -> None:
+    """A note on a repair ends the belief in the night of the repair, whose samples belong to two valves, and in no
+    other night.
+    """
     rows = ten_nights()
     store = store_of(tmp_path / "s", rows)
     notes.add(store.path, Note("L", rows[5]["start_s"] - 600.0, "valve replaced"))
@@ -168,8 +180,8 @@ def test_a_repair_that_is_noted_late_counts_when_beliefs_are_made_anew(tmp_path:
     assert [found[f"2026-03-0{day}"] for day in (5, 6, 7, 8)] == [4.0, 0.0, 1.0, 2.0]
 
 
-def test_nights_that_were_deleted_are_still_believed(tmp_path: Path) -> None:
-    """Pruned nights stay in what the oldest one left knew, and the check finds nothing wrong with that."""
+def test_beliefs_still_include_deleted_nights(tmp_path: Path) -> None:
+    """The beliefs after deletion of old nights still include those nights, and the check reports no problem."""
     store = store_of(tmp_path / "s", ten_nights())
     last = believed(store)["2026-03-11"]
     assert pruned(store, 4, None)
@@ -179,8 +191,10 @@ def test_nights_that_were_deleted_are_still_believed(tmp_path: Path) -> None:
     assert believed(store)["2026-03-11"] == last
 
 
-def test_a_belief_that_fails_is_that_loops_alone(tmp_path: Path) -> None:
-    """One loop whose witness is nonsense is named, the others of the night are believed, and the night stands."""
+def test_a_belief_that_fails_concerns_its_loop_only(tmp_path: Path) -> None:
+    """If the evidence of one loop is invalid, that loop is named, the other loops get their beliefs, and the night is
+    kept.
+    """
     store = Store(tmp_path / "s")
     broken = {**row(0, CALM, witness=json.dumps({"profile": "x"})), "loop": "B"}
     rows = [row_of(r, NIGHTS) for r in (row(0, CALM, witness=witness(0.8, 6.0)), broken)]
@@ -191,8 +205,8 @@ def test_a_belief_that_fails_is_that_loops_alone(tmp_path: Path) -> None:
     assert [r["loop"] for r in believed(store)["2026-03-02"]] == ["L"]
 
 
-def test_damaged_beliefs_of_the_night_before_are_made_anew(tmp_path: Path) -> None:
-    """A table of beliefs that cannot be read stops no night: all are made from the nights again."""
+def test_damaged_beliefs_of_the_night_before_are_computed_again(tmp_path: Path) -> None:
+    """An unreadable table of beliefs does not stop a night: all beliefs are computed again from the nights."""
     rows = ten_nights()
     store = store_of(tmp_path / "s", rows[:9])
     store.file("beliefs", rows[8]["night"]).write_bytes(b"PAR1 no table PAR1")
@@ -201,17 +215,19 @@ def test_damaged_beliefs_of_the_night_before_are_made_anew(tmp_path: Path) -> No
 
 
 def test_beliefs_of_a_night_cost_little(tmp_path: Path) -> None:
-    """A night reads itself, the beliefs of the night before and no older night, however many there are."""
+    """A night reads its own table and the beliefs of the night before, and no older night, for any number of
+    nights.
+    """
     rows = ten_nights()
     store = store_of(tmp_path / "s", rows[:9])
-    asked: list[tuple[str, str]] = []
+    reads: list[tuple[str, str]] = []
     own = Store.own_rows
 
     def counted(self: Store, table: str, night: str, *more: Any) -> list[dict[str, Any]]:
-        asked.append((table, night))
+        reads.append((table, night))
         return own(self, table, night, *more)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Store, "own_rows", counted)
         keep(store, rows[9])
-    assert asked == [("beliefs", "2026-03-10"), ("nights", "2026-03-11")]
+    assert reads == [("beliefs", "2026-03-10"), ("nights", "2026-03-11")]

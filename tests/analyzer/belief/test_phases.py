@@ -1,4 +1,6 @@
-"""Phases over nights: an overshoot that grows is told with its batch, and one that only scatters is not."""
+"""Phases over nights: an overshoot that grows is reported with its batch, and an overshoot that only scatters is not
+reported.
+"""
 
 from __future__ import annotations
 
@@ -16,20 +18,20 @@ LIMITS, HOUR, MOST = WearLimits(), 3600.0, 60
 
 
 def row(first: int, overshoot: np.ndarray, begin: float = 20.0, end: float = 50.0) -> dict[str, Any]:
-    """A night whose batches follow each other every hour."""
+    """A night with one batch every hour."""
     start = [HOUR * (first + k) for k in range(overshoot.size)]
-    told = {
+    phase = {
         "begin": begin,
         "end": end,
         "start_s": start,
         "overshoot_pct": overshoot.tolist(),
         "settled_s": [],
     }
-    return {"phases": json.dumps([told])}
+    return {"phases": json.dumps([phase])}
 
 
 def of_nights(overshoot: np.ndarray, a_night: int = 8) -> tuple[PhaseKnown, ...]:
-    """What is known of a phase after nights of so many batches."""
+    """The phases known after nights with `a_night` batches each."""
     known: tuple[PhaseKnown, ...] = ()
     for k in range(0, overshoot.size, a_night):
         known = with_repetitions(known, row(k, overshoot[k : k + a_night]), MOST)
@@ -37,8 +39,8 @@ def of_nights(overshoot: np.ndarray, a_night: int = 8) -> tuple[PhaseKnown, ...]
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_growth_is_told_with_the_batch_from_which_on(seed: int) -> None:
-    """An overshoot of 4 % that grows by one in a hundred from batch 24 on is told so within a few batches."""
+def test_growth_is_reported_with_the_batch_at_which_it_begins(seed: int) -> None:
+    """An overshoot of 4 % that grows by 1 % per batch from batch 24 on is found within five batches."""
     x = np.arange(48)
     seen = 4.0 + np.maximum(x - 23, 0) * 1.0 + np.random.default_rng(seed).normal(0.0, 1.0, 48)
     (phase,) = of_nights(seen)
@@ -52,7 +54,7 @@ def test_growth_is_told_with_the_batch_from_which_on(seed: int) -> None:
 
 
 def test_what_scatters_falls_or_jumps_once_is_no_growth() -> None:
-    """Of a hundred phases that stay, scatter by 3 %, or fall, none is told to grow."""
+    """Of a hundred phases that stay constant, scatter by 3 %, or fall, none is reported as growing."""
     for seed in range(100):
         rng = np.random.default_rng(seed)
         seen = 6.0 + rng.normal(0.0, 3.0, 48) - (seed % 2) * np.linspace(0.0, 4.0, 48)
@@ -61,7 +63,9 @@ def test_what_scatters_falls_or_jumps_once_is_no_growth() -> None:
 
 
 def test_a_night_twice_and_other_levels_are_kept_apart() -> None:
-    """A night read again counts no batch twice; another move is another phase; new settings begin anew."""
+    """A night read again counts no batch twice, other levels are another phase, and new settings start the
+    repetitions again.
+    """
     once = with_repetitions((), row(0, np.full(8, 3.0)), MOST)
     assert with_repetitions(once, row(0, np.full(8, 3.0)), MOST) == once
     both = with_repetitions(once, row(8, np.full(4, 3.0), begin=50.0, end=80.0), MOST)
@@ -70,7 +74,7 @@ def test_a_night_twice_and_other_levels_are_kept_apart() -> None:
 
 
 def test_beliefs_of_a_version_without_phases_are_read() -> None:
-    """What nights before this version believed goes on, its phases begun with the next night."""
+    """Beliefs stored by a version without phases are read; their phases start empty."""
     old = json.loads(kept_as(Belief("BIC1", "2026-03-02")))
     del old["phases"]
     assert belief_of(json.dumps(old)).phases == ()

@@ -1,4 +1,4 @@
-"""A valve that every night tells to stick, slip by slip, is told to stick by all of them."""
+"""If each night finds stiction slip by slip, the nights together find stiction."""
 
 from __future__ import annotations
 
@@ -19,8 +19,10 @@ MILL = Path(__file__).parents[3] / "sample_data"
 
 
 @pytest.mark.slow
-def test_a_valve_whose_friction_scatters_sticks_by_all_nights(tmp_path: Path) -> None:
-    """FIC2110 of the sample mill sticks over 6 % and jumps 5 %: two nights say so alone and together."""
+def test_a_valve_whose_friction_scatters_has_stiction_by_all_nights(tmp_path: Path) -> None:
+    """FIC2110 of the sample mill has a stickband of 6 % and a slip jump of 5 %: two nights find stiction alone and
+    together.
+    """
     export = open_export([MILL / "mill.parquet"])
     specs, _ = match(read_loops(MILL / "loops.csv"), export.tags)
     store = Store(tmp_path / "store")

@@ -1,4 +1,4 @@
-"""A worn valve is found by nights together, and only where they agree on its width."""
+"""A worn valve is found by several nights together, if they agree on its width."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from tests.analyzer.belief.nights_of_a_loop import (
     LOAD,
     WORN,
     followed,
+    no_fault,
     row,
-    sound,
     witness,
 )
 
 
 def test_a_fault_too_small_for_one_night_is_found_by_several() -> None:
-    """Six tenths of the evidence that one night needs, at one width, is certain by the fourth night and not by the
-    first."""
+    """If each night has 60 % of the evidence that one night needs, at one width, the fault is found by the fourth
+    night and not by the first.
+    """
     found = followed([row(k, CALM, witness=witness(0.8, 6.0)) for k in range(5)])
     assert found[0].valve.certain == ""
     assert found[3].told.fault == "backlash"
@@ -30,26 +31,31 @@ def test_a_fault_too_small_for_one_night_is_found_by_several() -> None:
     assert found[3].valve.width == pytest.approx(0.8, rel=0.13)
 
 
-def test_nights_that_differ_in_width_convict_nobody() -> None:
-    """Each night has its own width, and speaks against wider ones: no valve is told, though each says as much."""
+def test_nights_that_differ_in_width_give_no_valve_fault() -> None:
+    """If each night finds another width, and evidence against wider ones, no valve fault is reported although each
+    night has the same evidence.
+    """
     widths = [2.4, 0.4, 1.1, 0.3, 4.0, 0.6, 0.25]
     found = followed([row(k, CALM, witness=witness(w, 6.0, against=30.0)) for k, w in enumerate(widths)])
     assert all(b.told.fault == "none" for b in found)
 
 
-def test_one_great_night_among_calm_ones_is_not_believed() -> None:
-    """The best night is left out: a play narrow beside OP's range that one night sees and six do not is none."""
+def test_one_night_of_high_evidence_among_others_without_is_not_enough() -> None:
+    """The best night is left out: a backlash that is narrow compared with the range of OP and that only one of seven
+    nights shows is not reported.
+    """
     odd = witness(0.8, 15.0).replace('"op_range": 1.6', '"op_range": 8.0')
     found = followed([row(k, CALM, witness=odd if k == 3 else witness(0.8, 0.0, 0.0)) for k in range(7)])
     assert all(b.told.fault == "none" for b in found)
 
 
-def test_a_load_that_looks_like_a_play_every_night_convicts_no_valve() -> None:
-    """Five times the evidence of a verdict, in eight nights of a cycle that a load makes, tells no worn valve; twenty
-    times does, and the cause stays the load's."""
+def test_a_load_that_looks_like_backlash_every_night_gives_no_valve_fault() -> None:
+    """Eight nights of a load cycle with five times the evidence of a verdict give no valve fault. With twenty times
+    the evidence they do, and the cause stays the load.
+    """
     assert followed([row(k, LOAD, witness=witness(1.5, 50.0)) for k in range(8)])[-1].told.fault == "none"
-    told = followed([row(k, LOAD, witness=witness(1.5, 200.0)) for k in range(8)])[-1].told
-    assert (told.cause, told.fault, told.action, told.due) == (
+    reported = followed([row(k, LOAD, witness=witness(1.5, 200.0)) for k in range(8)])[-1].told
+    assert (reported.cause, reported.fault, reported.action, reported.due) == (
         "load",
         "backlash",
         "repair valve",
@@ -57,35 +63,36 @@ def test_a_load_that_looks_like_a_play_every_night_convicts_no_valve() -> None:
     )
 
 
-def test_another_valve_begins_the_belief_anew() -> None:
-    """After nights that say 2 %, nights that say nothing at all make the valve sound within three; a single odd one
-    does not."""
+def test_another_valve_starts_the_belief_again() -> None:
+    """After nights that find 2 %, nights without backlash clear the valve within three nights; one single such night
+    does not.
+    """
     worn = [row(k, WORN, witness=witness(2.0, 60.0)) for k in range(6)]
-    mended = [row(k, CALM, witness=sound()) for k in range(6, 9)]
-    found = followed([*worn, *mended])
+    repaired = [row(k, CALM, witness=no_fault()) for k in range(6, 9)]
+    found = followed([*worn, *repaired])
     assert found[5].valve.certain == "2026-03-02"
     assert found[6].valve.certain == "2026-03-02"
     assert found[8].valve.certain == ""
     assert found[8].valve.since == "2026-03-08"
     assert (
-        followed([*worn, mended[0], row(7, WORN, witness=witness(2.0, 60.0))])[-1].valve.certain
+        followed([*worn, repaired[0], row(7, WORN, witness=witness(2.0, 60.0))])[-1].valve.certain
         == "2026-03-02"
     )
 
 
-def test_a_repair_that_is_noted_begins_the_belief_anew_at_once() -> None:
-    """A note between two nights ends what was believed of the valve, and no other night's row is needed for it."""
+def test_a_noted_repair_starts_the_belief_again_at_once() -> None:
+    """A note on a repair between two nights ends the belief of the valve at once, without further nights."""
     worn = [row(k, WORN, witness=witness(2.0, 60.0)) for k in range(4)]
-    calm = row(4, CALM, witness=sound())
+    calm = row(4, CALM, witness=no_fault())
     at_s = calm["start_s"] - 3600.0
     assert followed([*worn, calm], (at_s,))[-1].valve.certain == ""
     assert followed([*worn, calm])[-1].valve.certain == "2026-03-02"
     within = followed([*worn, calm], (calm["start_s"] + 0.5 * DAY_S,))[-1]
-    assert within.valve.nights == 0  # a night of two valves tells of none
+    assert within.valve.nights == 0  # this night belongs to two valves and is evidence for neither
 
 
-def test_a_change_of_settings_leaves_the_valve_as_worn_as_it_was() -> None:
-    """Settings that calm the loop do not mend its valve: it stays known, for the next shutdown."""
+def test_a_change_of_settings_does_not_change_the_belief_in_the_valve() -> None:
+    """Settings that end the oscillation do not repair the valve: it stays in the list for the next shutdown."""
     worn = [row(k, WORN, witness=witness(2.0, 60.0)) for k in range(4)]
     calm = [row(k, CALM, ti=800.0, witness=witness(2.0, 0.0, 0.0)) for k in range(4, 8)]
     found = followed([*worn, *calm])[-1]
@@ -95,7 +102,7 @@ def test_a_change_of_settings_leaves_the_valve_as_worn_as_it_was() -> None:
 
 
 def test_evidence_fades_with_its_half_life() -> None:
-    """What a night said counts half after the half life, whether or not there were nights between."""
+    """The evidence of a night counts half after the half life, with or without nights in between."""
     first = row(0, CALM, witness=witness(0.8, 6.0))
     late = row(int(LIMITS.half_life), CALM, witness=witness(0.8, 0.0, 0.0))
     found = followed([first, late])
@@ -105,16 +112,19 @@ def test_evidence_fades_with_its_half_life() -> None:
 
 
 def test_the_probability_is_bayes_rule_over_widths() -> None:
-    """The probability of a worn valve equals prior odds spread over the widths times the likelihood of each."""
+    """The probability of a worn valve equals the prior odds, spread over the widths, times the likelihood of each
+    width.
+    """
     found = followed([row(k, CALM, witness=witness(0.8, 6.0)) for k in range(3)])[-1].valve
     prior = LIMITS.worn_before / WIDTHS.size
     worn = sum(prior * np.exp(x) for x in found.profile)
     assert found.worn_pct(LIMITS) == pytest.approx(100 * worn / (worn + 1 - LIMITS.worn_before))
 
 
-def test_another_recorder_leaves_the_valve_as_worn_as_it_was() -> None:
-    """Where the historian begins to compress, widths and sizes begin anew and the valve's belief does not; nothing of
-    it is news, though the cycle is not seen any more and the width seems to be another."""
+def test_another_recorder_does_not_change_the_belief_in_the_valve() -> None:
+    """If the historian begins to compress, the pools of widths and sizes start again and the belief in the valve does
+    not. Neither the missing cycle nor the other width is reported as a change.
+    """
     whole = [row(k, WORN, witness=witness(2.0, 60.0), straight_pct=0.5) for k in range(6)]
     cut = [row(6 + k, CALM, witness=witness(2.4, 60.0), straight_pct=35.0) for k in range(4)]
     beliefs = followed([*whole, *cut])
@@ -123,5 +133,5 @@ def test_another_recorder_leaves_the_valve_as_worn_as_it_was() -> None:
     assert beliefs[5].constants["width"].pooled.value == pytest.approx(2.0, rel=0.02)  # type: ignore[union-attr]
     assert beliefs[-1].constants["width"].pooled.value == pytest.approx(2.4, rel=0.02)  # type: ignore[union-attr]
     assert [w for _, w, _ in beliefs[-1].widths] == [2.4] * 4
-    said = [news(a, b, r) for a, b, r in zip(beliefs[5:], beliefs[6:], cut, strict=False)]
-    assert said == [("", "")] * 4
+    changes = [news(a, b, r) for a, b, r in zip(beliefs[5:], beliefs[6:], cut, strict=False)]
+    assert changes == [("", "")] * 4

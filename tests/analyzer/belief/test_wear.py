@@ -1,4 +1,6 @@
-"""A valve that wears is found when it does, foretold with honest ends, and one that does not is left alone."""
+"""Wear of a valve is found at the right night and predicted with intervals that contain the truth; a valve without
+wear is not reported.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ FIRST = date(2026, 1, 1)
 def widths(
     true: np.ndarray, seed: int, deviation: float = 0.06, missing: float = 0.0, alike: float = 0.0
 ) -> list[tuple[str, float, float]]:
-    """What nights tell of true widths, some of them missing; alike, the deviation by which all err alike."""
+    """Widths that nights report for the true widths, some of them missing; `alike` is the standard deviation of an
+    error common to all.
+    """
     rng = np.random.default_rng(seed)
     true = true * np.exp(alike * np.random.default_rng((seed, 1)).standard_normal())
     seen = true * np.exp(deviation * rng.standard_normal(true.size))
@@ -29,14 +33,15 @@ def widths(
 
 
 def growing(start: float, per_day: float, begins: int, nights: int) -> np.ndarray:
-    """A width that stays and then grows."""
+    """A width that is constant and then grows."""
     return start + per_day * np.maximum(np.arange(nights) - begins, 0)
 
 
 @pytest.mark.parametrize(("missing", "alike"), [(0.0, 0.0), (0.4, 0.0), (0.0, 0.06)])
-def test_forecasts_hold_the_truth(missing: float, alike: float) -> None:
-    """Of 24 valves that wear from .3 to 3 % in sixty nights, the day on which they reach 5 % lies within the
-    forecast's ends in at least 20, also where all widths of a valve err alike."""
+def test_forecasts_contain_the_truth(missing: float, alike: float) -> None:
+    """For at least 20 of 24 valves that wear from 0.3 to 3 % in sixty nights, the forecast interval contains the day
+    on which they reach 5 %. This holds too if all widths of a valve have a common error.
+    """
     held = 0
     for seed in range(24):
         true = growing(0.3, 2.7 / 60, 0, 61)
@@ -49,8 +54,9 @@ def test_forecasts_hold_the_truth(missing: float, alike: float) -> None:
 
 
 def test_the_night_from_which_it_grows_is_found() -> None:
-    """A valve of 1 % that begins to wear on the thirtieth night is told so to within six nights, and how fast
-    with ends that hold the truth in eight of ten."""
+    """For ten valves of 1 % that begin to wear on the thirtieth night, the median error of that night is at most six
+    nights. The interval of the wear rate contains the truth in at least eight of the ten.
+    """
     off, held = [], 0
     for seed in range(10):
         found = wear(widths(growing(1.0, 0.04, 30, 61), seed), LIMITS)
@@ -61,16 +67,18 @@ def test_the_night_from_which_it_grows_is_found() -> None:
     assert held >= 8
 
 
-def test_a_valve_that_stays_as_it_is_is_not_told_to_wear() -> None:
-    """Of 200 worn valves whose width stays, seen with an error and a half more than told, at most two are told."""
-    told = 0
+def test_a_valve_with_constant_width_is_not_reported_as_wearing() -> None:
+    """Of 200 worn valves with constant width and an error 1.5 times the stated one, at most two are reported as
+    wearing.
+    """
+    reported = 0
     for seed in range(200):
         seen = widths(np.full(60, 1.5), seed, deviation=0.09)
-        told += wear([(n, w, 0.06) for n, w, _ in seen], LIMITS) is not None
-    assert told <= 2
+        reported += wear([(n, w, 0.06) for n, w, _ in seen], LIMITS) is not None
+    assert reported <= 2
 
 
-def test_few_nights_and_a_valve_that_was_mended_tell_nothing() -> None:
+def test_few_nights_and_a_repaired_valve_show_no_wear() -> None:
     """Seven nights are too few; a width that falls is no wear."""
     assert wear(widths(growing(0.3, 0.05, 0, 7), 1), LIMITS) is None
     assert wear(widths(growing(3.0, -0.03, 10, 60), 1), LIMITS) is None
