@@ -1,4 +1,4 @@
-"""One small plant of coupled loops, run through the nightly batch once for all tests of what comes of it."""
+"""One small plant of coupled loops, run through the nightly batch once; several tests use its results."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from proofs.coupled.draw import draw
 
 @dataclass(frozen=True)
 class RunPlant:
-    """A store of one night, where its export lies, and the truth by loop."""
+    """A store of one night, the path of its export, and the truth by loop."""
 
     store: Path
     export: Path
@@ -29,8 +29,10 @@ class RunPlant:
 
 @pytest.fixture(scope="session")
 def run_plant(tmp_path_factory: pytest.TempPathFactory) -> RunPlant:
-    """Thirty loops over eight hours, a sticking valve among them that moves six others: made by the first process of
-    the suite that asks, for all of them."""
+    """Thirty loops over eight hours, with one sticking valve that moves six other loops.
+
+    The first test process that needs the plant makes it for all processes.
+    """
     own = tmp_path_factory.getbasetemp()
     folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "coupled"
     export, store, made = folder / "export.parquet", folder / "store", folder / "made"

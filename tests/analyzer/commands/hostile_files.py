@@ -1,6 +1,6 @@
-"""Files that came about by accident or were made to hurt, one a kind, none of them an export that can be assessed:
+"""Files that were damaged by accident or made as an attack, one of each kind; none is an export that can be assessed.
 
-python tests/analyzer/commands/hostile_files.py FOLDER writes them all.
+`python tests/analyzer/commands/hostile_files.py FOLDER` writes all of them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import pyarrow.parquet as pq
 from tests.analyzer.commands.workbooks import binary_book, open_book, open_row, packed
 
 KINDS: dict[str, Callable[[], bytes]] = {}
-"""File names, and what makes the bytes of each."""
+"""File names, and the function that makes the bytes of each."""
 ROWS = [f"2026-03-02 00:{k // 60:02d}:{k % 60:02d},{50 + k % 7},{40 + k % 5}" for k in range(300)]
 HEAD = "timestamp,FIC1.PV,FIC1.OP\n"
 TEXT = HEAD + "\n".join(ROWS) + "\n"
@@ -45,11 +45,11 @@ BOOK = {
     'openxmlformats.org/officeDocument/2006/relationships/sharedStrings" Target="sharedStrings.xml"/>'
     "</Relationships>",
 }
-"""Parts of a workbook beside its one sheet."""
+"""Parts of a workbook in addition to its one sheet."""
 
 
 def kind(name: str) -> Callable[[Callable[[], bytes]], Callable[[], bytes]]:
-    """Name the file whose bytes a function makes."""
+    """Register the file whose bytes a function makes."""
 
     def named(made: Callable[[], bytes]) -> Callable[[], bytes]:
         KINDS[name] = made
@@ -59,21 +59,21 @@ def kind(name: str) -> Callable[[Callable[[], bytes]], Callable[[], bytes]]:
 
 
 def texts(**of: str) -> None:
-    """Text files, by name with `_` for the point before the ending."""
+    """Text files; in each name, `_` replaces the point before the ending."""
     for name, text in of.items():
         stem, _, ending = name.rpartition("_")
         KINDS[f"{stem}.{ending}"] = lambda text=text: text.encode("utf-8", "surrogatepass")  # type: ignore
 
 
 def book(cells: str, **more: str) -> bytes:
-    """A workbook whose sheet holds some XML of rows."""
+    """A workbook whose sheet has the given XML of rows."""
     main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
     sheet = f'<?xml version="1.0"?><worksheet xmlns="{main}"><sheetData>{cells}</sheetData></worksheet>'
     return packed({**BOOK, "xl/worksheets/sheet1.xml": sheet, **more})
 
 
 def _members(data: bytes) -> dict[str, bytes]:
-    """What an archive holds, by name."""
+    """The members of an archive by name."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         return {name: archive.read(name) for name in archive.namelist()}
 
@@ -91,12 +91,12 @@ def table(columns: dict[str, object], **how: object) -> bytes:
 
 
 def stamps(rows: int, step_us: int = 1_000_000) -> np.ndarray:
-    """Stamps, a step apart."""
+    """Time stamps at a constant step."""
     return (START_US + step_us * np.arange(rows)).astype("datetime64[us]")
 
 
 def good() -> bytes:
-    """A whole Parquet export."""
+    """A complete Parquet export."""
     n = 300
     return table(
         {"timestamp": stamps(n), "FIC1.PV": np.arange(n) % 7 + 50.0, "FIC1.OP": np.arange(n) % 5 + 40.0}
@@ -429,7 +429,7 @@ def _() -> bytes:
 
 
 def _constant(rows: int, meta: dict[bytes, bytes] | None = None) -> bytes:
-    """Rows that are all alike, in next to no bytes."""
+    """Identical rows that compress to very few bytes."""
     out, block = io.BytesIO(), 10_000_000
     schema = pa.schema([("timestamp", pa.int64()), ("FIC1.PV", pa.float64())], meta)
     part = pa.table([pa.repeat(pa.scalar(START_US), block), pa.repeat(pa.scalar(1.0), block)], schema=schema)
@@ -496,7 +496,7 @@ def _() -> bytes:
 
 
 def written(folder: Path) -> Iterator[Path]:
-    """All files, written into a folder, and a folder and a link among them that lead nowhere."""
+    """All files, written into a folder, plus an empty folder, links without a target, and a missing path."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, made in KINDS.items():
         (folder / name).write_bytes(made())

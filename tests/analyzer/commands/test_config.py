@@ -1,4 +1,4 @@
-"""Limits come from one table, a file changes them, and what is wrong in it is told in one line."""
+"""Limits come from one table, a file changes them, and each error in the file is reported in one line."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from proofs.plant import START_S, Sketch, simulate, write_export
 from tests.reports.small_store import small_store
 
 TANK = Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5)
-"""A tank on a valve with play."""
+"""A tank on a valve with backlash."""
 READERS = ("run", "check", "tune", "explain", "simulate")
 """Commands that read an EXPORT (contract)."""
 CASES = [
@@ -41,22 +41,22 @@ CASES = [
 ]
 
 
-def asked(*arguments: str | Path) -> Result:
-    """What a command answers."""
+def run_command(*arguments: str | Path) -> Result:
+    """Result of a command."""
     return CliRunner().invoke(main, [*map(str, arguments)])
 
 
 @pytest.fixture(scope="module")
 def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Three hours of two tanks that cycle."""
+    """Three hours of two tanks that oscillate."""
     folder = tmp_path_factory.mktemp("config")
     trends = {name: simulate(TANK, 3.0, seed) for seed, name in enumerate(("LIC1", "LIC2"), 1)}
     return write_export(folder / "export.parquet", trends)
 
 
 def test_the_printed_defaults_are_the_defaults():
-    """`triage config` prints TOML that, read back, is the table of defaults again, each number with its comment."""
-    printed = asked("config").stdout
+    """`triage config` prints TOML that gives the default limits again when it is read; each number has a comment."""
+    printed = run_command("config").stdout
     stated = tomllib.loads(printed)
     assert configured(stated, "printed") == Config()
     names = {name for section in stated.values() for name in section}
@@ -66,25 +66,25 @@ def test_the_printed_defaults_are_the_defaults():
 
 
 def test_every_limit_has_unit_range_meaning_and_source():
-    """No limit is without unit, meaning and source, and every default lies in its range."""
+    """Each limit has a unit, a meaning and a source, and each default lies in its range."""
     for table in (getattr(Config(), section.name) for section in fields(Config)):
         for field in fields(table):
-            said, value = limit_of(field), getattr(table, field.name)
-            assert all((said.unit, said.meaning, said.source)), field.name
+            limit, value = limit_of(field), getattr(table, field.name)
+            assert all((limit.unit, limit.meaning, limit.source)), field.name
             numbers = [value] if isinstance(value, int | float) else [x for row in value for x in row[1:]]
-            assert all(said.least <= x <= said.most for x in numbers), field.name
+            assert all(limit.least <= x <= limit.most for x in numbers), field.name
 
 
-def test_sections_are_printed_in_their_own_words():
-    """What stands over a section's heading is what its own class says."""
+def test_sections_are_printed_with_the_description_of_their_class():
+    """The comment above the heading of a section is the description of its class."""
     printed = limits_document(Config())
-    said = re.findall(r"^# (.*)\n\[(\w+)\]$", printed, re.MULTILINE)
-    assert len({words for words, _ in said}) == len(said) == len(fields(Config))
-    assert ("What finding out about an export may cost before it is given up.", "opening") in said
+    descriptions = re.findall(r"^# (.*)\n\[(\w+)\]$", printed, re.MULTILINE)
+    assert len({words for words, _ in descriptions}) == len(descriptions) == len(fields(Config))
+    assert ("What finding out about an export may cost before it is given up.", "opening") in descriptions
 
 
 def test_a_file_changes_what_it_states_and_nothing_else(tmp_path: Path):
-    """A file with two limits gives the defaults but for these two; whole numbers stand for numbers."""
+    """A file with two limits changes only these two; whole numbers are accepted as numbers."""
     file = tmp_path / "limits.toml"
     file.write_text("[oscillation]\nperiods = 4\n[tuning]\nms_most = 1.8\n")
     found, default = read_config(file), Config()
@@ -98,7 +98,7 @@ def test_a_file_changes_what_it_states_and_nothing_else(tmp_path: Path):
 
 
 def test_a_byte_order_mark_changes_nothing(tmp_path: Path):
-    """A file as Notepad saves it, with a byte order mark, states what it states without."""
+    """A file with a byte order mark, as Notepad saves it, gives the same limits as without the mark."""
     text = "[oscillation]\nperiods = 3.5\n"
     plain, marked = tmp_path / "plain.toml", tmp_path / "marked.toml"
     plain.write_text(text, encoding="utf-8")
@@ -108,10 +108,12 @@ def test_a_byte_order_mark_changes_nothing(tmp_path: Path):
 
 @pytest.mark.parametrize(("text", "fragments"), CASES)
 def test_what_is_wrong_in_a_file_is_one_line(text, fragments, tmp_path: Path, export: Path):
-    """Unknown names, wrong types and values out of range are one line: seen, expected, remedy; exit status 2."""
+    """Unknown names, wrong types and values out of range give one line with value, expectation and remedy; exit
+    status 2.
+    """
     file = tmp_path / "limits.toml"
     file.write_text(text)
-    result = asked("check", export, "--config", file)
+    result = run_command("check", export, "--config", file)
     assert (result.exit_code, result.stdout) == (2, "")
     assert len(result.stderr.splitlines()) == 1
     assert "triage config" in result.stderr
@@ -120,9 +122,9 @@ def test_what_is_wrong_in_a_file_is_one_line(text, fragments, tmp_path: Path, ex
     )
 
 
-def test_a_file_that_is_not_there_is_one_line(tmp_path: Path, export: Path):
+def test_a_missing_file_is_one_line(tmp_path: Path, export: Path):
     """A missing file of limits is named in one line, exit status 2."""
-    result = asked("check", export, "--config", tmp_path / "none.toml")
+    result = run_command("check", export, "--config", tmp_path / "none.toml")
     assert result.exit_code == 2
     assert "none.toml" in result.stderr
     assert len(result.stderr.splitlines()) == 1
@@ -130,14 +132,16 @@ def test_a_file_that_is_not_there_is_one_line(tmp_path: Path, export: Path):
 
 @pytest.mark.parametrize("name", READERS)
 def test_commands_that_read_an_export_take_the_same_options(name):
-    """Loops, changes, span, time zone and limits can be stated to every command that reads an export (contract)."""
+    """Each command that reads an export has the options for loops, changes, span, time zone and limits (contract)."""
     options = {option for p in main.commands[name].params for option in p.opts}
     assert {"--loops", "--changes", "--since", "--until", "--timezone", "--config"} <= options
 
 
 @pytest.mark.slow
 def test_the_limits_reach_every_part_of_a_run(tmp_path: Path, export: Path):
-    """Limits of each part change what that part says of one export: quality, figures, oscillation, cause, advice."""
+    """Limits of each part change the result of that part for one export: quality, figures, oscillation, cause,
+    advice.
+    """
     plain = night(tmp_path, export, "")
     assert (plain["cause"], plain["status"]) == ("valve", "ok")
     assert night(tmp_path, export, "[quality]\nsamples = 100000")["status"] == "not assessed"
@@ -149,39 +153,41 @@ def test_the_limits_reach_every_part_of_a_run(tmp_path: Path, export: Path):
 
 
 def night(folder: Path, export: Path, text: str) -> dict[str, object]:
-    """The night's row of the first tank under some limits."""
+    """The row of the first tank under the given limits."""
     file, store = folder / "limits.toml", folder / "store"
     file.write_text(text)
-    asked("run", export, "--store", store, "--config", file, "--replace")
+    run_command("run", export, "--store", store, "--config", file, "--replace")
     row: dict[str, object] = Store(store).read("nights", Store(store).require()).to_pylist()[0]
     return row
 
 
 def test_tune_takes_its_limits(tmp_path: Path, export: Path):
-    """With a limit of play below what the valve has, tune says that it is beyond tuning; by default it is not."""
+    """With a backlash limit below the valve's backlash, `tune` reports it as beyond tuning; by default it does
+    not.
+    """
     loops = tmp_path / "loops.csv"
     loops.write_text("loop,type,pv_lo,pv_hi,kp,ti\nLIC1,level,0,100,0.9,40\n")
     file = tmp_path / "limits.toml"
     file.write_text("[tuning]\nband_beyond = 0.5\n")
     command = ("tune", export, "--loops", loops, "--loop", "LIC1")
-    assert "cannot compensate" not in asked(*command).stdout
-    assert "cannot compensate" in asked(*command, "--config", file).stdout
+    assert "cannot compensate" not in run_command(*command).stdout
+    assert "cannot compensate" in run_command(*command, "--config", file).stdout
 
 
 def test_report_takes_its_limits(tmp_path: Path):
-    """The report names the limits that it was made with, in its sentence on what is not compared."""
+    """The report states the limits that it was made with in its sentence on spans that are not compared."""
     store, file = small_store(tmp_path / "store", loops=8), tmp_path / "limits.toml"
     file.write_text("[before_after]\nload_pct = 7.5\n")
     change = ("--loop", "ТИК-1", "--changed", "2026-03-09T00:00Z", "--format", "markdown")
     for name, more in (("plain", ()), ("own", ("--config", file))):
-        assert asked("report", store.path, *change, *more, "--out", tmp_path / name).exit_code == 0
+        assert run_command("report", store.path, *change, *more, "--out", tmp_path / name).exit_code == 0
     plain, own = ((tmp_path / name / "before-after.md").read_text() for name in ("plain", "own"))
     assert "mean OP by over 10 %" in plain
     assert "mean OP by over 7.5 %" in own
 
 
 def test_explain_and_simulate_work_on_the_span_with_its_settings(export: Path):
-    """Of the second hour, with new settings typed in before and after it, they see that hour and the first ones."""
+    """For the second hour, both commands use only that hour, with the settings that were in force then."""
     hour = START_S + 3600.0, START_S + 7200.0
     changes = (
         TuningChange("LIC1", START_S + 60.0, kp_new=3.0),
@@ -199,12 +205,14 @@ def test_explain_and_simulate_work_on_the_span_with_its_settings(export: Path):
 
 
 def test_check_and_tune_take_a_span_of_time(export: Path):
-    """Of an hour of an export, check sees the samples of that hour; of none, tune says so in one line."""
+    """For one hour of an export, `check` uses the samples of that hour; for a span without samples, `tune` reports it
+    in one line.
+    """
     span = ("--since", "2026-03-02T00:00:00", "--until", "2026-03-02T01:00:00")
-    assert asked("check", export, *span).stdout.count("3600 samples every 1 s") == 2
-    nothing = asked("tune", export, "--loop", "LIC1", "--since", "2026-03-05")
+    assert run_command("check", export, *span).stdout.count("3600 samples every 1 s") == 2
+    nothing = run_command("tune", export, "--loop", "LIC1", "--since", "2026-03-05")
     assert nothing.exit_code == 2
     assert "no samples between --since and --until" in nothing.stderr
-    turned = asked("check", export, "--since", "2026-03-05", "--until", "2026-03-04")
+    turned = run_command("check", export, "--since", "2026-03-05", "--until", "2026-03-04")
     assert turned.exit_code == 2
     assert "swap them" in turned.stderr

@@ -1,4 +1,6 @@
-"""Hostile and accidental files through every command that reads an export, in two gigabytes: one line, in seconds."""
+"""Each command that reads an export handles damaged and malicious files within two gigabytes: one line, within
+seconds.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,7 @@ import pytest
 from tests.analyzer.commands.hostile_files import KINDS, written
 
 ROOT = Path(__file__).parents[3]
-ASK = """
+SCRIPT = """
 import json, resource, sys, time
 if __name__ == "__main__":
     resource.setrlimit(resource.RLIMIT_DATA, (2 << 30, 2 << 30))
@@ -31,26 +33,26 @@ if __name__ == "__main__":
 FEWEST = 60
 MOST_S = 10.0
 MARKS = ("Traceback", "panicked", "RUST_BACKTRACE", "terminate called", "an error of the program")
-"""What a program leaves that did not foresee its input, in any language."""
+"""Output that shows an unhandled error of a program, in any language."""
 
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
-    """One file a kind, and paths that are no files."""
+    """One file of each kind, and paths that are not files."""
     return [str(path) for path in written(tmp_path_factory.mktemp("hostile"))]
 
 
-def told(command: str, paths: list[str]) -> tuple[list[dict[str, Any]], str]:
-    """What a command says of each file, and what reached the terminal past Python."""
-    asked = [
+def results_of(command: str, paths: list[str]) -> tuple[list[dict[str, Any]], str]:
+    """The result of a command for each file, and the text that reached the terminal outside Python."""
+    arguments = [
         sys.executable,
         "-c",
-        ASK,
+        SCRIPT,
         command,
         paths[0],
         *paths,
     ]  # the first waits for the server of workers
-    done = subprocess.run(asked, cwd=ROOT, capture_output=True, text=True, check=False)
+    done = subprocess.run(arguments, cwd=ROOT, capture_output=True, text=True, check=False)
     return [json.loads(line) for line in done.stdout.splitlines()][1:], done.stderr
 
 
@@ -59,10 +61,12 @@ def told(command: str, paths: list[str]) -> tuple[list[dict[str, Any]], str]:
     "command",
     ["run", *(pytest.param(c, marks=pytest.mark.slow) for c in ("check", "tune", "explain", "test-plan"))],
 )
-def test_no_file_hurts(files: list[str], command: str) -> None:
-    """Of more than sixty kinds each ends with status 1 or 2, one line of an error at most, and within ten seconds."""
+def test_no_file_causes_a_crash(files: list[str], command: str) -> None:
+    """For each of more than sixty kinds, the exit status is 1 or 2, with at most one error line, within ten
+    seconds.
+    """
     assert len(KINDS) > FEWEST
-    answers, leaked = told(command, files)
+    answers, leaked = results_of(command, files)
     assert leaked == ""
     assert len(answers) == len(files)
     for a in answers:

@@ -1,4 +1,4 @@
-"""Workbooks of the kinds that no writer at hand makes: binary ones by MS-XLSB, open ones by ODF 1.3."""
+"""Workbooks of the kinds that no installed library writes: binary ones by MS-XLSB, open ones by ODF 1.3."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ BINARY = {
     f'package/2006/relationships"><Relationship Id="r1" Type="{RELATED}/worksheet" '
     'Target="worksheets/sheet1.bin"/></Relationships>',
 }
-"""Parts of a binary workbook beside its list of sheets and the one sheet."""
+"""Parts of a binary workbook in addition to its list of sheets and its one sheet."""
 Cell = tuple[int, int, float | str]
-"""Row and column from 0 on, and what is in it."""
+"""Row and column from 0 on, and the value."""
 
 
 def packed(members: Mapping[str, bytes | str], method: int = zipfile.ZIP_DEFLATED) -> bytes:
@@ -32,7 +32,9 @@ def packed(members: Mapping[str, bytes | str], method: int = zipfile.ZIP_DEFLATE
 
 
 def record(kind: int, data: bytes = b"") -> bytes:
-    """A record of a binary workbook: kind and length in seven bits a byte, the lowest first, then what it holds."""
+    """A record of a binary workbook: its kind and its length with seven bits in each byte, lowest first, then its
+    data.
+    """
     head = bytes([kind]) if kind < 128 else bytes([kind & 127 | 128, kind >> 7])
     size = len(data)
     while size > 127:
@@ -47,7 +49,7 @@ def counted(text: str) -> bytes:
 
 
 def binary_book(cells: Iterable[Cell]) -> bytes:
-    """An xlsb workbook of one sheet; cells in the order of their rows."""
+    """An xlsb workbook of one sheet; the cells are in the order of their rows."""
     sheets = (
         record(0x8F) + record(0x9C, struct.pack("<II", 0, 1) + counted("r1") + counted("Data")) + record(0x90)
     )
@@ -64,7 +66,7 @@ def binary_book(cells: Iterable[Cell]) -> bytes:
 
 
 def open_book(rows: str, name: str = "Data") -> bytes:
-    """An ods workbook of one sheet, given its rows."""
+    """An ods workbook of one sheet with the given rows."""
     spaces = " ".join(f'xmlns:{space}="{OASIS}{space}:1.0"' for space in ("office", "table", "text"))
     sheet = f'<table:table table:name="{name}">{rows}</table:table>'
     body = f"<office:body><office:spreadsheet>{sheet}</office:spreadsheet></office:body>"
@@ -75,7 +77,9 @@ def open_book(rows: str, name: str = "Data") -> bytes:
 
 
 def open_row(*cells: float | str | int, times: int = 1) -> str:
-    """A row of an ods sheet that stands for so many; of its cells text, numbers, and whole numbers of empty ones."""
+    """A row of an ods sheet that is repeated `times` times. A cell is a text or a number; a whole number is a count
+    of empty cells.
+    """
     held = "".join(map(_open_cell, cells))
     return f'<table:table-row table:number-rows-repeated="{times}">{held}</table:table-row>'
 

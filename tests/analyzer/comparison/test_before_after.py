@@ -1,4 +1,4 @@
-"""Before and after: verdicts are right where something changed and rare where nothing did."""
+"""Before and after: verdicts are right if something changed, and rare if nothing changed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ WEEK = 168
 
 
 def hours(factor: float = 1.0, seed: int = 0, **after: float) -> dict[str, np.ndarray]:
-    """Two weeks of hourly figures with noise; after the middle they are `factor` times as large."""
+    """Two weeks of hourly figures with noise; in the second week they are `factor` times as large."""
     rng = np.random.default_rng(seed)
     later = np.arange(2 * WEEK) >= WEEK
     found = {"hour_s": CHANGED_S + HOUR_S * (np.arange(2 * WEEK) - WEEK), "usable_h": np.ones(2 * WEEK)}
@@ -30,12 +30,12 @@ def hours(factor: float = 1.0, seed: int = 0, **after: float) -> dict[str, np.nd
 
 
 def compared(found: dict[str, np.ndarray]) -> list[ChangeVerdict]:
-    """Verdicts on the study's four."""
+    """Verdicts on the four primary figures."""
     return [c.verdict for c in compare("L", found, *spans_around(CHANGED_S, 7)).primary]
 
 
 def test_halved_figures_are_better() -> None:
-    """Figures that halve are called better, all four, and the interval holds the true change."""
+    """If all four figures halve, each is called better, and each interval contains the true change."""
     found = compare("L", hours(0.5), *spans_around(CHANGED_S, 7))
     assert [c.verdict for c in found.primary] == [ChangeVerdict.BETTER] * 4
     assert grade(found) == "clear"
@@ -57,12 +57,12 @@ def test_service_is_better_when_higher() -> None:
 
 
 def test_small_improvements_are_modest() -> None:
-    """An improvement of a tenth in all four is found and called modest."""
+    """An improvement of 10 % in all four figures is found and called modest."""
     assert grade(compare("L", hours(0.9), *spans_around(CHANGED_S, 7))) == "modest"
 
 
 @pytest.mark.parametrize(
-    ("column", "value", "said"),
+    ("column", "value", "fragment"),
     [
         ("sp_mean_pct", 60.0, "set point"),
         ("pv_mean_pct", 60.0, "PV level"),
@@ -72,16 +72,18 @@ def test_small_improvements_are_modest() -> None:
         ("at_limits_pct", 30.0, "limit"),
     ],
 )
-def test_incomparable_spans_are_not_counted(column: str, value: float, said: str) -> None:
-    """A week at another set point, level, load, mode, travel or at a limit gives no verdict, and says why."""
+def test_incomparable_spans_are_not_counted(column: str, value: float, fragment: str) -> None:
+    """A week with another set point, level, load, mode, set point travel or time at limits gives no verdict, with the
+    reason.
+    """
     found = compare("L", hours(0.5, **{column: value}), *spans_around(CHANGED_S, 7))
     assert {c.verdict for c in found.changes} == {ChangeVerdict.INCOMPARABLE}
-    assert any(said in reason for reason in found.reasons)
+    assert any(fragment in reason for reason in found.reasons)
     assert grade(found) == "incomparable"
 
 
-def test_a_loop_that_swung_to_its_limits_is_compared() -> None:
-    """OP at a limit for 30 % of the time is no reason against comparing where the loop swung all that week."""
+def test_a_loop_that_oscillated_to_its_limits_is_compared() -> None:
+    """OP at a limit for 30 % of the time does not prevent a comparison if the loop oscillated all that week."""
     found = hours(0.5)
     found["at_limits_pct"][:WEEK] = 30.0
     found["oscillating_pct"][:WEEK] = 100.0
@@ -91,15 +93,15 @@ def test_a_loop_that_swung_to_its_limits_is_compared() -> None:
 
 
 def test_too_little_time_is_not_counted() -> None:
-    """Two days after a change are too few, and the text says how many there are."""
+    """Two days after a change are too few, and the text states the number of days."""
     found = hours(0.5)
     cut = {k: v[: WEEK + 48] for k, v in found.items()}
     result = compare("L", cut, *spans_around(CHANGED_S, 7))
     assert result.reasons == ("too little time after: needs 3 usable days, has 2.0",)
 
 
-def test_a_reason_is_none_that_reads_like_enough() -> None:
-    """71.9 usable hours are told as 3.0 days, and 3 days are enough."""
+def test_days_that_round_to_the_minimum_are_enough() -> None:
+    """71.9 usable hours are reported as 3.0 days, and 3 days are enough."""
     found = hours(0.5)
     found["usable_h"][WEEK + 1 :] = 71.9 / (WEEK - 1)
     limits = replace(LIMITS, usable_share=0.0)
@@ -107,7 +109,7 @@ def test_a_reason_is_none_that_reads_like_enough() -> None:
 
 
 def test_gaps_are_left_out_of_the_means() -> None:
-    """Hours without a figure or without usable time do not pull a mean."""
+    """Hours without a figure or without usable time do not change a mean."""
     found = hours(1.0)
     name = "valve_travel_pct_per_h"
     found[name][10:30] = np.nan
@@ -119,20 +121,20 @@ def test_gaps_are_left_out_of_the_means() -> None:
 
 
 def test_means_weigh_usable_time() -> None:
-    """An hour of which half is usable counts half."""
+    """An hour that is half usable has half the weight."""
     side = Side(np.array([1.0, 4.0]), np.array([1.0, 0.5]))
     assert side.mean == pytest.approx(2.0)
 
 
 def test_other_changes_end_the_spans() -> None:
-    """Another change of the same loop ends the span that it falls into."""
+    """Another change of the same loop ends the span in which it happens."""
     before, after = spans_around(CHANGED_S, 7, [CHANGED_S - 86400.0, CHANGED_S + 2 * 86400.0])
     assert before == Span(CHANGED_S - 86400.0 + 3600.0, CHANGED_S)
     assert after == Span(CHANGED_S + 3600.0, CHANGED_S + 2 * 86400.0)
 
 
-def test_blocks_are_those_of_a_slow_twin() -> None:
-    """Replicates equal means of circular blocks summed one by one."""
+def test_blocks_agree_with_a_slow_reference() -> None:
+    """Replicates equal means of circular blocks that are summed one by one."""
     rng = np.random.default_rng(5)
     side = Side(rng.normal(size=60), rng.uniform(size=60))
     fast = replicates(side, np.random.default_rng(6))[:20]
@@ -157,7 +159,7 @@ def test_drift_widens_and_noise_hardly_does() -> None:
 
 
 def test_intervals_cover_the_truth() -> None:
-    """Over 300 pairs of weeks with slow noise of 24 h, a 95 % interval misses the true difference at most 5 %."""
+    """For 300 pairs of weeks with slow noise of 24 h, a 95 % interval misses the true difference in at most 5 %."""
     rng = np.random.default_rng(8)
     missed = 0
     for seed in range(300):
@@ -171,9 +173,9 @@ def test_intervals_cover_the_truth() -> None:
 
 
 def test_unchanged_plants_are_called_unchanged() -> None:
-    """Of 12 simulated plants in which nothing was changed, hardly a figure is called better or worse.
+    """Of 48 figures of 12 simulated plants without a change, at most two are called better or worse.
 
-    The whole proof, 200 plants, is proofs/honesty.py.
+    The complete proof, with 200 plants, is proofs/honesty.py.
     """
     found = [f for f, _ in examined(12, 1, first=5000)]
     calls = [c.verdict for f in found for c in f.primary]
@@ -182,7 +184,7 @@ def test_unchanged_plants_are_called_unchanged() -> None:
 
 
 def test_constant_figures_do_not_change() -> None:
-    """Figures that stand still, at zero or elsewhere, change neither way and raise nothing."""
+    """Figures that are constant, at zero or elsewhere, get no verdict of change and raise no error."""
     found = hours()
     for m in MEASURES:
         found[m.name] = np.full(2 * WEEK, 0.0 if m.primary else 5.0)
@@ -193,7 +195,7 @@ def test_constant_figures_do_not_change() -> None:
 
 
 def test_unknown_figures_are_left_out() -> None:
-    """A figure that is not known on one side is left out, never called better."""
+    """A figure that is unknown on one side is left out and never called better."""
     found = hours(0.5)
     found["variability_pct"][:WEEK] = np.nan
     assert "variability_pct" not in {
@@ -202,7 +204,7 @@ def test_unknown_figures_are_left_out() -> None:
 
 
 def test_shifting_time_changes_nothing() -> None:
-    """The same weeks a year of whole days later give the same answer."""
+    """The same weeks shifted by 365 whole days give the same result."""
     found = hours(0.8)
     moved = {**found, "hour_s": found["hour_s"] + 365 * 86400.0}
     one = compare("L", found, *spans_around(CHANGED_S, 7))
@@ -211,12 +213,14 @@ def test_shifting_time_changes_nothing() -> None:
 
 
 def test_equal_spans_have_no_reasons() -> None:
-    """Spans that are alike can be compared."""
+    """Two equal spans can be compared."""
     assert reasons_against(hours(), *spans_around(CHANGED_S, 7)) == ()
 
 
 def test_followers_name_their_source() -> None:
-    """The source that at least half of the oscillating nights name is the loop's; fewer name none."""
+    """A loop's source is the source that at least half of the oscillating nights name; otherwise the loop has
+    none.
+    """
     assert follows(["A", "A", None], [True, True, False]) == "A"
     assert follows(["A", None, None, None], [True] * 4) == ""
     assert follows(["A", "B", "A"], [True] * 3) == "A"

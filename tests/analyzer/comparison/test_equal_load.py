@@ -1,4 +1,4 @@
-"""Before and after on equal load: the part of the change is told from that of the load."""
+"""Before and after on equal load: the part of the change is separated from the part of the load."""
 
 from __future__ import annotations
 
@@ -40,14 +40,16 @@ AFTER = {
 
 
 def days(sketch: Sketch, seed: int) -> Trends:
-    """Some days of a sketch, every tenth second."""
+    """Four days of a sketch, every tenth second."""
     made = simulate(sketch, 24.0 * DAYS, seed)
     return Trends(*(getattr(made, name)[::10] for name in ("sp", "pv", "op", "stem")))
 
 
 @pytest.fixture(scope="module")
 def cases(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ChangeCase]:
-    """Three loops of four days before and after: load doubled alone; slowed under twice the load; worn, retuned."""
+    """Three loops, four days before and after: only the load doubled; slowed under twice the load; worn valve and
+    retuned.
+    """
     folder = tmp_path_factory.mktemp("equal")
     trends = {}
     for seed, (name, (before, after)) in enumerate(AFTER.items()):
@@ -68,12 +70,12 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ChangeCase]:
 
 
 def figure(case: ChangeCase, name: str) -> Change:
-    """A loop's primary change of a figure."""
+    """The primary change of a figure of a loop."""
     return next(c for c in case.found.primary if c.measure.name == name)
 
 
 def true_error(before: Sketch, after: Sketch) -> float:
-    """Log of the error's ratio of two loops under one load."""
+    """Logarithm of the ratio of the errors of two loops under the same load."""
     sizes = []
     for sketch in (before, after):
         made = simulate(replace(sketch, load_std=before.load_std), 24.0, 7)
@@ -81,8 +83,8 @@ def true_error(before: Sketch, after: Sketch) -> float:
     return math.log(sizes[1] / sizes[0])
 
 
-def test_a_load_that_doubles_is_not_the_changes_doing(cases: dict[str, ChangeCase]) -> None:
-    """Where neither settings nor valve changed and the load doubled, the change did nothing; the load is named."""
+def test_a_load_that_doubles_is_not_an_effect_of_the_change(cases: dict[str, ChangeCase]) -> None:
+    """If only the load doubled, the change has no effect on the error, and the load is named as the reason."""
     case = cases["DOUBLED"]
     assert grade(case.found) is Grade.SAME
     error = figure(case, "average_absolute_error_pct")
@@ -94,9 +96,11 @@ def test_a_load_that_doubles_is_not_the_changes_doing(cases: dict[str, ChangeCas
     assert "different load" in outcome(case.found)
 
 
-def test_the_part_of_new_settings_is_told_under_another_load(cases: dict[str, ChangeCase]) -> None:
-    """A loop slowed under twice the load: its travel is better and its error worse by its own part, which holds the
-    truth, and what is traded is not red."""
+def test_the_part_of_new_settings_is_reported_under_another_load(cases: dict[str, ChangeCase]) -> None:
+    """A loop is slowed under twice the load: its travel is better and its error worse by the part of the change.
+
+    The interval of that part contains the truth, and the error that was traded for travel is not red.
+    """
     case = cases["SLOWED"]
     error, travel = (figure(case, n) for n in ("average_absolute_error_pct", "valve_travel_pct_per_h"))
     assert any("different load" in reason for reason in case.found.reasons)
@@ -119,8 +123,10 @@ def test_the_part_of_new_settings_is_told_under_another_load(cases: dict[str, Ch
     assert kinds == {"better", "unclear"}
 
 
-def test_travel_is_the_stems_behind_a_worn_valve(cases: dict[str, ChangeCase]) -> None:
-    """Behind play the stem's travel is judged, its interval holds the truth, and OP's stands beside it."""
+def test_travel_of_a_worn_valve_is_that_of_the_stem(cases: dict[str, ChangeCase]) -> None:
+    """With backlash, the travel of the stem is compared and its interval contains the truth; the travel of OP is also
+    listed.
+    """
     case = cases["RETUNED"]
     stem = figure(case, "valve_travel_pct_per_h")
     assert "stem" in stem.measure.title
@@ -134,22 +140,23 @@ def test_travel_is_the_stems_behind_a_worn_valve(cases: dict[str, ChangeCase]) -
     assert stem.parts.promised.value == pytest.approx(stem.parts.change.value, abs=1.0)
 
 
-def test_remarks_are_said_once(cases: dict[str, ChangeCase]) -> None:
-    """What makes two weeks differ stands once in the table of figures, not in each row."""
+def test_remarks_are_written_once(cases: dict[str, ChangeCase]) -> None:
+    """The reason why two weeks differ is written once in the table of figures, and not in each row."""
     text = render(changes_page([cases["SLOWED"]], [], "test"))
     table = text.partition("## Figures before and after")[2]
     assert table.count("different load") == 1
 
 
 def simulated(value: float, deviation: float) -> EqualLoad:
-    """A simulated change of every figure by so much, under a load of nothing."""
+    """A simulated change of every figure by `value`, without an effect of the load."""
     of = dict.fromkeys(FIGURES, LogRatio(value, deviation))
     return EqualLoad(of, dict.fromkeys(FIGURES, NO_RATIO), of, NO_RATIO)
 
 
-def test_measured_and_simulated_are_weighed() -> None:
-    """In weeks that are alike a precise measurement outweighs the simulation; where both contradict each other the
-    interval holds both."""
+def test_measured_and_simulated_changes_are_weighted() -> None:
+    """In comparable weeks a precise measurement outweighs the simulation; if they contradict each other, the interval
+    contains both.
+    """
     limits = CONFIG.before_after
     found = parts_of(LogRatio(-0.5, 0.05), simulated(-0.4, 0.05), FIGURES[0], True, limits)
     assert found.change.value == pytest.approx(-0.5, abs=0.03)
@@ -162,8 +169,8 @@ def test_measured_and_simulated_are_weighed() -> None:
     assert other.left.value == pytest.approx(1.3)
 
 
-def test_what_unchanged_loops_did_is_a_reference() -> None:
-    """Six unchanged loops whose errors all rose by half make that the common change; four make none."""
+def test_changes_of_unchanged_loops_are_a_reference() -> None:
+    """Six unchanged loops whose errors all rose by half give the common change; four loops give none."""
     rng = np.random.default_rng(3)
     hours = []
     for _ in range(6):
@@ -184,10 +191,14 @@ def test_what_unchanged_loops_did_is_a_reference() -> None:
     assert reference(hours[:4], *spans) is None
 
 
-@pytest.mark.parametrize(("before", "said"), [("none", 1), ("check settings", 0)])
-def test_settings_that_were_never_typed_in_are_told(before: str, said: int) -> None:
-    """Nights whose OP follows other settings after a change alone say that it was not typed in; where OP did so
-    before too, the statement is wrong and no reason against comparing."""
+@pytest.mark.parametrize(("before", "count"), [("none", 1), ("check settings", 0)])
+def test_settings_that_were_never_typed_in_are_reported(before: str, count: int) -> None:
+    """If OP follows other settings only on the nights after a change, the report says that the change was not typed
+    in.
+
+    If OP follows other settings before the change too, the stated settings are wrong, and this does not prevent a
+    comparison.
+    """
     known = {"duration_s": DAY_S, "kp": None, "travel_of": "OP"}
     rows = [
         {**known, "start_s": DAY_S * k, "action": before if k < DAYS else "check settings"}
@@ -195,12 +206,14 @@ def test_settings_that_were_never_typed_in_are_told(before: str, said: int) -> N
     ]
     spans = Span(0.0, DAYS * DAY_S), Span(DAYS * DAY_S, 2 * DAYS * DAY_S)
     found = _evidence(rows, {}, TuningChange("L", DAYS * DAY_S), spans, CONFIG.before_after)
-    assert len(found.reasons) == said
+    assert len(found.reasons) == count
     assert found.simulated is None
 
 
-def test_the_proofs_loops_are_what_they_say() -> None:
-    """Of the proof's loops a third changes; a load that changes alone has no own part beyond that of 2 % in gain."""
+def test_the_loops_of_the_proof_change_as_stated() -> None:
+    """In the proof, one loop in three changes in load only: its part due to the change is below 0.05 and due to the
+    load above.
+    """
     found = changed(3, 6)
     assert [c.what in LOADS for c in found] == [False, True, False] * 2
     own = truth(found[1])["average_absolute_error_pct"]
@@ -215,19 +228,21 @@ def test_reports_are_written_as_text(cases: dict[str, ChangeCase], tmp_path: Pat
 
 
 def night(worn: bool, cycles: bool) -> LoopNight:
-    """A night of a loop whose valve has shown play, or not, and which cycles, or not."""
+    """A night of a loop with or without backlash of the valve and with or without a cycle."""
     flat = np.zeros(8)
     return LoopNight(
         None, 1.0, 2.0, 0.0, True, worn, 0.0, flat, flat, 86400.0, 0.1, 10.0, 0.0, 0.0, False, cycles
     )
 
 
-@pytest.mark.parametrize(("cycles", "cured"), [(False, True), (True, False)])
-def test_a_repair_is_seen_where_the_cycle_ended(cycles: bool, cured: bool) -> None:
-    """A play that is no longer seen is repaired where the loop came to rest; a cycle from outside, in which it
-    cannot be seen, proves no repair."""
+@pytest.mark.parametrize(("cycles", "repaired"), [(False, True), (True, False)])
+def test_a_repair_is_found_if_the_cycle_ended(cycles: bool, repaired: bool) -> None:
+    """A backlash that is no longer seen is repaired if the oscillation ended.
+
+    If an external disturbance continues the oscillation and hides the backlash, a repair is not proven.
+    """
     before, after = (night(True, True),) * 7, (night(False, cycles),) * 7
-    assert Weeks(before, after, Pid(1.0, 60.0), Pid(1.0, 60.0)).cured is cured
+    assert Weeks(before, after, Pid(1.0, 60.0), Pid(1.0, 60.0)).cured is repaired
 
 
 @pytest.mark.parametrize(
@@ -244,7 +259,9 @@ def test_a_repair_is_seen_where_the_cycle_ended(cycles: bool, cured: bool) -> No
     ],
 )
 def test_a_night_is_simulated_with_its_whole_controller(stated: LoopSpec, share: float) -> None:
-    """Derivative, filter, gap, range of OP and the gain in force are those of loops.csv, not a plain PI."""
+    """A night is simulated with the derivative, filter, gap, range of OP and gain in force of loops.csv, not with a
+    PI alone.
+    """
     terms = controller_columns(stated) | ({} if share == 1.0 else {"gain_share": share})
     names = ("loop", "pv_lo", "pv_hi", "kp", "ti", "form", "gain_unit", "ti_unit")
     row = {name: getattr(stated, name) for name in names}
@@ -252,4 +269,4 @@ def test_a_night_is_simulated_with_its_whole_controller(stated: LoopSpec, share:
     found = pid_of(row)
     assert found == controller(stated, 50.0, share)
     assert found is not None
-    assert found.error_form is stated.error_form  # the simulation asks for the member, not for its text
+    assert found.error_form is stated.error_form  # the simulation needs the enum member, not its text

@@ -1,4 +1,4 @@
-"""Explanations of simulated loops, fitted outright without the search for a name."""
+"""Explanations of simulated loops, fitted directly, without the search for a named effect."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ START_S = 1_772_409_600.0
 
 
 def of_loop(width: float, grid: float = 0.01, stated: float = 1.8) -> Case:
-    """A loop with play of that width, PV kept in steps of `grid` %, and a stated gain (1.8 is true)."""
+    """A loop with backlash of that width, a PV resolution of `grid` %, and a stated gain (1.8 is true)."""
     rng = np.random.default_rng(5)
     sp = 50 + np.repeat(rng.uniform(-7, 7, N // 120), 120)
     load = np.cumsum(rng.normal(0, 0.02, N)) + rng.normal(0, 0.08, N)
@@ -57,8 +57,8 @@ def of_loop(width: float, grid: float = 0.01, stated: float = 1.8) -> Case:
     return case(spec, (spec,), series, Config())
 
 
-def with_play(found: Explanation, width: float) -> Explanation:
-    """The explanation with play taken as its effect."""
+def with_backlash(found: Explanation, width: float) -> Explanation:
+    """The explanation with backlash as its effect."""
     row = next(r for r in CANDIDATES if r.name == "backlash")
     c = found.plain.model.c.copy()
     c[Slot.STICKBAND] = width
@@ -71,9 +71,9 @@ def with_play(found: Explanation, width: float) -> Explanation:
 @cache
 def explanation(kind: str) -> Explained:
     """An explanation with that verdict: backlash, none, quantization, controller-settings or unexplained."""
-    asked = of_loop(2.0 if kind == "backlash" else 0.0, 0.8 if kind == "quantization" else 0.01,
+    given = of_loop(2.0 if kind == "backlash" else 0.0, 0.8 if kind == "quantization" else 0.01,
                     1.0 if kind == "controller-settings" else 1.8)  # fmt: skip
-    s = asked.subject
+    s = given.subject
     assert s.sp is not None
     assert s.stated is not None
     inputs = inputs_of(s)
@@ -89,16 +89,16 @@ def explanation(kind: str) -> Explained:
         law=law,
     )
     if kind == "backlash":
-        found = with_play(found, 1.5)
+        found = with_backlash(found, 1.5)
     if kind == "unexplained":
         found = Explanation(p, plain, plain, left=99.0)
     found = replace(found, proof=held_out(found.p, found.plain, found.best))
-    said = answer(found, s)
+    answered = answer(found, s)
     model = {
         "loop": "A",
         "constants": {"K": 120.0, "T": 20.0, "L": 3.0},
         "level_pv_pct": 50.0,
         "middle_op_pct": 50.0,
     }
-    brought = judged(model, found, s) if kind == "backlash" else None
-    return Explained(asked, found, said, as_data(asked, said, brought), brought)
+    user_model = judged(model, found, s) if kind == "backlash" else None
+    return Explained(given, found, answered, as_data(given, answered, user_model), user_model)

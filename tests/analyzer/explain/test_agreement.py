@@ -1,4 +1,6 @@
-"""Verdict and explanation are told together: agreement, other kind, silence, contradiction, each in a sentence."""
+"""Verdict and explanation are reported together: agreement, other kind, no statement, contradiction, each in a
+sentence.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,7 @@ from analyzer.explain.words import TOLD, agreement, beside_night
 
 
 @pytest.mark.parametrize(
-    ("cause", "kind", "verdict", "block", "told"),
+    ("cause", "kind", "verdict", "block", "text"),
     [
         ("valve", "backlash", "backlash", "valve", "agree"),
         ("valve", "undecided", "stiction", "valve", "agree"),
@@ -20,28 +22,30 @@ from analyzer.explain.words import TOLD, agreement, beside_night
         ("none", "none", "valve-characteristic", "valve", "does not consider it"),
     ],
 )
-def test_each_pair_has_its_sentence(cause: str, kind: str, verdict: str, block: str, told: str) -> None:
-    """What one names and the other does not is said, with what would settle it."""
-    assert told in agreement({"cause": cause, "valve_fault": kind}, verdict, block)
+def test_each_pair_has_its_sentence(cause: str, kind: str, verdict: str, block: str, text: str) -> None:
+    """If only one of the two names a fault, the text says so, and how to settle it."""
+    assert text in agreement({"cause": cause, "valve_fault": kind}, verdict, block)
 
 
 @pytest.mark.parametrize("verdict", ["none", "unexplained", "load-step", "second-lag"])
 def test_no_valve_no_sentence(verdict: str) -> None:
-    """Where neither speaks of a valve nothing is added."""
+    """If neither the verdict nor the explanation concerns a valve, no sentence is added."""
     assert agreement({"cause": "tuning", "valve_fault": "none"}, verdict, "process") == ""
 
 
-def test_words_nobody_knows_do_no_harm() -> None:
-    """A store written by another version may hold a name that the catalogue lacks."""
+def test_an_unknown_name_of_an_effect_raises_no_error() -> None:
+    """A name that the catalogue does not contain, as from a store of another version, raises no error."""
     assert agreement({"cause": "none", "valve_fault": "none"}, "no such effect", "none") == ""
 
 
-@pytest.mark.parametrize(("block", "told"), [("valve", "calm_valve"), ("process", "calm")])
-def test_an_explanation_of_a_calm_loop_says_that_the_night_asks_for_nothing(block: str, told: str) -> None:
-    """Of a loop with nothing to do the explanation of a valve says why the night reports none, others that they are
-    about the model."""
+@pytest.mark.parametrize(("block", "text"), [("valve", "calm_valve"), ("process", "calm")])
+def test_an_explanation_of_a_loop_without_action_says_so(block: str, text: str) -> None:
+    """If the night has no action for a loop, the text for a valve effect says why the night reports none.
+
+    The text for other effects says that they concern the model.
+    """
     night = {"cause": "none", "action": "none", "valve_fault": "none", "lanes": None}
     assert (
         beside_night(night, "backlash" if block == "valve" else "second-lag", block)
-        == (TOLD["beside_verdict"][told])
+        == (TOLD["beside_verdict"][text])
     )

@@ -1,4 +1,4 @@
-"""A night's flagged loops are explained, whatever one of them does, and the answers are kept and shown."""
+"""The flagged loops of a night are explained although single loops fail, and the answers are stored and shown."""
 
 from __future__ import annotations
 
@@ -42,12 +42,14 @@ ROW = {"status": "ok", "oscillating_pct": 0.0, "cause": "none", "action": "none"
 
 @pytest.fixture
 def store(tmp_path: Path) -> Store:
-    """Two weeks of 30 made-up loops."""
+    """Two weeks of 30 invented loops."""
     return small_store(tmp_path / "store", hours=False, buckets=50)
 
 
-def told(q: FlaggedLoop) -> tuple[dict[str, Any], str]:
-    """An answer that needs no recording, without a page; the second nasty loop fails, the third abstains."""
+def stub_answer(q: FlaggedLoop) -> tuple[dict[str, Any], str]:
+    """An answer that needs no recording, without a page; the second nasty loop fails, and the third is not
+    explained.
+    """
     if q.spec.loop == NASTY[1]:
         raise ZeroDivisionError("broken")
     if q.spec.loop == NASTY[2]:
@@ -56,7 +58,7 @@ def told(q: FlaggedLoop) -> tuple[dict[str, Any], str]:
 
 
 class DyingWorkers:
-    """Workers of which every second dies over its task."""
+    """Workers of which every second one dies during its task."""
 
     def __init__(self, count: int, function: Callable[[FlaggedLoop], dict[str, Any]], limits: object) -> None:
         self.function, self.tasks = function, []
@@ -91,12 +93,12 @@ class DyingWorkers:
     ],
 )
 def test_flagged_loops_oscillate_or_have_cause_or_action(changed: dict[str, Any], worth: bool) -> None:
-    """A loop is explained where it oscillates, or has a cause or an action, and was assessed."""
+    """A loop is explained if it was assessed and oscillates, has a cause or has an action."""
     assert flagged(ROW | changed) is worth
 
 
-def test_worst_loop_comes_first_with_the_loop_that_leads_it(store: Store) -> None:
-    """Questions go by significance, and a follower brings its source's tags."""
+def test_worst_loop_comes_first_with_its_source_loop(store: Store) -> None:
+    """Loops are ordered by significance, and a follower also gets the tags of its source."""
     rows = [
         ROW | {"loop": tag, "cause": "load", "oscillation_significance": size, "source_loop": lead}
         for tag, size, lead in (("FIC0000", 1.0, None), ("FIC0001", 9.0, "FIC0000"))
@@ -109,8 +111,8 @@ def test_worst_loop_comes_first_with_the_loop_that_leads_it(store: Store) -> Non
 
 
 def test_one_failing_loop_never_stops_the_night(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A loop that breaks and one that abstains have their reason as answer; all others are explained."""
-    monkeypatch.setattr(explain_night, "_answer_and_page", told)
+    """A loop that fails has its error as answer, and all others are explained."""
+    monkeypatch.setattr(explain_night, "_answer_and_page", stub_answer)
     seen: list[tuple[int, int]] = []
     rows = explain_flagged(PLANT, store, NIGHT, progress=lambda *x: seen.append(x))
     by = {r["loop"]: r for r in known(store, NIGHT.name)}
@@ -121,9 +123,9 @@ def test_one_failing_loop_never_stops_the_night(store: Store, monkeypatch: pytes
     assert all(json.loads(r["answer"])["loop"] == r["loop"] for r in rows)
 
 
-def test_dead_worker_costs_its_loop_alone(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where every second worker dies, every second loop says so and the others have their answers."""
-    monkeypatch.setattr(explain_night, "_answer_and_page", told)
+def test_dead_worker_loses_only_its_loop(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    """If every second worker dies, every second loop reports it, and the other loops have their answers."""
+    monkeypatch.setattr(explain_night, "_answer_and_page", stub_answer)
     monkeypatch.setattr("analyzer.night.workers.Workers", DyingWorkers)
     rows = explain_flagged(PLANT, store, NIGHT, 2)
     dead = [r for r in rows if "SIGKILL" in r["reason"]]
@@ -131,8 +133,8 @@ def test_dead_worker_costs_its_loop_alone(store: Store, monkeypatch: pytest.Monk
 
 
 def test_resumed_night_keeps_what_it_has(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A stopped night goes on with the loops that have no answer yet."""
-    monkeypatch.setattr(explain_night, "_answer_and_page", told)
+    """A resumed night explains only the loops without an answer."""
+    monkeypatch.setattr(explain_night, "_answer_and_page", stub_answer)
     whole = explain_flagged(PLANT, store, NIGHT)
     keep(store, NIGHT.name, [whole[0] | {"reason": "kept"}])
     again = explain_flagged(PLANT, store, NIGHT, resume=True)
@@ -141,15 +143,17 @@ def test_resumed_night_keeps_what_it_has(store: Store, monkeypatch: pytest.Monke
 
 
 def test_failure_is_an_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An abstention's reason stands as it is, an error's with its kind."""
-    monkeypatch.setattr(explain_night, "_answer_and_page", told)
+    """The reason of a loop that is not explained is unchanged; an error is given with its type."""
+    monkeypatch.setattr(explain_night, "_answer_and_page", stub_answer)
     spec = {s.loop: s for s in SPECS}
-    ask = [answered(FlaggedLoop(EXPORT, spec[n], None, NIGHT, Config()))["reason"] for n in NASTY[1:3]]
-    assert ask == ["not explained: ZeroDivisionError: broken", "needs OP, has none"]
+    reasons = [answered(FlaggedLoop(EXPORT, spec[n], None, NIGHT, Config()))["reason"] for n in NASTY[1:3]]
+    assert reasons == ["not explained: ZeroDivisionError: broken", "needs OP, has none"]
 
 
 def test_loop_page_shows_the_explanation(store: Store) -> None:
-    """The loop's page has the explanation's sentence and what to look at, escaped; without one it has no section."""
+    """The page of a loop has the sentence of the explanation and what to check, escaped; without an explanation it
+    has no section.
+    """
     name = store.nights()[-1]
     before = {p.title: p for p in night_pages.pages_of_night(store, name, 8)}
     tag = next(t for t in before if t in tags(30))
@@ -166,8 +170,10 @@ def test_loop_page_shows_the_explanation(store: Store) -> None:
     assert evil not in render(after[tag], True)
 
 
-def test_kept_page_is_drawn_with_the_night(store: Store) -> None:
-    """The page that a night kept of an explanation is written beside the loop's, which links it; a broken one not."""
+def test_stored_page_is_written_with_the_night(store: Store) -> None:
+    """The stored page of an explanation is written with a link from the page of the loop; a broken stored page is not
+    written.
+    """
     name = store.nights()[-1]
     tag = next(t for t in {p.title: p for p in night_pages.pages_of_night(store, name, 8)} if t in tags(30))
     data = abstained(tag, "reason") | {"verdict": "backlash", "block": "valve"}

@@ -1,4 +1,4 @@
-"""The page and the text of an explanation say and show what the answer holds."""
+"""The page and the text of an explanation show the content of the answer."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def blocks(page: Page) -> list:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_kind_of_answer_has_a_whole_page(kind: str) -> None:
-    """Whatever the verdict, the page has its sentence, the recording, where the misfit lives and the fit."""
+    """For each verdict the page has its sentence, the recording, the place of the misfit and the fit."""
     e = explanation(kind)
     assert e.said.verdict == kind
     page = pages.explanation_page(e)
@@ -46,15 +46,17 @@ def test_each_kind_of_answer_has_a_whole_page(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", ["backlash", "quantization", "controller-settings"])
 def test_findings_have_a_picture(kind: str) -> None:
-    """Play, a coarse sensor and other settings are each drawn."""
+    """Backlash, a coarse sensor and other settings each have a plot."""
     page = pages.explanation_page(explanation(kind))
     section = next(s for s in page.sections if s.title == "What was found")
     plot = next(b for b in section.blocks if isinstance(b, Plot))
     assert all(np.isfinite(line.y).all() for line in plot.lines)
 
 
-def test_page_of_play_shows_both_models_and_the_users(tmp_path: Path) -> None:
-    """Plain, improved and brought simulation stand in trend and table, the improved one nearest to the recording."""
+def test_page_of_backlash_shows_both_models_and_the_user_model(tmp_path: Path) -> None:
+    """Baseline, improved and user's model are in trend and table, and the improved model is nearest to the
+    recording.
+    """
     e = explanation("backlash")
     page = pages.explanation_page(e)
     whole = next(b for b in blocks(page) if isinstance(b, Trend))
@@ -69,7 +71,7 @@ def test_page_of_play_shows_both_models_and_the_users(tmp_path: Path) -> None:
 
 
 def test_marked_spans_and_close_look_lie_in_the_recording() -> None:
-    """Spans that carry the misfit lie within the recording, and the close look is a part of it."""
+    """The marked spans of the misfit lie within the recording, and the close view is a part of it."""
     e = explanation("backlash")
     whole, closer = drawn_trends(e)
     first, last = whole.time_s[0], whole.time_s[0] + N
@@ -80,16 +82,16 @@ def test_marked_spans_and_close_look_lie_in_the_recording() -> None:
     assert closer.time_s.size == part.stop - part.start
 
 
-def test_where_tells_what_carries_play() -> None:
-    """Of play the answer tells features with their chances, and the keys of the contract are there."""
+def test_where_has_the_features_of_backlash() -> None:
+    """For backlash the answer contains features and the keys of the contract, and it is valid JSON."""
     where = explanation("backlash").data["where"]
     assert {"signals", "spans", "pv_range", "op_range", "direction", "band_s"} <= set(where)
     assert {f["name"] for f in where["features"]} >= {"pv_level", "op_level", "after_reversals"}
     assert json.loads(json.dumps(where)) == where
 
 
-def test_none_shows_what_was_held_out() -> None:
-    """Where nothing was found the plain loop still has a held-out misfit of its own, under 1 %."""
+def test_none_shows_the_held_out_misfit() -> None:
+    """If no effect was found, the baseline model still has its own held-out misfit, below 1 %."""
     fit = explanation("none").data["fit"]["baseline"]
     assert fit["held_out"]["rmse"] != fit["fitted"]["rmse"]
     assert fit["held_out"]["rmse"] < 1.0
@@ -97,7 +99,7 @@ def test_none_shows_what_was_held_out() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_text_is_narrow_and_without_raw_floats(kind: str) -> None:
-    """Text keeps within 112 columns and shows no number of more than six digits."""
+    """The text has at most 112 columns and no number of more than six digits."""
     text = answer_lines(explanation(kind).data)
     assert max(len(line) for line in text) <= 112
     assert not any(len(word.strip(".,;()").replace(".", "")) > 6 for line in text for word in line.split()
@@ -105,14 +107,14 @@ def test_text_is_narrow_and_without_raw_floats(kind: str) -> None:
 
 
 def test_narrow_intervals_keep_their_width() -> None:
-    """Ends that agree in three digits are shown with as many as tell them apart, an exact value with a dash."""
+    """The two ends of an interval are shown with enough digits to differ; an exact value is shown as a dash."""
     assert interval_text({"low": 1.0691, "high": 1.0704}) == "1.069 … 1.07"
     assert interval_text({"low": 1.0, "high": 2.0}) == "1 … 2"
     assert interval_text({"low": 3.0, "high": 3.0}) == "–"
 
 
-def test_a_number_that_one_effect_hides_is_shown_of_another() -> None:
-    """A supply's flow at rest is told as a number of its own, although physics of no name has one that is not."""
+def test_a_number_hidden_for_one_effect_is_shown_for_another() -> None:
+    """The flow at rest of a supply is shown, although another effect hides a number of that name."""
     numbers = {
         name: {"value": 8.0, "low": 6.0, "high": 10.0, "unit": "% OP"}
         for name in ("flow_at_rest_pct", "head_1")
@@ -121,14 +123,16 @@ def test_a_number_that_one_effect_hides_is_shown_of_another() -> None:
     assert [row[1].text for row in parameters(supply).rows] == ["Flow at rest"]
 
 
-@pytest.mark.parametrize(("after", "said"), [(1.001, "0 %"), (0.999, "0 %"), (1.5, "+50 %"), (0.5, "-50 %")])
-def test_changes_have_a_sign_unless_none(after: float, said: str) -> None:
-    """A change is in whole percent with its sign; nothing has none."""
-    assert change(1.0, after) == said
+@pytest.mark.parametrize(
+    ("after", "expected"), [(1.001, "0 %"), (0.999, "0 %"), (1.5, "+50 %"), (0.5, "-50 %")]
+)
+def test_changes_have_a_sign_unless_none(after: float, expected: str) -> None:
+    """A change is given in whole percent with its sign; zero has no sign."""
+    assert change(1.0, after) == expected
 
 
-def test_columns_line_up() -> None:
-    """Numbers end, and texts begin, at the same place in each row."""
+def test_columns_are_aligned() -> None:
+    """Numbers end at the same column in each row, and texts begin at the same column."""
     rows = lined_up([("a", "1.5", "short"), ("longer", "10", "words " * 40)], (1,))
     assert rows[0].index("short") == rows[1].index("words")
     assert rows[0].index("1.5") + 3 == rows[1].index("10") + 2
@@ -136,7 +140,7 @@ def test_columns_line_up() -> None:
 
 
 def test_abstention_has_a_page() -> None:
-    """Where nothing can be said the page says what is missing, in HTML and in Markdown."""
+    """If no explanation is possible, the page states what is missing, in HTML and in Markdown."""
     page = pages.abstention(abstained("A", "A: needs OP, has none"))
     assert "needs OP, has none" in render(page, True)
     assert "needs OP, has none" in as_markdown(page, "")

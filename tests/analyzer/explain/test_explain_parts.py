@@ -1,4 +1,4 @@
-"""A recording in which settings changed is explained in parts of one setting each."""
+"""A recording in which settings changed is explained in parts, each with constant settings."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from analyzer.night.opened import guarded
 from identification.estimation.problem import in_blocks
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
-from tests.analyzer.explain.test_explain import asked
+from tests.analyzer.explain.test_explain import run_command
 
 SPEC = LoopSpec("A", pv="A.PV", op="A.OP", kp=2.0, ti=50.0)
 N = 5000
@@ -48,7 +48,7 @@ def changed(at_s: float, kp_old: float, kp_new: float, loop: str = "A") -> Tunin
 
 
 def test_each_part_has_the_settings_of_its_time() -> None:
-    """Two changes make three parts, the longest first, each with the gain in force there, none sharing a sample."""
+    """Two changes give three parts, the longest first, each with the gain in force; no two parts share a sample."""
     found = parts(SPEC, trends(), (changed(3000, 1.0, 1.5), changed(4000, 1.5, 2.0)), "UTC")
     assert [(p.samples, p.spec.kp) for p in found] == [(3000, 1.0), (1000, 1.5), (1000, 2.0)]
     stamps = np.concatenate([p.series["A.OP"].stamp_s for p in found])
@@ -57,29 +57,31 @@ def test_each_part_has_the_settings_of_its_time() -> None:
 
 
 def test_changes_elsewhere_leave_one_part() -> None:
-    """Changes of other loops, or before and after the recording, part nothing, and nothing is said."""
+    """Changes of other loops, and changes before or after the recording, divide nothing, and no note is written."""
     outside = (changed(2000, 1.0, 1.5, "B"), changed(-5.0, 1.0, 2.0), changed(N + 10, 2.0, 3.0))
     found = parts(SPEC, trends(), outside, "UTC")
     assert [(p.samples, p.spec.kp) for p in found] == [(N, 2.0)]
     assert parts_said(found) == ""
 
 
-def test_scrap_is_left_out() -> None:
-    """A part too short to be judged is not held out, and the rest keeps its own settings."""
+def test_a_part_that_is_too_short_is_left_out() -> None:
+    """A part that is too short is left out, and the rest keeps its own settings."""
     found = parts(SPEC, trends(), (changed(N - PART_SAMPLES + 1, 1.0, 2.0),), "UTC")
     assert [(p.samples, p.spec.kp) for p in found] == [(N - PART_SAMPLES + 1, 1.0)]
 
 
-def test_dated_rows_of_loops_part_too() -> None:
-    """A row of loops.csv that is valid from within the recording parts it as a change does."""
+def test_dated_rows_of_loops_csv_divide_the_recording() -> None:
+    """A row of loops.csv with a start date within the recording divides it in the same way as a change."""
     spec = replace(SPEC, valid_from_s=2000.0, earlier=(replace(SPEC, kp=0.7),))
     found = parts(spec, trends(), (), "UTC")
     assert [(p.samples, p.spec.kp) for p in found] == [(3000, 2.0), (2000, 0.7)]
 
 
 @pytest.mark.parametrize("still", [0, 1, 2])
-def test_part_in_which_op_stands_still_is_left_out(tmp_path: Path, still: int) -> None:
-    """Of three parts the one with a still OP is neither explained nor held out, be it the longest; the rest are."""
+def test_part_with_constant_op_is_left_out(tmp_path: Path, still: int) -> None:
+    """Of three parts the one with a constant OP is neither explained nor held out, even if it is the longest; the
+    others are used.
+    """
     lengths, rng = (2500, 1500, 1000), np.random.default_rng(1)
     op = np.concatenate([np.cumsum(rng.normal(0, 0.1, n)) * (i != still) + 50 for i, n in enumerate(lengths)])
     stamp = pd.Timestamp("2026-03-02", tz="UTC") + pd.to_timedelta(np.arange(op.size), unit="s")
@@ -94,8 +96,10 @@ def test_part_in_which_op_stands_still_is_left_out(tmp_path: Path, still: int) -
 
 
 @pytest.mark.slow
-def test_play_is_proven_under_the_other_settings(tmp_path: Path) -> None:
-    """A play found under the old settings is held against the week under the new ones, and the answer names both."""
+def test_backlash_is_tested_under_the_other_settings(tmp_path: Path) -> None:
+    """A backlash found under the old settings is tested on the week with the new ones, and the answer mentions the
+    change.
+    """
     rng = np.random.default_rng(4)
     frames, at = [], pd.Timestamp("2026-03-02")
     for kp, ti in ((1.8, 20.0), (0.9, 40.0)):
@@ -113,11 +117,11 @@ def test_play_is_proven_under_the_other_settings(tmp_path: Path) -> None:
     (tmp_path / "changes.csv").write_text(
         "loop,time,kp_old,ti_old,kp_new,ti_new\nA,2026-03-02T01:06:40Z,1.8,20,0.9,40\n"
     )
-    status, said = asked(
+    status, text = run_command(
         "explain", tmp_path / "x.parquet", "--loops", tmp_path / "loops.csv", "--changes", tmp_path / "changes.csv",
         "--loop", "A", "--format", "json",
     )  # fmt: skip
-    answer = json.loads(said.splitlines()[-1])
+    answer = json.loads(text.splitlines()[-1])
     assert (status, answer["verdict"]) == (0, "backlash")
     assert answer["effects"][0]["parameters"]["backlash_pct"]["value"] == pytest.approx(2.0, rel=0.05)
     assert answer["held_out_on"][0]["share"] > 0.3
@@ -125,15 +129,17 @@ def test_play_is_proven_under_the_other_settings(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("most", "first", "count"), [(100_000, 100_000, 86_400), (40_000, 125_000, 15_000)])
-def test_a_long_recording_is_explained_where_its_night_fitted_the_valve(
+def test_a_long_recording_is_explained_on_the_stretch_that_its_night_fitted(
     most: int, first: int, count: int
 ) -> None:
-    """Of 186,400 s the last night, or the 15,000 s of it up to the end of the fitted stretch, in row 40,000."""
+    """Of 186,400 s, the last night is explained, or its 15,000 s up to the end of the stretch that the night
+    fitted.
+    """
     n = 186_400
     whole = prepare(SPEC, trends(n), Config().quality)
     window = in_blocks(np.zeros(3000), np.zeros(30_000), np.ones(3000, dtype=bool), 10.0, 10, first=10_000)
     verdict = SimpleNamespace(require_measured=SimpleNamespace(window=window))
-    part, said = stretch_of_night(whole, verdict, most)  # type: ignore[arg-type]
+    part, text = stretch_of_night(whole, verdict, most)  # type: ignore[arg-type]
     assert (len(latest_night(whole).record), len(part.record)) == (86_400, count)
     assert part.record.start_s == whole.record.start_s + first
-    assert f"{count} of {n} samples" in said
+    assert f"{count} of {n} samples" in text

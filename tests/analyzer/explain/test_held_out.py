@@ -1,4 +1,4 @@
-"""`explain --held-out`: what was found in one recording put to the proof on others of the same loop."""
+"""`explain --held-out`: a finding of one recording is tested on other recordings of the same loop."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import pytest
 
 from identification.mismatch.explanation import together
 from identification.mismatch.proof import Misfit
-from tests.analyzer.explain.test_explain import asked, export
+from tests.analyzer.explain.test_explain import export, run_command
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two recordings of a loop with play and one of the same loop after its linkage was mended."""
+    """Two recordings of a loop with backlash and one of the same loop after a repair of its linkage."""
     at = tmp_path_factory.mktemp("held")
     export(at, "week.parquet", 1, 2.0)
     export(at, "next.parquet", 2, 2.0)
@@ -23,60 +23,62 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return at
 
 
-def told(folder: Path, *others: str) -> dict:
-    """The answer for the first week, other recordings held out."""
+def answer_for(folder: Path, *others: str) -> dict:
+    """The answer for the first week, with other recordings held out."""
     words = [w for name in others for w in ("--held-out", folder / name)]
-    status, said = asked(
+    status, answer = run_command(
         "explain", folder / "week.parquet", *words, "--loops", folder / "loops.csv", "--loop", "A", "--format", "json"
     )  # fmt: skip
     assert status == 0
-    return json.loads(said.splitlines()[-1])
+    return json.loads(answer.splitlines()[-1])
 
 
-def test_play_carries_over_to_the_next_week(folder: Path) -> None:
-    """A play that is there in both weeks removes misfit in the week that was not fitted; the answer says how much."""
-    said = told(folder, "next.parquet")
-    assert said["verdict"] == "backlash"
-    (there,) = said["held_out_on"]
+def test_backlash_is_also_found_in_the_next_week(folder: Path) -> None:
+    """A backlash that both weeks contain reduces the misfit of the week that was not fitted, and the answer states by
+    how much.
+    """
+    answer = answer_for(folder, "next.parquet")
+    assert answer["verdict"] == "backlash"
+    (there,) = answer["held_out_on"]
     assert there["recording"] == "next.parquet"
     assert there["share"] > 0.1
     assert there["explained"]["rmse"] < there["baseline"]["rmse"]
-    assert said["effects"][0]["held_out_share"] == pytest.approx(there["share"])
-    assert said["fit"]["explained"]["held_out"]["rmse"] == pytest.approx(there["explained"]["rmse"])
+    assert answer["effects"][0]["held_out_share"] == pytest.approx(there["share"])
+    assert answer["fit"]["explained"]["held_out"]["rmse"] == pytest.approx(there["explained"]["rmse"])
 
 
 @pytest.mark.slow
-def test_what_does_not_carry_over_has_no_name(folder: Path) -> None:
-    """Where the other recording contradicts it nothing is told as found, and why is said."""
-    said = told(folder, "mended.parquet")
-    assert said["verdict"] == "unexplained"
-    assert said["effects"] == []
-    assert "backlash" in said["reason"]
-    assert "other recordings" in said["reason"]
+def test_an_effect_that_other_recordings_contradict_is_not_reported(folder: Path) -> None:
+    """If the other recording contradicts a finding, no effect is reported, and the reason is given."""
+    answer = answer_for(folder, "mended.parquet")
+    assert answer["verdict"] == "unexplained"
+    assert answer["effects"] == []
+    assert "backlash" in answer["reason"]
+    assert "other recordings" in answer["reason"]
 
 
 @pytest.mark.slow
-def test_page_and_text_tell_each_recording(folder: Path, tmp_path: Path) -> None:
-    """Text and page name every recording held out with both misfits."""
+def test_page_and_text_name_each_recording(folder: Path, tmp_path: Path) -> None:
+    """Text and page name each held-out recording."""
     common = ("--held-out", folder / "next.parquet", "--loops", folder / "loops.csv", "--loop", "A")
-    assert "next.parquet" in asked("explain", folder / "week.parquet", *common)[1]
-    asked("explain", folder / "week.parquet", *common, "--format", "html", "--out", tmp_path)
+    assert "next.parquet" in run_command("explain", folder / "week.parquet", *common)[1]
+    run_command("explain", folder / "week.parquet", *common, "--format", "html", "--out", tmp_path)
     (page,) = tmp_path.glob("*.html")
     assert "next.parquet" in page.read_text()
 
 
 def test_missing_recording_is_one_line(folder: Path) -> None:
-    """A held-out file that is not there ends in one line with status 2, before anything is computed."""
-    status, said = asked(
+    """A held-out file that does not exist ends in one line with status 2."""
+    status, answer = run_command(
         "explain", folder / "week.parquet", "--held-out", folder / "gone.parquet", "--loops", folder / "loops.csv",
         "--loop", "A",
     )  # fmt: skip
     assert status == 2
-    assert "gone.parquet" in said
+    assert "gone.parquet" in answer
 
 
 def test_misfits_add_up_by_their_squares() -> None:
-    """Misfits of two recordings together are those of the two stacked."""
+    """The combined misfit of two recordings equals the misfit of both recordings joined."""
     rng = np.random.default_rng(1)
     moves = [rng.normal(0, 3, 500), rng.normal(0, 1, 1500)]
     left = [rng.normal(0, 1, 500), rng.normal(0, 0.5, 1500)]

@@ -1,4 +1,4 @@
-"""The measured load that loops.csv states is what an explanation tries first."""
+"""An explanation tries the measured load that loops.csv states first."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from analyzer.loops.tags import match
 
 
 def loaded(n: int = 5400) -> pd.DataFrame:
-    """A PI loop on a lag of 60 s whose load is measured as FT9, behind a lag of 20 s; a sample a second."""
+    """A PI loop on a lag of 60 s, with a measured load FT9 that acts through a lag of 20 s; one sample a second."""
     rng = np.random.default_rng(4)
     rows, load, felt, x, total = np.empty((n, 4)), 0.0, 0.0, 50.0, 50.0
     for k in range(n):
@@ -32,24 +32,31 @@ def loaded(n: int = 5400) -> pd.DataFrame:
     return table
 
 
-def test_a_measured_load_explains_what_it_does(tmp_path: Path) -> None:
-    """With the load stated as upstream the explanation names it and its lag; without, it does not know of it."""
+def test_a_measured_load_is_named_with_its_lag(tmp_path: Path) -> None:
+    """If loops.csv states the load as upstream, the explanation names it and its lag; otherwise it does not."""
     loaded().to_csv(tmp_path / "x.csv", index=False, float_format="%.3f")
-    said = []
+    answers = []
     for upstream in ("FT9", ""):
         (tmp_path / "loops.csv").write_text(
             f"loop,kp,ti,pv_lo,pv_hi,upstream\nTIC1,0.8,60,0,100,{upstream}\n"
         )
-        asked = ["explain", str(tmp_path / "x.csv"), "--loops", str(tmp_path / "loops.csv"), "--loop", "TIC1"]
-        said.append(json.loads(CliRunner().invoke(main, [*asked, "--format", "json"]).stdout))
-    (effect,) = said[0]["effects"]
+        arguments = [
+            "explain",
+            str(tmp_path / "x.csv"),
+            "--loops",
+            str(tmp_path / "loops.csv"),
+            "--loop",
+            "TIC1",
+        ]
+        answers.append(json.loads(CliRunner().invoke(main, [*arguments, "--format", "json"]).stdout))
+    (effect,) = answers[0]["effects"]
     assert effect["name"] == "coupling"
     assert 15.0 < effect["parameters"]["coupling_lag_s"]["value"] < 25.0
-    assert said[1]["verdict"] != "coupling"
+    assert answers[1]["verdict"] != "coupling"
 
 
-def test_an_upstream_of_another_plant_is_told() -> None:
-    """A loop stands for its PV; a name that is neither loop nor tag is told."""
+def test_an_unknown_upstream_is_reported() -> None:
+    """An upstream loop is replaced by its PV tag; a name that is neither loop nor tag is reported."""
     stated = (LoopSpec("A", upstream="B"), LoopSpec("B", upstream="C"))
     (a, b), notes = match(stated, ["A.PV", "B.PV"])
     assert (a.load, b.load) == ("B.PV", None)

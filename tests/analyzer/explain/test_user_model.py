@@ -1,4 +1,4 @@
-"""The user's own model is judged in one line, and wrong units are told."""
+"""The user's own model is judged in one line, and wrong units are reported."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def model(gain: float = 1.2, lag_s: float = 20.0, dead_s: float = 3.0) -> dict:
 
 
 @pytest.fixture(scope="module")
-def asked() -> tuple[Explanation, Recording]:
-    """A plain loop of gain 1.2, time constant 20 s and dead time 3 s, with its plain fit."""
+def baseline_fit() -> tuple[Explanation, Recording]:
+    """A loop of gain 1.2, time constant 20 s and dead time 3 s with an ideal valve, and its baseline fit."""
     rng = np.random.default_rng(1)
     sp = 50 + np.repeat(rng.uniform(-7, 7, N // 150), 150)
     r = closed_loop(Loop(Fopdt(1.2, 20.0, 3.0), Pid(1.8, 20.0)), sp, rng.normal(0, 0.1, N))
@@ -52,16 +52,18 @@ def asked() -> tuple[Explanation, Recording]:
     return carried_over(Explanation(p, plain, plain)), s
 
 
-def test_right_model_does_as_well(asked: tuple[Explanation, Recording]) -> None:
-    """The true model leaves the noise, 0.1 %, as the refitted plain loop does, and no unit is doubted."""
-    own = judged(model(), *asked)
+def test_right_model_does_as_well(baseline_fit: tuple[Explanation, Recording]) -> None:
+    """The true model leaves the noise of 0.1 % as residual, as the refitted baseline does, and no unit is
+    questioned.
+    """
+    own = judged(model(), *baseline_fit)
     assert own.held_out.rmse == pytest.approx(0.1, rel=0.1)
     assert "it is as good as the baseline model" in own.note
     assert "off" not in own.note
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "expected"),
     [
         (model(gain=120.0), "100 times off"),
         (model(gain=0.012), "100 times off"),
@@ -70,13 +72,17 @@ def test_right_model_does_as_well(asked: tuple[Explanation, Recording]) -> None:
         (model(gain=-1.2), "another sign"),
     ],
 )
-def test_wrong_units_are_told(asked: tuple[Explanation, Recording], wrong: dict, said: str) -> None:
-    """Gain off by a hundred, minutes for seconds and a turned sign are each told in the one line."""
-    assert said in judged(wrong, *asked).note
+def test_wrong_units_are_reported(
+    baseline_fit: tuple[Explanation, Recording], wrong: dict, expected: str
+) -> None:
+    """A gain wrong by a factor of a hundred, minutes instead of seconds, and a wrong sign are each reported in the
+    one line.
+    """
+    assert expected in judged(wrong, *baseline_fit).note
 
 
 def test_refits_are_not_called_wrong_units() -> None:
-    """Gains and time constants within a factor of ten are a matter of fit, not of units."""
+    """Gains and time constants within a factor of ten are differences of the fit and not of units."""
     c = neutral()
     for gain, lag in ((0.15, 3.0), (11.0, 190.0), (1.2, 20.0)):
         c[Slot.K], c[Slot.T] = gain, lag
@@ -84,20 +90,20 @@ def test_refits_are_not_called_wrong_units() -> None:
 
 
 def test_ratios_count_both_ways() -> None:
-    """A ratio and its inverse are the same mistake; zero is none."""
+    """A ratio and its inverse are the same mistake; a ratio of zero is no mistake."""
     assert within(100.0, (60, 160))
     assert within(-0.01, (60, 160))
     assert not within(0.0, (60, 160))
 
 
 def test_comparison_has_three_outcomes() -> None:
-    """Worse, as well and better are told apart at a twentieth."""
-    said = [against_plain(x, 1.0, AS_GOOD).split()[2] for x in (1.06, 1.04, 0.94)]
-    assert said == ["worse", "as", "better"]
+    """The results worse, equal and better are separated at 5 %."""
+    expected = [against_plain(x, 1.0, AS_GOOD).split()[2] for x in (1.06, 1.04, 0.94)]
+    assert expected == ["worse", "as", "better"]
 
 
-def test_only_the_plain_part_of_a_model_starts_the_search() -> None:
-    """Play in a brought model does not enter the plain loop that it is compared with."""
+def test_only_the_baseline_part_of_a_model_starts_the_search() -> None:
+    """Backlash in a user's model does not enter the baseline model that it is compared with."""
     data = model() | {"constants": {"K": 1.0, "T": 5.0, "L": 1.0, "STICKBAND": 3.0}}
     c = plain_start(data)
     assert c[Slot.STICKBAND] == 0.0
@@ -120,7 +126,7 @@ def test_only_the_plain_part_of_a_model_starts_the_search() -> None:
     ],
 )
 def test_unusable_models_are_one_line(tmp_path: Path, text: str) -> None:
-    """A file that is no model, another loop's, or holds no number where one belongs is refused with what to do."""
+    """A file that is not a model, belongs to another loop, or has an invalid number is refused in one line."""
     path = tmp_path / "m.json"
     path.write_text(text)
     with pytest.raises(InputError) as refused:
@@ -128,8 +134,8 @@ def test_unusable_models_are_one_line(tmp_path: Path, text: str) -> None:
     assert "\n" not in str(refused.value)
 
 
-def test_percent_means_to_a_model_what_it_meant_when_it_was_fitted() -> None:
-    """A model fitted where the recorded range was 20 to 60 keeps it over a recording that reaches from 30 to 40."""
+def test_a_model_keeps_the_ranges_of_its_fit() -> None:
+    """A saved model keeps the range of its fit, 20 to 60, although the new recording has a range of 30 to 40."""
     now = Scale(30.0, 10.0, 0.0, 100.0, recorded=True)
     kept = {"scale": {"pv_low": 20.0, "pv_span": 40.0, "op_low": 0.0, "op_span": 10.0}}
     assert saved_scale(kept, now) == Scale(20.0, 40.0, 0.0, 10.0, recorded=True)

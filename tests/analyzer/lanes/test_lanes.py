@@ -1,4 +1,4 @@
-"""Loops that need a look without oscillating: each lane with its figure, its clause and what it asks for."""
+"""Loops that need attention without an oscillation: each lane with its figure, its clause and its action."""
 
 from __future__ import annotations
 
@@ -24,8 +24,10 @@ HOURS = 6
 
 
 def trends(kp: float = 2.0, seed: int = 0, ramp: float = 0.0) -> dict[str, np.ndarray]:
-    """Six hours of a PI loop (lag 60 s, dead time 10 s, Ti 60 s) under a load that wanders, and that moves by a ramp
-    of some size in the third hour; OP from its own law."""
+    """Six hours of a PI loop (lag 60 s, dead time 10 s, Ti 60 s) under a drifting load; OP follows its control law.
+
+    In the third hour the load also moves by a ramp of size `ramp`.
+    """
     rng = np.random.default_rng(seed)
     n = HOURS * 3600
     walk = np.convolve(rng.normal(size=n + 599), np.ones(600) / 120.0, "valid")
@@ -45,7 +47,7 @@ def row_of(
     every_s: float = 1.0,
     **extra: np.ndarray,
 ) -> dict[str, object]:
-    """The night's row of a loop of these trends."""
+    """The row of one night for a loop with these trends."""
     stamp = START_S + every_s * np.arange(values["pv"].size, dtype=float)
     found = {f"L.{role.upper()}": series(stamp, x) for role, x in {**values, **extra}.items()}
     stated = replace(stated, kp=kp, mode="L.MODE" if "mode" in extra else None)
@@ -60,13 +62,15 @@ def lanes(row: dict[str, object]) -> set[str]:
     return set(str(row["lanes"] or "").split(", ")) - {""}
 
 
-def test_a_good_loop_stands_in_no_lane() -> None:
-    """Swift control of a wandering load is in no lane, whatever the noise."""
+def test_a_good_loop_is_in_no_lane() -> None:
+    """Fast control of a drifting load is in no lane, for four draws of the noise."""
     assert [lanes(row_of(trends(seed=s))) for s in range(4)] == [set()] * 4
 
 
 def test_a_small_gain_is_sluggish() -> None:
-    """The same loop at a tenth of the gain lets errors stand for integral times, and says so."""
+    """At a tenth of the gain, errors of the same loop last several integral times, and the loop is reported as
+    sluggish.
+    """
     row = row_of(trends(0.2), 0.2)
     assert lanes(row) == {Lane.SLUGGISH}
     assert "sluggish" in str(row["reason"])
@@ -75,8 +79,9 @@ def test_a_small_gain_is_sluggish() -> None:
 
 @pytest.mark.parametrize("ramp", [60.0, -120.0])
 def test_a_ramp_of_the_load_is_not_sluggish(ramp: float) -> None:
-    """While the load is on a ramp the error is constant, for any PI loop: a change of throughput makes none
-    sluggish."""
+    """During a ramp of the load the error of any PI loop is constant: a change of throughput makes no loop
+    sluggish.
+    """
     row = row_of(trends(ramp=ramp))
     memory = row["error_memory_ti"]
     assert isinstance(memory, float)
@@ -85,14 +90,14 @@ def test_a_ramp_of_the_load_is_not_sluggish(ramp: float) -> None:
 
 
 def test_a_loop_at_its_set_point_is_not_sluggish() -> None:
-    """Slow errors of a hundredth of the same size, which no transmitter tells from none, put a loop in no lane."""
+    """Slow errors of a hundredth of that size, below the resolution of a transmitter, put a loop in no lane."""
     values = trends(0.2)
     small = {"sp": values["sp"], "pv": 50.0 + 0.01 * (values["pv"] - 50.0), "op": values["op"]}
     assert Lane.SLUGGISH not in lanes(row_of(small, 0.2))
 
 
 def test_a_loop_within_its_noise_is_not_sluggish() -> None:
-    """Slow errors under PV's own noise, at samples too far apart to average it, are none that a gain would mend."""
+    """Slow errors below the noise of PV, with samples too far apart for averaging, are not reported as sluggish."""
     values = {role: x[::12] for role, x in trends(0.2).items()}
     noise = np.random.default_rng(1).normal(scale=0.9 * (values["pv"] - 50.0).std(), size=values["pv"].size)
     row = row_of({**values, "pv": values["pv"] + noise}, 0.2, every_s=12.0)
@@ -101,9 +106,12 @@ def test_a_loop_within_its_noise_is_not_sluggish() -> None:
 
 
 @pytest.mark.parametrize(("share", "sluggish"), [(0.1, 7), (1.0, 0)])
-def test_a_process_that_bears_far_more_gain_is_told(share: float, sluggish: int) -> None:
-    """Of ten temperatures whose set point steps, at a tenth of SIMC's gain seven or more are sluggish, at SIMC's own
-    none: errors that last, and a process that bears more gain, are two signs."""
+def test_a_process_that_allows_far_more_gain_is_reported(share: float, sluggish: int) -> None:
+    """Of ten temperatures with set point steps, at least seven are sluggish at a tenth of SIMC's gain, and none at
+    SIMC's gain.
+
+    Lasting errors and a process that allows more gain are two separate signs.
+    """
     found = []
     for seed in range(10):
         rng = np.random.default_rng(100 + seed)
@@ -119,7 +127,9 @@ def test_a_process_that_bears_far_more_gain_is_told(share: float, sluggish: int)
 
 
 def test_compression_is_not_sluggish() -> None:
-    """A trend that a historian drew straight is slow by its recorder, and is not called sluggish."""
+    """A trend that a historian stores as straight lines is slow because of its recorder, and is not called
+    sluggish.
+    """
     good = trends()
     kept = np.arange(0, good["pv"].size, 300)
     pv = np.interp(np.arange(good["pv"].size), kept, good["pv"][kept])
@@ -127,15 +137,17 @@ def test_compression_is_not_sluggish() -> None:
 
 
 def test_a_loop_in_manual_has_its_lane_though_it_is_not_assessed() -> None:
-    """In manual all night: not assessed, needs time in automatic, and found under `--lane manual`."""
+    """A loop in manual all night is not assessed, needs time in automatic, and is in the lane manual."""
     good = trends()
     row = row_of(good, mode=np.zeros(good["pv"].size))
     assert (row["status"], row["action"]) == (Status.NOT_ASSESSED, Action.NEEDS_DATA)
     assert (lanes(row), row["manual_pct"]) == ({Lane.MANUAL}, 100.0)
 
 
-def test_a_lasting_error_asks_for_the_measurement() -> None:
-    """PV 20 % of span beside SP in automatic with OP free: check the measurement, and on which side it lies."""
+def test_a_lasting_error_leads_to_a_check_of_the_measurement() -> None:
+    """With PV 20 % of span below SP in automatic and OP free, the action is to check the measurement, and the side is
+    stated.
+    """
     good = trends()
     row = row_of({**good, "sp": good["sp"] + 20.0})
     assert Lane.LASTING_ERROR in lanes(row)
@@ -145,7 +157,9 @@ def test_a_lasting_error_asks_for_the_measurement() -> None:
 
 
 def test_op_at_its_limit_explains_the_error() -> None:
-    """With OP at 100 % all night the lasting error is the limit's, and the measurement is left alone."""
+    """With OP at 100 % all night, the limit explains the lasting error, and no check of the measurement is
+    advised.
+    """
     good = trends()
     row = row_of({**good, "sp": good["sp"] + 20.0, "op": np.full(good["op"].size, 100.0)})
     assert {Lane.AT_LIMIT, Lane.LASTING_ERROR} <= lanes(row)
@@ -153,8 +167,8 @@ def test_op_at_its_limit_explains_the_error() -> None:
     assert "upper limit" in str(row["reason"])
 
 
-def test_a_frozen_measurement_is_told() -> None:
-    """PV that stands for an hour while OP moves is frozen."""
+def test_a_frozen_measurement_is_reported() -> None:
+    """PV that is constant for an hour while OP moves is frozen."""
     good = trends()
     pv = good["pv"].copy()
     pv[7200:10800] = pv[7200]
@@ -164,8 +178,8 @@ def test_a_frozen_measurement_is_told() -> None:
     assert row["action"] == Action.CHECK_MEASUREMENT
 
 
-def test_without_op_nothing_is_said_of_op() -> None:
-    """Without OP the lanes that rest on it are empty figures, no zeros."""
+def test_without_op_no_figures_of_op_are_reported() -> None:
+    """Without OP the lanes that need OP have empty figures and not zeros."""
     row = row_of({k: v for k, v in trends().items() if k != "op"})
     assert [row[FIGURE[lane]] for lane in (Lane.MANUAL, Lane.AT_LIMIT, Lane.FROZEN, Lane.TRAVEL)] == [
         None
@@ -173,14 +187,14 @@ def test_without_op_nothing_is_said_of_op() -> None:
 
 
 def made(loop: str, lanes: str, loss: float | None, significance: float = 0.0) -> dict[str, object]:
-    """A row as the list sorts it."""
+    """A row with the columns that the list sorts by."""
     figures = {"oscillation_significance": significance, "loss": loss, "importance": loss, "cause": "none"}
     figures |= {"due": None}
     return {"loop": loop, "lanes": lanes or None, **figures}
 
 
 def test_losses_order_the_list_where_importance_is_stated() -> None:
-    """A loop at its limit with the largest loss comes first; what needs no look comes last."""
+    """A loop at its limit with the largest loss comes first; a loop without a lane comes last."""
     rows = [
         made("A", "oscillation", 5.0, 40.0),
         made("B", "", 9.0),
@@ -190,7 +204,7 @@ def test_losses_order_the_list_where_importance_is_stated() -> None:
 
 
 def test_without_importance_oscillation_comes_first() -> None:
-    """Without importances: oscillating loops by significance, then the other lanes, then the rest."""
+    """Without importances, oscillating loops come first by significance, then the other lanes, then the rest."""
     rows = [made("A", "manual", None), made("B", "", None), made("C", "oscillation", None, 3.0)]
     assert [r["loop"] for r in worst_first([*rows, made("D", "oscillation", None, 8.0)])] == [
         "D",
@@ -200,8 +214,8 @@ def test_without_importance_oscillation_comes_first() -> None:
     ]
 
 
-def test_a_failed_loop_asks_for_nothing() -> None:
-    """What failed has no action; its reason stands."""
+def test_a_failed_loop_has_no_action() -> None:
+    """A failed loop has no action, and its reason is unchanged."""
     failed = Finding(
         "L", "2026-03-02", Status.FAILED, Requirement(None, RequirementKind.AS_TOLD, ("ValueError: x",))
     )
@@ -209,8 +223,8 @@ def test_a_failed_loop_asks_for_nothing() -> None:
     assert (done["action"], done["reason"], done["lanes"]) == (None, "ValueError: x", None)
 
 
-def test_an_op_that_rests_at_its_limit_is_not_nothing_to_do():
-    """A loop that the first lines say to look at has no action 'none', and its page says what to look for."""
+def test_an_op_at_its_limit_has_an_action():
+    """A loop with OP at its limit gets the action `check limit` and not `none`, and its page states what to check."""
     row = {"status": "ok", "action": "none", "cause": "none", "loop": "TIC1", "lanes": "at limit"}
     lanes = (Lane.AT_LIMIT, Lane.LASTING_ERROR)
     idle = Finding("TIC1", "2026-03-02", Status.OK, remedy=Remedy(Action.NONE))

@@ -1,4 +1,4 @@
-"""Notes on loops: kept line by line, shown where the loop is, hiding it only while they say so."""
+"""Notes on loops are stored line by line, shown with the loop, and hide it only until the stated date."""
 
 from __future__ import annotations
 
@@ -22,23 +22,25 @@ def store(tmp_path: Path) -> Store:
     return small_store(tmp_path / "store", loops=12, nights=3)
 
 
-def asked(*arguments: object) -> Result:
-    """An answer of the command line."""
+def run_command(*arguments: object) -> Result:
+    """Result of a command line."""
     return CliRunner().invoke(main, [str(a) for a in arguments])
 
 
 def listed(store: Store, *options: str) -> list[dict[str, str]]:
     """Rows of the list as CSV."""
-    return list(csv.DictReader(io.StringIO(asked("rank", store.path, "--format", "csv", *options).stdout)))
+    return list(
+        csv.DictReader(io.StringIO(run_command("rank", store.path, "--format", "csv", *options).stdout))
+    )
 
 
 def test_a_note_is_shown_in_list_and_pages(store: Store, tmp_path: Path) -> None:
-    """What was noted stands in the list, in the CSV's own column, on the morning page and the loop's page."""
-    assert asked("note", store.path, NASTY[0], "seen <b>it</b>", "--owner", "Laine").exit_code == 0
+    """A note is shown in the list, in its own column of the CSV, on the morning page and on the page of the loop."""
+    assert run_command("note", store.path, NASTY[0], "seen <b>it</b>", "--owner", "Laine").exit_code == 0
     row = next(r for r in listed(store) if r["loop"] == NASTY[0])
     assert row["note"].startswith("seen <b>it</b> (Laine, ")
-    assert "note: seen &lt;b&gt;it" in asked("rank", store.path, "--format", "markdown").stdout
-    asked("pages", store.path, "--out", tmp_path / "out")
+    assert "note: seen &lt;b&gt;it" in run_command("rank", store.path, "--format", "markdown").stdout
+    run_command("pages", store.path, "--out", tmp_path / "out")
     pages = [p.read_text("utf-8") for p in (tmp_path / "out").glob("*.html")]
     holding = [p for p in pages if "seen &lt;b&gt;it" in p]
     assert len(holding) >= 2
@@ -46,55 +48,57 @@ def test_a_note_is_shown_in_list_and_pages(store: Store, tmp_path: Path) -> None
 
 
 def test_the_newest_note_counts_and_all_are_printed(store: Store) -> None:
-    """A second note takes the place of the first in the list; without a text all are printed, oldest first."""
+    """A second note replaces the first in the list; without a text all notes are printed, oldest first."""
     for text in ("first", "second"):
-        asked("note", store.path, "FIC0000", text, "--owner", "a")
+        run_command("note", store.path, "FIC0000", text, "--owner", "a")
     assert next(r for r in listed(store) if r["loop"] == "FIC0000")["note"].startswith("second")
-    assert [line.split()[0] for line in asked("note", store.path, "FIC0000").stdout.splitlines()] == [
+    assert [line.split()[0] for line in run_command("note", store.path, "FIC0000").stdout.splitlines()] == [
         "first",
         "second",
     ]
 
 
 def test_a_hidden_loop_comes_back(store: Store) -> None:
-    """A loop is hidden from table and summary before its date and is there from that night on; the CSV has it."""
+    """A hidden loop is missing from table and summary before its date and shown from that night on; the CSV always
+    has it.
+    """
     first = listed(store)[0]["loop"]
-    asked("note", store.path, first, "waits for the shutdown", "--hide-until", "2026-03-05")
-    table = asked("rank", store.path, "--wide")
+    run_command("note", store.path, first, "waits for the shutdown", "--hide-until", "2026-03-05")
+    table = run_command("rank", store.path, "--wide")
     assert f"hidden by their notes (--all shows them): {first}" in table.stderr
     assert listed(store)[0]["loop"] == first
-    assert first in asked("rank", store.path, "--wide", "--all").stdout
-    asked("note", store.path, first, "waits for the shutdown", "--hide-until", "2026-03-04")
-    assert asked("rank", store.path, "--wide").stderr == ""
+    assert first in run_command("rank", store.path, "--wide", "--all").stdout
+    run_command("note", store.path, first, "waits for the shutdown", "--hide-until", "2026-03-04")
+    assert run_command("rank", store.path, "--wide").stderr == ""
 
 
 def test_hidden_loops_do_not_shorten_the_list(store: Store) -> None:
-    """--top 3 shows three loops though the first of all is hidden."""
+    """--top 3 shows three loops although the first loop is hidden."""
     order = [r["loop"] for r in listed(store)]
-    asked("note", store.path, order[0], "later", "--hide-until", "2030-01-01")
-    shown = asked("rank", store.path, "--top", "3", "--format", "markdown").stdout.splitlines()[2:]
+    run_command("note", store.path, order[0], "later", "--hide-until", "2030-01-01")
+    shown = run_command("rank", store.path, "--top", "3", "--format", "markdown").stdout.splitlines()[2:]
     assert len(shown) == 3
 
 
 @pytest.mark.parametrize(
-    ("loop", "text", "said"),
+    ("loop", "text", "fragment"),
     [
         ("FIC000", "x", "one of its loops (FIC"),
         ("FIC0000", "   ", "an empty note"),
         ("nothing", "x", "is not in"),
     ],
 )
-def test_mistakes_are_one_line(store: Store, loop: str, text: str, said: str) -> None:
-    """A loop that is not there and a note that says nothing are told in one line and write nothing."""
-    result = asked("note", store.path, loop, text)
+def test_mistakes_are_one_line(store: Store, loop: str, text: str, fragment: str) -> None:
+    """An unknown loop and an empty note are reported in one line, and no note is written."""
+    result = run_command("note", store.path, loop, text)
     assert result.exit_code == 2
-    assert said in result.stderr
+    assert fragment in result.stderr
     assert len(result.stderr.splitlines()) == 1
     assert not (store.path / notes.FILE).exists()
 
 
-def test_many_writers_lose_nothing(tmp_path: Path) -> None:
-    """Forty notes written at once by eight threads are all there, each whole."""
+def test_many_writers_lose_no_note(tmp_path: Path) -> None:
+    """Forty notes that eight threads write at once are all stored completely."""
 
     def write(k: int) -> None:
         notes.add(tmp_path, notes.Note("L", float(k), "x" * 200 + str(k), "me"))
@@ -104,8 +108,8 @@ def test_many_writers_lose_nothing(tmp_path: Path) -> None:
     assert [n.time_s for n in notes.read_notes(tmp_path)["L"]] == [float(k) for k in range(40)]
 
 
-def test_a_broken_line_costs_itself_alone(tmp_path: Path) -> None:
-    """Half a line from a machine that died is passed over; the notes around it stay."""
+def test_a_broken_line_loses_only_itself(tmp_path: Path) -> None:
+    """Half a line after a crash of a computer is skipped; the notes around it are kept."""
     notes.add(tmp_path, notes.Note("L", 1.0, "one"))
     with (tmp_path / notes.FILE).open("a", encoding="utf-8") as file:
         file.write('{"loop": "L", "ti\n[]\n')
@@ -113,8 +117,8 @@ def test_a_broken_line_costs_itself_alone(tmp_path: Path) -> None:
     assert [n.text for n in notes.read_notes(tmp_path)["L"]] == ["one", "two"]
 
 
-def test_half_a_line_swallows_no_note(tmp_path: Path) -> None:
-    """Half a line that a full disk left at the end costs itself, and not the note that comes next."""
+def test_half_a_line_does_not_lose_the_next_note(tmp_path: Path) -> None:
+    """Half a line at the end, as after a full disk, is lost, and the next note is not."""
     (tmp_path / notes.FILE).write_text('{"loop": "L", "time_s": 1.0, "te', encoding="utf-8")
     notes.add(tmp_path, notes.Note("L", 2.0, "two"))
     assert [n.text for n in notes.read_notes(tmp_path)["L"]] == ["two"]
@@ -135,15 +139,15 @@ def test_half_a_line_swallows_no_note(tmp_path: Path) -> None:
         "[" * 100_000,
     ],
 )
-def test_what_is_no_note_is_passed_over(tmp_path: Path, line: str) -> None:
-    """Lines of JSON that are no notes cost nothing but themselves."""
+def test_a_line_without_a_note_is_skipped(tmp_path: Path, line: str) -> None:
+    """JSON lines that are not notes are skipped, and no other note is lost."""
     (tmp_path / notes.FILE).write_text(line + "\n", encoding="utf-8")
     notes.add(tmp_path, notes.Note("L", 2.0, "two"))
     assert {k: [n.text for n in own] for k, own in notes.read_notes(tmp_path).items()} == {"L": ["two"]}
 
 
-def test_a_note_steers_no_terminal(tmp_path: Path) -> None:
-    """Escape sequences and marks that turn the writing are escapes, whether typed or found in the file."""
+def test_a_note_does_not_control_the_terminal(tmp_path: Path) -> None:
+    """Escape sequences and bidirectional marks are shown as escapes, both from the command line and from the file."""
     assert notes.new("L", "a\x1b[2Jb\u202ec", "me", "").text == r"a\x1b[2Jb\u202ec"
     notes.add(tmp_path, notes.Note("L", 1.0, "a\x1b]0;b\u2066", "m\x07e"))
     (found,) = notes.read_notes(tmp_path)["L"]
@@ -151,9 +155,11 @@ def test_a_note_steers_no_terminal(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("form", ["text", "html", "markdown"])
-def test_the_summary_is_small_and_says_the_same(store: Store, form: str) -> None:
-    """One screen in three formats: the first things, the worst loops; a mail without scripts and under 100 kB."""
-    result = asked("summary", store.path, "--format", form)
+def test_the_summary_is_small_and_agrees_with_the_list(store: Store, form: str) -> None:
+    """The summary fits one screen in three formats and names the worst loop; a mail has no scripts and less than 100
+    kB.
+    """
+    result = run_command("summary", store.path, "--format", form)
     assert result.exit_code == 0
     assert len(result.stdout.encode()) < 100_000
     worst = next(r["loop"] for r in listed(store) if r["loop"].startswith("FIC"))
