@@ -15,19 +15,19 @@ from analyzer.finder.as_csv import Row, as_csv
 from analyzer.finder.draft import type_of, unit_of
 from analyzer.loops.spec import LoopSpec, read_loops
 from proofs.controllers_plant import controlled
-from tests.analyzer.finder.test_finder_pairs import pi_loop, strangers
+from tests.analyzer.finder.test_finder_pairs import pi_loop, unrelated_tags
 
 
 def triage(*arguments: object) -> Result:
-    """A command, run here."""
+    """Result of a command."""
     return CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
 
 
 @pytest.fixture(scope="module")
-def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An export of one loop with names, one without, and measurements of no loop."""
+def mixed_export(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An export of one loop with named tags, one loop without, and measurements that belong to no loop."""
     named, nameless = pi_loop(2.0, 60.0, 0.5, seed=2), pi_loop(-1.0, 40.0, -0.8, seed=3)
-    others = strangers(6000, 6, 9)
+    others = unrelated_tags(6000, 6, 9)
     table = pd.DataFrame({"timestamp": pd.date_range("2026-03-02", periods=6000, freq="s")})
     table[["TIC7.SP", "TIC7.PV", "TIC7.OP"]] = named
     table[["X3", "X1", "X2"]] = nameless + np.array([7.0, 7.0, 0.0])
@@ -38,9 +38,9 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_the_draft_is_read_as_loops_csv(bag: Path, tmp_path: Path) -> None:
-    """What the command writes is loops.csv: the loop of names and the loop of the data, with its settings."""
-    done = triage("loops", bag, "--out", tmp_path / "loops.csv")
+def test_the_draft_is_read_as_loops_csv(mixed_export: Path, tmp_path: Path) -> None:
+    """The output of the command is a valid loops.csv: the loop by names and the loop by data, with its settings."""
+    done = triage("loops", mixed_export, "--out", tmp_path / "loops.csv")
     assert done.exit_code == 0
     assert "2 loops (1 names, 1 data)" in done.output
     named, found = read_loops(tmp_path / "loops.csv")
@@ -52,8 +52,10 @@ def test_the_draft_is_read_as_loops_csv(bag: Path, tmp_path: Path) -> None:
 
 
 def test_a_draft_states_no_range_of_an_op_in_milliamperes(tmp_path: Path) -> None:
-    """Where all OPs lie within a signal of 4 to 20 mA the draft leaves their range open, and the commands that read
-    it ask for it; stated as 0 to 100 it would be percent."""
+    """If all OPs lie within 4 to 20, as in mA, the draft leaves their range open, and `check` reports that it is missing.
+
+    With a range of 0 to 100 it would be percent.
+    """
     table = pd.DataFrame({"timestamp": pd.date_range("2026-03-02", periods=6000, freq="s")})
     for name, gain in (("TIC7", 0.5), ("TIC8", 0.4)):
         loop = pi_loop(2.0, 60.0, gain, seed=int(name[-1]))
@@ -64,14 +66,16 @@ def test_a_draft_states_no_range_of_an_op_in_milliamperes(tmp_path: Path) -> Non
     specs = read_loops(tmp_path / "loops.csv")
     assert [s.stated & {"op_lo", "op_hi"} for s in specs] == [set(), set()]
     assert all("like mA: state op_lo and op_hi" in s.extra["says"] for s in specs)
-    said = triage("check", tmp_path / "export.csv", "--loops", tmp_path / "loops.csv").output
-    assert "OP of 2 loops lies between 4 and 20, like mA" in said
+    output = triage("check", tmp_path / "export.csv", "--loops", tmp_path / "loops.csv").output
+    assert "OP of 2 loops lies between 4 and 20, like mA" in output
 
 
-def test_settings_that_are_not_stated_are_drafted_as_recorded(bag: Path, tmp_path: Path) -> None:
-    """A stated loop without kp and ti gets those that its data show, and keeps all that its row states."""
+def test_settings_that_are_not_stated_are_drafted_as_recorded(mixed_export: Path, tmp_path: Path) -> None:
+    """A stated loop without kp and ti gets the settings that its data show, and keeps everything that its row
+    states.
+    """
     (tmp_path / "stated.csv").write_text("loop,description,pv_lo,pv_hi,gap\nTIC7,column's foot,-50,150,0.5\n")
-    done = triage("loops", bag, "--loops", tmp_path / "stated.csv", "--out", tmp_path / "loops.csv")
+    done = triage("loops", mixed_export, "--loops", tmp_path / "stated.csv", "--out", tmp_path / "loops.csv")
     assert done.exit_code == 0
     spec = next(s for s in read_loops(tmp_path / "loops.csv") if s.loop == "TIC7")
     assert spec.extra["found_by"] == "recorded"
@@ -80,10 +84,10 @@ def test_settings_that_are_not_stated_are_drafted_as_recorded(bag: Path, tmp_pat
     assert (spec.description, spec.pv_lo, spec.pv_hi, spec.gap) == ("column's foot", -50.0, 150.0, 0.5)
 
 
-def test_what_is_stated_is_kept(bag: Path, tmp_path: Path) -> None:
-    """A loop of --loops stands as it is stated, and its tags are nobody else's."""
+def test_stated_loops_are_kept(mixed_export: Path, tmp_path: Path) -> None:
+    """A loop of --loops is kept as stated, and its tags are used for no other loop."""
     (tmp_path / "stated.csv").write_text("loop,pv,op,kp,ti\nQ,X1,Y0,3,7\n")
-    done = triage("loops", bag, "--loops", tmp_path / "stated.csv")
+    done = triage("loops", mixed_export, "--loops", tmp_path / "stated.csv")
     rows = {r["loop"]: r for r in csv.DictReader(x for x in done.stdout.splitlines() if x[:1] != "#")}
     assert (rows["Q"]["pv"], rows["Q"]["op"], rows["Q"]["kp"], rows["Q"]["ti"]) == ("X1", "Y0", "3", "7")
     assert rows["Q"]["found_by"] == "stated"
@@ -91,29 +95,31 @@ def test_what_is_stated_is_kept(bag: Path, tmp_path: Path) -> None:
 
 
 def test_a_less_sure_loop_is_commented_out(tmp_path: Path) -> None:
-    """A row below the probability stands behind a # and is read by no command."""
+    """A row below the required probability is written as a comment and is read by no command."""
     rows = [Row(LoopSpec("A", pv="a"), "data", 89.0, "x, y"), Row(LoopSpec("B", pv="b"), "data", 91.0)]
     (tmp_path / "loops.csv").write_text(as_csv(rows))
     assert "\n# A," in as_csv(rows)
     assert [s.loop for s in read_loops(tmp_path / "loops.csv")] == ["B"]
 
 
-def test_a_first_night_needs_no_file(bag: Path, tmp_path: Path) -> None:
-    """Without loops.csv a run has the loops of names, with --find-loops those of the data too; check says why."""
-    alone = triage("run", bag, "--store", tmp_path / "a")
+def test_a_first_night_needs_no_file(mixed_export: Path, tmp_path: Path) -> None:
+    """Without loops.csv a run assesses the loops found by names, and with --find-loops also those found by data;
+    `check` says why.
+    """
+    alone = triage("run", mixed_export, "--store", tmp_path / "a")
     assert "1 of 1 loops assessed" in alone.output
-    found = triage("run", bag, "--find-loops", "--store", tmp_path / "b")
+    found = triage("run", mixed_export, "--find-loops", "--store", tmp_path / "b")
     assert "2 of 2 loops assessed" in found.output
-    told = triage("check", bag, "--find-loops").output
-    assert "X1: found by data" in told
-    assert "X2 follows X1 by a law (PI, direct acting)" in told
+    output = triage("check", mixed_export, "--find-loops").output
+    assert "X1: found by data" in output
+    assert "X2 follows X1 by a law (PI, direct acting)" in output
 
 
 @pytest.mark.parametrize(
     "tag", ["FIC101.PV flow", "LC12 level", "a1/PIC-7.pv pressure", "TT_3 temperature", "T0001 ", "FAN3 "]
 )
-def test_a_type_is_told_by_isa_letters(tag: str) -> None:
-    """The first letter of an instrument's name tells what it measures; of other names it tells nothing."""
+def test_a_type_is_given_by_isa_letters(tag: str) -> None:
+    """The first letter of an ISA instrument name gives the measured quantity; other names give none."""
     name, _, kind = tag.partition(" ")
     assert type_of(name) == kind
 
@@ -129,13 +135,16 @@ def test_a_type_is_told_by_isa_letters(tag: str) -> None:
     ],
 )
 def test_the_unit_is_that_in_brackets_of_the_name(tag: str, unit: str) -> None:
-    """A unit in brackets at the end of a name is PV's unit; a role or an index there is none."""
+    """A unit in brackets at the end of a name is the unit of PV; a role or an index in brackets is no unit."""
     assert unit_of(tag) == unit
 
 
 def test_a_draft_has_the_derivative_and_the_filter_that_the_data_show(tmp_path: Path) -> None:
-    """Of controllers simulated elsewhere a PID is drafted with its derivative time, a PI behind a filter with that
-    filter, and a PI with neither; gains and integral times are right within a tenth."""
+    """For independently simulated controllers, a PID is drafted with its derivative time, and a PI with a PV filter
+    with that filter.
+
+    A PI without both gets neither; gains and integral times are right within 10 %.
+    """
     made = {
         f"TIC{k}": controlled(form, "set point moves", 61, 0.25)
         for k, form in enumerate(("PI", "ideal PID", "PV filter"))

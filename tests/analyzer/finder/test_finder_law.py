@@ -1,4 +1,4 @@
-"""Shares that a law explains, of many tags at once, against one tag at a time."""
+"""Shares that a control law explains: many tags at once agree with one tag at a time."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ WIDTHS = (1, 4, 16)
 
 @pytest.fixture(scope="module")
 def walks():
-    """Twelve tags that wander, and each a little with the one before it, shape (4000, 12)."""
+    """Twelve drifting tags, each with a part of the tag before it, shape (4000, 12)."""
     rng = np.random.default_rng(7)
     steps = rng.normal(size=(4000, 12))
     return np.cumsum(steps + 0.5 * np.roll(steps, 1, axis=1), axis=0)
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_shares_of_errors_are_those_of_each_difference(walks, width):
-    """The law from every tag's error at a set point explains of OP what it explains from the difference itself."""
+def test_shares_of_errors_equal_those_of_each_difference(walks, width):
+    """The law from the error of each tag explains the same share of OP as the law from the difference itself."""
     set_points, outputs = [3, 3, 8], [5, 0, 11]
     found = explained_by_errors(Moves.plain(walks, width), set_points, outputs)
     for pair, (sp, op) in enumerate(zip(set_points, outputs, strict=True)):
@@ -33,7 +33,7 @@ def test_shares_of_errors_are_those_of_each_difference(walks, width):
 
 @pytest.mark.parametrize("width", WIDTHS)
 def test_either_way_is_the_larger_of_both(walks, width):
-    """Of every pair of tags the better direction counts."""
+    """For each pair of tags the better direction counts."""
     m = Moves.plain(walks, width)
     forth, back = explained_share(m, m.of_tags(5)), explained_share(m.of_tags(5), m).T
     assert explained_either_way(m, 5) == pytest.approx(np.maximum(forth, back), abs=1e-12)

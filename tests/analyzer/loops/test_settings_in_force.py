@@ -1,4 +1,4 @@
-"""Settings have dates: each night has those in force at its end."""
+"""Settings have dates: each night has the settings in force at its end."""
 
 from __future__ import annotations
 
@@ -34,21 +34,25 @@ SECOND = TuningChange("L", 200.0, kp_new=3.0)
         (1e9, (3.0, 20.0)),
     ],
 )
-def test_the_last_change_before_a_time_counts(at_s, expected):
-    """Old settings before the first change, then those of the last one; what a change leaves out stays as it was."""
+def test_the_last_change_before_a_time_applies(at_s, expected):
+    """Before the first change the old settings apply, then those of the last change; a value that a change omits is
+    unchanged.
+    """
     first = TuningChange("L", 100.0, 0.5, 5.0, 2.0, 20.0)
     found = in_force(LOOP, (SECOND, TuningChange("M", 60.0, kp_new=9.0), first), at_s)
     assert (found.kp, found.ti) == expected
 
 
-def test_without_changes_loops_csv_stands():
-    """No changes, or other loops', leave loops.csv as it is."""
+def test_without_changes_loops_csv_applies():
+    """Without changes, or with changes of other loops only, the settings of loops.csv are unchanged."""
     assert in_force(LOOP, (), 0.0) is LOOP
     assert in_force(LOOP, (TuningChange("M", 0.0, kp_new=9.0),), 1e9) is LOOP
 
 
 def test_a_run_advises_on_the_settings_in_force(tmp_path):
-    """With loops.csv old by a factor of two in gain, the change's date makes 'check settings' a retune."""
+    """If the gain in loops.csv is old by a factor of two, the date of the change turns 'check settings' into a
+    retune.
+    """
     pipe = Sketch("valve", (12.0, 150.0, 6.0), 0.65, 30.0, backlash=2.5, load_std=0.1)
     export = open_export([write_export(tmp_path / "x.parquet", {"L": simulate(pipe, 6.0)})])
     stale = match([spec("L", kp=0.3, ti=90.0, scan_s=1.0)], export.tags)[0]
@@ -64,8 +68,10 @@ def test_a_run_advises_on_the_settings_in_force(tmp_path):
 
 
 def test_a_date_without_a_time_belongs_to_the_night_that_begins_there(tmp_path):
-    """Settings dated at midnight are those of the night that begins then: the night before keeps the old ones, is not
-    asked to check its settings, and the change is found where it was."""
+    """Settings dated at midnight apply to the night that begins then.
+
+    The night before keeps the old ones without 'check settings', and the change is found at that time.
+    """
     flow = Sketch("none", (1.0, 40.0, 8.0), 1.0, 30.0, moves=3.0)
     changed = replace(flow, kp=0.4, ti=60.0)
     days = [simulate(s, 24.0, seed) for seed, s in enumerate((flow, flow, changed, changed))]
@@ -103,7 +109,7 @@ M,5,50,percent,
     ],
 )
 def test_dated_rows_of_loops_csv(tmp_path, at, expected):
-    """Each row counts from its valid_from on, 08:00 of the plant's clock without a zone, with the units it states."""
+    """Each row applies from its valid_from on, in the clock of the plant if no zone is given, with its own units."""
     path = tmp_path / "loops.csv"
     path.write_text(DATED, encoding="utf-8")
     loops = read_loops(path, "Europe/Helsinki")
@@ -112,8 +118,8 @@ def test_dated_rows_of_loops_csv(tmp_path, at, expected):
     assert (found.kp, found.ti, found.gain_unit) == expected
 
 
-def test_two_rows_at_one_time_are_told(tmp_path):
-    """A loop twice without dates is no dated loop."""
+def test_two_rows_at_one_time_are_reported(tmp_path):
+    """Two rows of one loop without different dates are refused."""
     path = tmp_path / "loops.csv"
     path.write_text("loop,kp,valid_from\nL,1,\nL,2,\n", encoding="utf-8")
     with pytest.raises(InputError, match="different times in valid_from"):
@@ -129,14 +135,14 @@ def test_two_rows_at_one_time_are_told(tmp_path):
     ],
 )
 def test_the_page_says_where_settings_come_from(at_s, expected):
-    """Settings of changes.csv are told with the day of the change, in the plant's own days."""
+    """Settings of changes.csv are reported with the day of the change, in days of the plant."""
     first = TuningChange("L", 100.0, 0.5, 5.0, 2.0, 20.0)
     second = TuningChange("L", 2 * 86400.0 - 3600.0, kp_new=3.0)
     assert settings_from(LOOP, (second, first), at_s, "Europe/Helsinki") == expected
 
 
-def test_loops_csv_is_named_where_no_change_says_otherwise():
-    """Without changes the settings are those of loops.csv; where none are stated nothing is said."""
+def test_loops_csv_is_named_without_a_change_of_settings():
+    """Without changes the settings are those of loops.csv; if none are stated, the source is empty."""
     assert settings_from(LOOP, (), 50.0, "UTC") == "loops.csv"
     assert settings_from(LOOP, (TuningChange("L", 10.0, who="me"),), 50.0, "UTC") == "loops.csv"
     assert settings_from(spec("M", kp=None, ti=None), (), 50.0, "UTC") == ""

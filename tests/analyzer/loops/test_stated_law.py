@@ -1,4 +1,6 @@
-"""What loops.csv states of a controller beside gain and times, and which slip of the pen makes wrong settings."""
+"""Data of a controller in loops.csv in addition to gain and times, and the typing error that explains wrong
+settings.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,7 @@ def row(tmp_path, header: str, cells: str) -> LoopSpec:
 
 
 def test_extras_are_taken_in_percent_of_spans(tmp_path):
-    """A gap in the PV's unit and limits in the OP's unit become percent: 2 of 200 is 1 %, 12 mA is 50 %."""
+    """A gap in the unit of PV and limits in the unit of OP become percent: 2 of 200 is 1 %, 12 mA is 50 %."""
     extras = "gap,gap_gain,error_form,pv_filter_s,op_rate,op_hi_limit,sp_weight,td_filter"
     spec = row(
         tmp_path,
@@ -40,13 +42,15 @@ def test_extras_are_taken_in_percent_of_spans(tmp_path):
 
 @pytest.mark.parametrize("cell", ["0", "inf", "P", "off"])
 def test_no_integral_is_written_in_the_usual_ways(tmp_path, cell):
-    """An integral time of 0, inf, P or off is none."""
+    """An integral time of 0, inf, P or off means no integral action."""
     pid = controller(row(tmp_path, "kp,ti", f"2,{cell}"), None)
     assert pid == Pid(2.0, math.inf)
 
 
 def test_integral_alone_is_stated_by_a_gain_of_zero(tmp_path):
-    """kp 0 with ti is the law 1/Ti times the integral, and is stated back as it was; kp 0 alone states nothing."""
+    """kp 0 with ti means integral action alone with gain 1/Ti and is stated back as it was; kp 0 alone states no
+    controller.
+    """
     spec = row(tmp_path, "kp,ti,ti_unit", "0,2,min")
     pid = controller(spec, None)
     assert pid is not None
@@ -56,7 +60,9 @@ def test_integral_alone_is_stated_by_a_gain_of_zero(tmp_path):
 
 
 def test_a_negative_integral_time_needs_a_gain_of_zero(tmp_path):
-    """The sign of a controller with a gain is that of the gain."""
+    """A negative integral time is refused with a gain, whose sign is that of the controller, and allowed with a gain
+    of zero.
+    """
     with pytest.raises(InputError, match="not below 0"):
         row(tmp_path, "kp,ti", "2,-60")
     pid = controller(row(tmp_path, "kp,ti", "0,-60"), None)
@@ -73,8 +79,8 @@ def test_a_negative_integral_time_needs_a_gain_of_zero(tmp_path):
         ("beta", "sp_weight"),
     ],
 )
-def test_other_names_are_told_what_they_mean(tmp_path, column, meant):
-    """A column under another name, or misspelt, is refused with the name that is meant."""
+def test_other_names_are_refused_with_the_name_that_is_meant(tmp_path, column, meant):
+    """A column with another or a misspelt name is refused with the name that is meant."""
     with pytest.raises(InputError, match=meant):
         row(tmp_path, f"kp,{column}", "2,60")
 
@@ -94,15 +100,17 @@ SPEC = LoopSpec("L", kp=2.0, ti=1.5, pv_lo=0.0, pv_hi=250.0)
         (SPEC, Pid(7.0, 400.0), {}),
     ],
 )
-def test_the_slip_that_explains_the_settings_is_named(spec, found, changed):
-    """Minutes, repeats, band, engineering units and form are told by the figures found; else nothing is."""
+def test_the_typing_error_that_explains_the_settings_is_named(spec, found, changed):
+    """The found figures show whether minutes, repeats, band, engineering units or form was meant; otherwise nothing
+    is named.
+    """
     if changed or found.kp == 7.0:
         assert slip(spec, found, 250.0) == changed
     else:
         assert "form" not in slip(replace(spec, form=Form.IDEAL), found, 250.0)
 
 
-def test_what_the_record_shows_is_written_as_loops_csv_takes_it(tmp_path):
+def test_found_terms_are_written_in_the_units_of_loops_csv(tmp_path):
     """A gap of 1 % of a span of 200, a rate of 1 %/s and a limit of 50 % of 4 to 20 mA are 2, 0.16 and 12."""
     spec = row(tmp_path, "pv_lo,pv_hi,op_lo,op_hi,kp,ti", "100,300,4,20,2,60")
     stated = controller(spec, 200.0)
@@ -116,8 +124,8 @@ def test_what_the_record_shows_is_written_as_loops_csv_takes_it(tmp_path):
     assert controller(again, 200.0) == seen
 
 
-def test_an_op_that_stands_within_a_stated_gap_is_not_in_manual():
-    """Of two spans in which OP stands still, the one in which the error leaves the gap is manual."""
+def test_a_constant_op_within_a_stated_gap_is_not_in_manual():
+    """Of two spans with constant OP, only the span in which the error leaves the gap is manual."""
     manual, error = np.zeros(40, dtype=bool), np.zeros(40)
     manual[5:15] = manual[20:30] = True
     error[5:15], error[20:30] = 0.4, np.linspace(0.0, 0.9, 10)

@@ -1,4 +1,4 @@
-"""A time that a person wrote is read one way or refused; never the other way round without a word."""
+"""A written time has one meaning or is refused; an ambiguous date is never read silently."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def at(text: str) -> float:
         ("20260512 080000", "2026-05-12T08:00"),
     ],
 )
-def test_a_time_is_what_it_says(text: str, utc: str) -> None:
-    """ISO, points, names of months and days above twelve are plain: dates with points have the day first."""
+def test_an_unambiguous_time_is_read(text: str, utc: str) -> None:
+    """ISO dates, month names and days above twelve are unambiguous; dates with points have the day first."""
     assert parse_time(text, "here") == at(utc)
 
 
 @pytest.mark.parametrize("text", ["05/12/2026", "5/12/2026 08:00", "05-12-2026", "10-11-12"])
-def test_what_reads_two_ways_is_refused(text: str) -> None:
-    """A date that fits both orders is refused, unless the order is stated."""
+def test_an_ambiguous_date_is_refused(text: str) -> None:
+    """A date that fits both orders is refused unless the order is stated."""
     with pytest.raises(InputError, match="reads two ways"):
         parse_time(text, "here")
     first, second = parse_time(text, "here", day_first=True), parse_time(text, "here", day_first=False)
@@ -68,15 +68,17 @@ def test_what_reads_two_ways_is_refused(text: str) -> None:
         *("9999-12-31", "1601-01-01", "8:00 9.3.2026", "x" * 100_000, "\u202e2026-05-12"),
     ],
 )
-def test_what_is_no_time_is_refused(text: str) -> None:
-    """Words, numbers, clocks without a day and days outside our time are one short line."""
-    with pytest.raises(InputError) as told:
+def test_an_invalid_time_is_refused(text: str) -> None:
+    """Words, numbers, times without a day, and years far from the present give one short line."""
+    with pytest.raises(InputError) as error:
         parse_time(text, "changes.csv, row 2")
-    assert len(str(told.value)) < 200
+    assert len(str(error.value)) < 200
 
 
 def test_changes_are_read_in_one_order(tmp_path: Path) -> None:
-    """A file of changes with points is day first in each row; strokes need the order stated."""
+    """In a file of changes, dates with points have the day first in each row; dates with slashes need a stated
+    order.
+    """
     path = tmp_path / "changes.csv"
     path.write_text("loop;time\nA;12.5.2026\nB;13.5.2026\n")
     assert [c.time_s for c in read_changes(path)] == [at("2026-05-12"), at("2026-05-13")]
@@ -87,7 +89,7 @@ def test_changes_are_read_in_one_order(tmp_path: Path) -> None:
 
 
 def test_rows_of_changes_are_counted_as_an_editor_does(tmp_path: Path) -> None:
-    """Blank lines and comments are no changes, and count among the rows that an error names."""
+    """Blank lines and comments are no changes, but they count in the row number of an error."""
     path = tmp_path / "changes.csv"
     path.write_text("loop,time\n\n# tuned in May\nA,2026-05-12\n\nB,soon\n")
     with pytest.raises(InputError, match="row 6: time 'soon'"):
@@ -95,16 +97,18 @@ def test_rows_of_changes_are_counted_as_an_editor_does(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("time", ["25:00", "24:01", "12:61", "12:00:61", "12:00+99:00", "13:00 AM"])
-def test_what_no_clock_shows_is_refused(tmp_path: Path, time: str) -> None:
-    """A time that no clock shows is one line with file and row, and not carried over into another hour or day."""
+def test_an_impossible_time_of_day_is_refused(tmp_path: Path, time: str) -> None:
+    """An impossible time of day is reported in one line with file and row, and is not moved to another hour or
+    day.
+    """
     path = tmp_path / "changes.csv"
     path.write_text(f"loop,time\nA,2026-03-04 08:00\n,\nB,2026-03-04 {time}\n")
     with pytest.raises(InputError, match=r"changes\.csv, row 4: time "):
         read_changes(path)
 
 
-def test_many_changes_are_one_table(tmp_path: Path) -> None:
-    """Each of 20,000 rows is what it is alone, in at most 60 calls a row."""
+def test_many_changes_are_read_as_one_table(tmp_path: Path) -> None:
+    """Each of 20,000 rows is read as it is read alone, with at most 60 calls a row."""
     shown = (
         "2026-03-{d:02d} 0{h}:00",
         "{d:02d}.03.2026 0{h}:00",

@@ -38,7 +38,7 @@ def only(folder: Path, text: str) -> LoopSpec:
 
 
 def test_only_the_loop_is_required(tmp_path: Path) -> None:
-    """A file of names alone is enough, and every default that this uses can be told."""
+    """A file with loop names only is enough, and the defaults that it uses are listed."""
     spec = only(tmp_path, "loop\nFIC101\n")
     assert (spec.loop, spec.form, spec.gain_unit, spec.ti_unit) == ("FIC101", Form.IDEAL, "percent", "s")
     assert (spec.op_lo, spec.op_hi, spec.kp) == (0, 100, None)
@@ -46,7 +46,7 @@ def test_only_the_loop_is_required(tmp_path: Path) -> None:
 
 
 def test_every_column_is_read(tmp_path: Path) -> None:
-    """Every column of the contract is read, and a column of the plant's own is kept."""
+    """Each column of the contract is read, and additional columns of the plant are kept."""
     spec = only(
         tmp_path,
         "loop,description,type,area,master,ratio_of,sp,pv,op,mode,position,pv_lo,pv_hi,op_lo,op_hi,pv_unit,kp,ti,td,form,gain_unit,"
@@ -65,7 +65,7 @@ def test_every_column_is_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
 def test_a_table_from_a_european_spreadsheet(tmp_path: Path, encoding: str) -> None:
-    """Semicolons, decimal commas, any encoding, capitals in the header, empty rows: read as meant."""
+    """Semicolons, decimal commas, several encodings, capitals in the header and empty rows are read correctly."""
     text = "Loop;Description;KP;Ti\r\n\r\nTIC1;Kühler;1,5;20\r\n;;;\r\n"
     (spec,) = read_loops(written(tmp_path, text, encoding))
     assert (spec.loop, spec.description, spec.kp, spec.ti) == ("TIC1", "Kühler", 1.5, 20)
@@ -92,8 +92,8 @@ def test_a_table_from_a_european_spreadsheet(tmp_path: Path, encoding: str) -> N
         ("loop,kp\n,1\n", ["row 2", "no loop name"]),
     ],
 )
-def test_what_cannot_be_used_is_told(tmp_path: Path, text: str, fragments: list[str]) -> None:
-    """Each fault of a loops.csv is told with its place and its remedy."""
+def test_errors_of_loops_csv_are_reported(tmp_path: Path, text: str, fragments: list[str]) -> None:
+    """Each error in a loops.csv is reported with its place and its remedy."""
     with pytest.raises(InputError) as error:
         read_loops(written(tmp_path, text))
     assert str(tmp_path / "loops.csv") in str(error.value)
@@ -102,7 +102,7 @@ def test_what_cannot_be_used_is_told(tmp_path: Path, text: str, fragments: list[
 
 
 def test_missing_file(tmp_path: Path) -> None:
-    """A loops.csv that does not exist is an input error, no traceback."""
+    """A loops.csv that does not exist is an input error without a traceback."""
     with pytest.raises(InputError, match="cannot be opened"):
         read_loops(tmp_path / "none.csv")
 
@@ -127,24 +127,30 @@ def test_missing_file(tmp_path: Path) -> None:
     ],
 )
 def test_loops_by_their_endings(tags: list[str], expected: tuple[str | None, ...]) -> None:
-    """The endings of each control system give the loop's signals; CV and MV mean what they mean there."""
+    """The tag endings of each control system give the signals of the loop; CV and MV have the meaning of that
+    system.
+    """
     (spec,) = find_loops(tags)
     assert (spec.loop, spec.sp, spec.pv, spec.op, spec.mode, spec.position) == expected
 
 
 def test_two_blocks_of_a_module_are_two_loops() -> None:
-    """Two function blocks of one module keep their names, since the module's name would be both."""
+    """Two function blocks of one module keep their full names, because the name of the module would be that of
+    both.
+    """
     specs = find_loops(["F1/PID1/PV.CV", "F1/PID2/PV.CV"])
     assert [spec.loop for spec in specs] == ["F1/PID1", "F1/PID2"]
 
 
 def test_no_pv_no_loop() -> None:
-    """Tags without a PV, and tags of no known ending, make no loop."""
+    """Tags without a PV, and tags without a known ending, form no loop."""
     assert find_loops(["F1.OP", "F1.SP", "TI77", "F2.PV.quality"]) == ()
 
 
 def test_match_fills_defaults_and_reports_what_is_missing() -> None:
-    """Silent rows get LOOP.SP and so on or the dialect's endings; what the export lacks is told and kept."""
+    """Rows without tags get LOOP.SP and so on, or the endings of the control system; missing tags are reported and
+    kept.
+    """
     specs = (LoopSpec("F1"), LoopSpec("Y1"), LoopSpec("GONE"), LoopSpec("N1", pv="N1.X", op="N1.Y"))
     tags = ["F1.PV", "F1.OP", "Y1.PV", "Y1.MV", "N1.X", "NEW.PV"]
     matched, notes = match(specs, tags)
@@ -172,7 +178,9 @@ def test_match_fills_defaults_and_reports_what_is_missing() -> None:
     ],
 )
 def test_controllers_in_the_units_of_the_project(spec: LoopSpec, kp: float, ti_s: float, td_s: float) -> None:
-    """Bands, engineering gains, minutes, repeats and every form become percent, seconds, ideal form."""
+    """Bands, engineering gains, minutes, repeats and all forms are converted to percent, seconds and the ideal
+    form.
+    """
     pid = controller(spec, pv_span=200)
     assert pid is not None
     assert (pid.kp, pid.ti_s, pid.td_s) == pytest.approx((kp, ti_s, td_s))
@@ -193,8 +201,10 @@ SPECS = st.builds(
 
 
 @given(SPECS, st.floats(0.1, 1e4), st.floats(0, 1))
-def test_stated_settings_survive_the_round_trip(spec: LoopSpec, pv_span: float, share: float) -> None:
-    """What is stated, turned into percent and seconds and back, is what was stated, in any form and unit."""
+def test_stated_settings_are_unchanged_by_conversion_and_back(
+    spec: LoopSpec, pv_span: float, share: float
+) -> None:
+    """Stated settings that are converted to percent and seconds and back are unchanged, in any form and unit."""
     ti_s = {"s": spec.ti, "min": spec.ti, "repeats/min": 1 / spec.ti if spec.ti else 0}[spec.ti_unit]
     spec = replace(spec, td=None if ti_s is None else 0.99 * share * ti_s)
     pid = controller(spec, pv_span)
@@ -214,7 +224,7 @@ def test_no_settings_no_controller() -> None:
 @pytest.mark.skipif(not SHARED.exists(), reason="the plants' files lie outside the repository")
 @pytest.mark.parametrize("name", ["plants/a", "concealed", "recordings/isdb", "recordings/refinery"])
 def test_real_loops_csv(name: str) -> None:
-    """Every loops.csv at hand is read and has as many loops as rows."""
+    """Each available loops.csv is read and has as many loops as rows."""
     path = SHARED / name / "loops.csv"
     assert len(read_loops(path)) == len(path.read_text().split()) - 1
 
@@ -229,8 +239,8 @@ def test_real_loops_csv(name: str) -> None:
         *(("td", cell) for cell in ("inf", "1e-320")),
     ],
 )
-def test_numbers_that_nobody_means_are_refused(tmp_path, column, cell):
-    """Infinite, vanishing and absurd settings are slips: one line names row and column."""
+def test_extreme_numbers_are_refused(tmp_path, column, cell):
+    """Infinite, vanishing and extreme settings are errors: one line names row and column."""
     stated = {"kp": "1", "ti": "10", "td": "0", "scan_s": "1", "importance": "1", column: cell}
     text = f"loop,{','.join(stated)}\nFIC1,{','.join(stated.values())}\n"
     with pytest.raises(InputError, match=f"row 2, column '{column}'"):
@@ -240,15 +250,16 @@ def test_numbers_that_nobody_means_are_refused(tmp_path, column, cell):
 @pytest.mark.parametrize(
     ("low", "high"), [("0", "inf"), ("0", "1e-320"), ("5", "5"), ("100", "0"), ("1e15", "2e15")]
 )
-def test_ranges_that_nobody_means_are_refused(tmp_path, low, high):
-    """A range has a width that numbers can tell."""
+def test_impossible_ranges_are_refused(tmp_path, low, high):
+    """A range without a representable positive width is refused."""
     with pytest.raises(InputError, match="row 2"):
         read_loops(written(tmp_path, f"loop,op_lo,op_hi\nFIC1,{low},{high}\n"))
 
 
-def test_a_zero_that_says_nothing_ends_no_night(tmp_path):
-    """Gains and scans of 0, as control systems export them for loops without, are empty cells; a gain of 0 beside an
-    integral time is not, but the integral alone."""
+def test_a_zero_without_meaning_is_an_empty_cell(tmp_path):
+    """Gains and scan times of 0, as some control systems export them, are empty cells. A gain of 0 with an integral
+    time means integral action alone.
+    """
     (loop,) = read_loops(written(tmp_path, "loop,kp,ti,scan_s\nFIC1,0,0,0\n"))
     assert (loop.kp, loop.ti, loop.scan_s) == (None, 0.0, None)
     assert not loop.stated & {"kp", "scan_s"}
@@ -262,36 +273,38 @@ def test_a_zero_that_says_nothing_ends_no_night(tmp_path):
     ],
 )
 @pytest.mark.parametrize("mark", "._")
-def test_endings_of_several_makes(sp, pv, op, mark):
-    """A set point and an output are found by what any make calls them, where the process value has another's name."""
+def test_endings_of_several_vendors(sp, pv, op, mark):
+    """A set point and an output are found by the names of any vendor, even if PV has the name of another vendor."""
     tags = {role: f"FIC1{mark}{ending}" for role, ending in (("sp", sp), ("pv", pv), ("op", op))}
     (loop,) = find_loops(tags.values())
     assert (loop.loop, loop.sp, loop.pv, loop.op) == ("FIC1", tags["sp"], tags["pv"], tags["op"])
 
 
-def test_words_behind_a_blank():
-    """A whole word may stand behind a blank; two letters there may be part of a name."""
+def test_words_after_a_blank():
+    """A complete word may follow a blank; two letters after a blank may be part of a name."""
     (loop,) = find_loops(["FIC1 Istwert", "FIC1 Sollwert", "column PV", "column SP"])
     assert (loop.loop, loop.sp, loop.pv) == ("FIC1", "FIC1 Sollwert", "FIC1 Istwert")
 
 
 def test_no_tag_has_two_roles():
-    """An MV beside PV and OP is no second output, and no tag is taken for a set point and an output."""
+    """An MV next to PV and OP is no second output, and no tag is both set point and output."""
     (loop,) = find_loops(["A.PV", "A.OP", "A.MV"])
     assert (loop.pv, loop.op, loop.sp) == ("A.PV", "A.OP", None)
 
 
 @pytest.mark.parametrize("names", [("Sollwert", "Istwert", "Stellgröße"), ("SETP", "PV", "CV")])
 def test_bare_columns_belong_to_the_file_s_loop(tmp_path, names):
-    """Columns that are named for roles alone are of the loop that the file is named for."""
+    """Columns that are named only by role belong to the loop with the name of the file."""
     rows = "".join(f"2026-03-02 00:00:{k:02d};50;{k};{k}\n" for k in range(60))
     (tmp_path / "FIC1.csv").write_text(f"Zeit;{';'.join(names)}\n{rows}", encoding="utf-8")
     (loop,) = find_loops(open_export([tmp_path / "FIC1.csv"]).tags)
     assert (loop.loop, loop.op is not None, loop.sp is not None) == ("FIC1", True, True)
 
 
-def test_a_table_without_a_header_is_taken_in_the_order_of_loops_csv() -> None:
-    """Columns without names are the tags that loops.csv states, in its order, where they are as many; else none."""
+def test_a_table_without_a_header_is_read_in_the_order_of_loops_csv() -> None:
+    """Columns without names are the tags of loops.csv in its order if the numbers are equal; otherwise none is
+    assigned.
+    """
     stated = (LoopSpec("A", sp="A.S", pv="A.P", op="A.O"), LoopSpec("B"))
     columns = [f"column {i}" for i in range(2, 8)]
     (a, b), notes = match(stated, columns)
@@ -323,21 +336,25 @@ VENDORS = (
 
 
 @pytest.mark.parametrize("own", VENDORS, ids=lambda own: own[2])
-def test_loops_by_the_names_of_many_makes(own: tuple[str, str, str, str]) -> None:
-    """Roles stand behind the name or before it, in words of many languages, with units, blocks and domains around."""
+def test_loops_by_the_names_of_many_vendors(own: tuple[str, str, str, str]) -> None:
+    """Roles are found after or before the loop name, in many languages, with units, blocks and domains around
+    them.
+    """
     (loop,) = find_loops(["Y99", *own[1:], "flow rate 7"])
     assert (loop.loop.rstrip(" -"), loop.sp, loop.pv, loop.op) == own
 
 
 def test_a_column_that_numbers_the_rows_is_no_tag(tmp_path: Path) -> None:
-    """An id that falls by one a row is left out; a value that does so under another name is kept."""
+    """An id column that decreases by one in each row is left out; a value under another name that does the same is
+    kept.
+    """
     rows = "".join(f"{900 - k},2026-03-02 00:00:{k:02d},{k},{k}\n" for k in range(60))
     (tmp_path / "x.csv").write_text("id,time,FT_1,FV_1\n" + rows)
     assert open_export([tmp_path / "x.csv"]).tags == ("FT_1", "FV_1")
 
 
-def test_isa_letters_pair_what_measures_with_what_moves() -> None:
-    """FT_211 and FV_211 are a loop, LT_211 and an index are none."""
+def test_isa_letters_pair_measurement_and_valve() -> None:
+    """FT_211 and FV_211 form a loop; LT_211 and an index form none."""
     (loop,) = find_loops(["id", "FT_211", "FV_211", "LT_211", "TV_7"])
     assert (loop.loop, loop.pv, loop.op) == ("FIC211", "FT_211", "FV_211")
 
@@ -346,5 +363,5 @@ def test_isa_letters_pair_what_measures_with_what_moves() -> None:
     "tags", [["TK1 Level", "TK2 Level"], ["R1.Temperature", "R1.Pressure"], ["X", "Y", "Z"]]
 )
 def test_a_word_alone_makes_no_loop(tags: list[str]) -> None:
-    """A measurement that is named for what it measures is no loop by that."""
+    """A measurement with the name of its quantity forms no loop."""
     assert find_loops(tags) == ()

@@ -1,4 +1,4 @@
-"""What a slip of the pen is answered with, and columns that loops.csv knows better than their names do."""
+"""Answers to typing errors, and columns whose meaning loops.csv states against their names."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BEGUN = datetime(2026, 3, 2, 23, 30)
 
 
 def export(path: Path, heads: str, *first: str, form: str = "%Y-%m-%d %H:%M:%S") -> Path:
-    """An hour of SP, PV and OP at 2 s behind columns that hold the same text in every row."""
+    """An hour of SP, PV and OP at 2 s, after columns with the same text in each row."""
     noise = np.random.default_rng(3).normal(0.0, 1.0, (1800, 2))
     stamps = ((BEGUN + timedelta(seconds=2 * k)).strftime(form) for k in range(1800))
     rows = (
@@ -39,8 +39,8 @@ def checked(path: Path, loops: str, *more: str) -> Result:
 
 
 @pytest.mark.parametrize("spelt", ["fic-101", "FIC101", "FIC 101", "FIC_101"])
-def test_a_tag_that_is_spelt_otherwise_is_asked_back(tmp_path, spelt):
-    """A tag of loops.csv that the export has in another spelling is answered with the export's."""
+def test_another_spelling_of_a_tag_gives_a_suggestion(tmp_path, spelt):
+    """For a tag of loops.csv that the export has in another spelling, the spelling of the export is suggested."""
     found = checked(
         export(tmp_path / "day.csv", "timestamp,FIC-101.SP,FIC-101.PV,FIC-101.OP"), f"loop\n{spelt}\n"
     )
@@ -48,16 +48,16 @@ def test_a_tag_that_is_spelt_otherwise_is_asked_back(tmp_path, spelt):
     assert "did you mean FIC-101.PV?" in found.output
 
 
-def test_a_tag_of_another_name_is_not_asked_back(tmp_path):
-    """A tag that the export has in no spelling is missing, and no other is offered."""
+def test_a_tag_of_another_name_gives_no_suggestion(tmp_path):
+    """A tag that the export has in no spelling is missing, and no other tag is suggested."""
     found = checked(
         export(tmp_path / "day.csv", "timestamp,FIC-101.SP,FIC-101.PV,FIC-101.OP"), "loop\nFIC-110\n"
     )
     assert "no PV tag FIC-110.PV in the export\n" in found.output
 
 
-def test_a_pv_that_is_called_as_times_are_is_a_pv(tmp_path):
-    """A column that loops.csv states as PV holds no stamps, though 'Data' is a date in other languages."""
+def test_a_pv_with_the_name_of_a_time_is_a_pv(tmp_path):
+    """A column that loops.csv states as PV is no time column, although 'Data' means date in some languages."""
     path = export(tmp_path / "day.csv", "Time,sp,Data,out")
     found = checked(path, "loop,sp,pv,op\nTIC1,sp,Data,out\n")
     assert found.exit_code == 0, found.output
@@ -65,7 +65,7 @@ def test_a_pv_that_is_called_as_times_are_is_a_pv(tmp_path):
 
 
 def test_an_error_with_fractions_is_no_quality(tmp_path):
-    """A column 'error' of fractions is a signal beside a 'status', and rejects no sample."""
+    """A column 'error' with fractions is a signal next to a column 'status', and rejects no sample."""
     path = export(tmp_path / "day.csv", "time,status,sp,error,output", "3")
     found = checked(path, "loop,sp,pv,op\nTC1,sp,error,output\n")
     assert found.exit_code == 0, found.output
@@ -73,7 +73,7 @@ def test_an_error_with_fractions_is_no_quality(tmp_path):
 
 
 def test_a_stated_tag_is_no_quality(tmp_path):
-    """A column that loops.csv states as a tag is no quality, whatever its name and its figures."""
+    """A column that loops.csv states as a tag is no quality column, for any name and any values."""
     path = export(tmp_path / "day.csv", "time,quality,sp,pv,op", "3")
     found = checked(path, "loop,sp,pv,op,mode\nTC1,sp,pv,op,quality\n")
     assert "taken as bad" not in found.output
@@ -81,7 +81,7 @@ def test_a_stated_tag_is_no_quality(tmp_path):
 
 @pytest.mark.parametrize("form", ["%H:%M:%S", "%I:%M:%S %p"])
 def test_times_of_day_are_read_over_midnight_in_a_stated_format(tmp_path, form):
-    """A format without a date reads times of day, a day more after midnight: the hour has its 1,800 samples."""
+    """A format without a date reads times of day with the next day after midnight: the hour has its 1,800 samples."""
     path = export(tmp_path / "day.csv", "clock,TIC1.SP,TIC1.PV,TIC1.OP", form=form)
     found = checked(path, "loop\nTIC1\n", "--date-format", form)
     assert found.exit_code == 0, found.output
@@ -97,8 +97,8 @@ def store(tmp_path: Path) -> Path:
     return tmp_path / "store"
 
 
-def test_a_column_that_is_misspelt_is_asked_back(store):
-    """`--by eror` offers columns of errors in one short line, and an unknown one does not list them all."""
+def test_a_misspelt_column_gives_a_suggestion(store):
+    """`--by eror` suggests columns of errors in one short line, and an unknown name does not list all columns."""
     near = CliRunner().invoke(main, ["rank", str(store), "--by", "eror"])
     assert near.exit_code == 2
     assert "average_absolute_error_pct" in near.output
@@ -108,7 +108,7 @@ def test_a_column_that_is_misspelt_is_asked_back(store):
 
 
 def test_a_list_needs_no_terminal_and_no_unicode(store):
-    """`rank` prints a list where the output is cp1252, and ends well where it is closed."""
+    """`rank` prints a list if the output is cp1252, and ends without error if the output is closed."""
     command = [sys.executable, "-m", "analyzer.cli", "rank", str(store)]
     western = subprocess.run(
         command, capture_output=True, env={**os.environ, "PYTHONIOENCODING": "cp1252"}, check=False

@@ -1,4 +1,6 @@
-"""What a night says of loops that share an oscillation: rows, groups, list and pages, by the simulation's truths."""
+"""Results of a night for loops that share an oscillation: rows, groups, list and pages agree with the simulated
+truth.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,7 @@ def rows(plant: RunPlant, table: str = "nights") -> list[Row]:
 
 
 def listed(plant: RunPlant, form: str) -> str:
-    """What `triage rank --groups` prints."""
+    """The output of `triage rank --groups`."""
     done = CliRunner().invoke(
         main, ["rank", str(plant.store), "--groups", "--format", form], catch_exceptions=False
     )
@@ -43,30 +45,32 @@ def listed(plant: RunPlant, form: str) -> str:
 
 
 def source(plant: RunPlant) -> str:
-    """The loop whose valve sticks."""
+    """The loop with the sticking valve."""
     return next(name for name, t in plant.truth.items() if t["role"] == "source")
 
 
 def followers(plant: RunPlant, swell: float) -> set[str]:
-    """Loops whose error it spreads by so much."""
+    """Loops whose error the sticking valve increases by at least this factor."""
     return {name for name, t in plant.truth.items() if t["role"] == "follower" and t["swell"] >= swell}
 
 
-def test_the_source_leads_those_that_it_moves(run_plant: RunPlant):
-    """Of six loops whose error the sticking valve doubles, five at least are sent to it; it keeps its verdict."""
+def test_the_loops_that_the_source_moves_follow_it(run_plant: RunPlant):
+    """Of six loops whose error the sticking valve doubles, at least five follow it; the source keeps its verdict."""
     by_name = {r["loop"]: r for r in rows(run_plant)}
     lead = source(run_plant)
-    told = [by_name[name] for name in followers(run_plant, 2.0) if by_name[name]["source_loop"]]
-    assert len(told) >= 5
-    for row in told:
+    followers_found = [by_name[name] for name in followers(run_plant, 2.0) if by_name[name]["source_loop"]]
+    assert len(followers_found) >= 5
+    for row in followers_found:
         assert (row["source_loop"], row["cause"], row["action"]) == (lead, "load", "see source loop")
     assert by_name[lead]["cause"] == "valve"
     assert by_name[lead]["source_loop"] is None
     assert "fix this one first" in by_name[lead]["reason"]
 
 
-def test_whoever_oscillates_stands_in_that_lane(run_plant: RunPlant):
-    """Lanes are told after the plant-wide pass: a loop that it finds oscillating is in the lane, and nobody else."""
+def test_each_oscillating_loop_is_in_that_lane(run_plant: RunPlant):
+    """Lanes are assigned after the plant-wide pass: exactly the loops that oscillate after it are in the oscillation
+    lane.
+    """
     found = rows(run_plant)
     assert {r["loop"] for r in found if "oscillation" in lanes_in(r)} == {
         r["loop"] for r in found if counts(r["oscillating_pct"])
@@ -74,8 +78,8 @@ def test_whoever_oscillates_stands_in_that_lane(run_plant: RunPlant):
     assert any(r["source_loop"] for r in found)
 
 
-def test_no_follower_is_told_to_retune(run_plant: RunPlant):
-    """Loops that follow another one get no settings, and loops that nothing couples to the source follow nobody."""
+def test_no_follower_gets_settings(run_plant: RunPlant):
+    """Loops that follow another loop get no settings, and loops without a coupling to the source follow none."""
     for row in rows(run_plant):
         if row["source_loop"]:
             assert row["kp_new"] is None
@@ -84,7 +88,7 @@ def test_no_follower_is_told_to_retune(run_plant: RunPlant):
 
 
 def test_the_group_is_listed_in_every_format(run_plant: RunPlant):
-    """Table, CSV, JSON and Markdown name the loop to fix first and those that would gain."""
+    """Table, CSV, JSON and Markdown name the loop to fix first and the loops that would improve."""
     lead = source(run_plant)
     (first, *_) = json.loads(listed(run_plant, "json"))
     assert first["fix_first"] == lead
@@ -98,7 +102,7 @@ def test_the_group_is_listed_in_every_format(run_plant: RunPlant):
 
 
 def test_groups_have_pages_with_pictures(run_plant: RunPlant):
-    """The morning page links a page of the group, which draws way, trends and spectra of its loops."""
+    """The morning page links to a page of the group with the path, the trends and the spectra of its loops."""
     found = {p.name: p for p in pages_of_night(Store(run_plant.store))}
     assert 'href="group-1.html"' in render(found["index"])
     blocks = [b for s in found["group-1"].sections for b in s.blocks]
@@ -114,8 +118,10 @@ def test_groups_have_pages_with_pictures(run_plant: RunPlant):
     )
 
 
-def test_the_table_of_groups_tells_roles_and_gains(run_plant: RunPlant):
-    """One source a group, confidences that leave room for a source unseen, and gains no larger than the error."""
+def test_the_table_of_groups_has_roles_and_gains(run_plant: RunPlant):
+    """Each group has one source, confidences that leave room for an unseen source, and gains not larger than the
+    error.
+    """
     errors = {r["loop"]: r["average_absolute_error_pct"] for r in rows(run_plant)}
     for row in rows(run_plant, "groups"):
         assert 0 <= row["gain_pct"] <= errors[row["loop"]]
@@ -127,7 +133,7 @@ def test_the_table_of_groups_tells_roles_and_gains(run_plant: RunPlant):
 
 
 def test_a_second_run_of_some_loops_keeps_the_others_group(run_plant: RunPlant, tmp_path):
-    """Loops of another export of the night are numbered behind the groups that the store has."""
+    """Groups of another export of the night are numbered after the groups that the store has."""
     import shutil
 
     store = tmp_path / "store"
@@ -143,7 +149,7 @@ def test_a_second_run_of_some_loops_keeps_the_others_group(run_plant: RunPlant, 
 
 @pytest.mark.parametrize("form", ["table", "json", "csv", "markdown"])
 def test_a_night_without_groups_says_so(tmp_path, form):
-    """A store whose night has no groups lists none and fails nowhere."""
+    """A store whose night has no groups lists none and gives no error."""
     from analyzer.columns import NIGHTS
     from analyzer.store.table import rows_table, write_table
 
@@ -157,8 +163,8 @@ def test_a_night_without_groups_says_so(tmp_path, form):
         assert "no loops share an oscillation" in done.output
 
 
-def test_list_and_page_say_one_confidence():
-    """A confidence is rounded once: list and morning page say the same percentage of a source."""
+def test_list_and_page_show_the_same_confidence():
+    """A confidence is rounded once: the list and the morning page show the same percentage of a source."""
     known = {"role": "source", "group_period_s": 60.0, "source_pct": 63.46, "gain_pct": None}
     night = {"cause": "valve", "action": "repair valve", "kp_new": None, "ti_new": None}
     group = GroupView("1", ({**known, "loop": "A"},), {"A": night})

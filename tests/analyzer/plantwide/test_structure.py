@@ -1,4 +1,4 @@
-"""What hangs on what is told from the moves of set points, outputs and PVs, and from nothing that moves by chance."""
+"""Dependences between loops are found from the moves of set points, outputs and PVs, and not from random moves."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ N, DT_S = 9000, 4.0
 
 
 def wander(seed: int) -> Floats:
-    """A signal that moves all the time."""
+    """A signal that always moves."""
     x = np.cumsum(np.random.default_rng(seed).standard_normal(N))
     return 50.0 + 10.0 * (x - x.mean()) / np.ptp(x)
 
 
 def by_exception(x: Floats, band: float) -> Floats:
-    """A signal whose changes smaller than a band are not recorded."""
+    """A signal recorded by exception: changes smaller than a band are not recorded."""
     out, last = x.copy(), x[0]
     for k in range(x.size):
         last = x[k] if abs(x[k] - last) >= band else last
@@ -30,7 +30,7 @@ def by_exception(x: Floats, band: float) -> Floats:
 
 
 def moves(loop: str, sp: Floats, pv: Floats, op: Floats, late: int = 0) -> Moves:
-    """What is kept of trends whose record begins some samples late."""
+    """The stored moves of trends whose record begins some samples late."""
     start = START_S + late * DT_S
     record = LoopRecord(loop, start, DT_S, sp[late:], pv[late:], op[late:], np.zeros(N - late, dtype=bool))
     found = moves_of(record)
@@ -39,8 +39,11 @@ def moves(loop: str, sp: Floats, pv: Floats, op: Floats, late: int = 0) -> Moves
 
 
 def test_a_set_point_that_is_an_output_names_the_master() -> None:
-    """In another unit, recorded by exception and from another time on, it is the master's output all the same, and
-    the PV that the master's loop moves is not its leader."""
+    """The set point in another unit, recorded by exception and from a later time, is still found as the master's
+    output.
+
+    The PV that the master moves is not its leader.
+    """
     out = wander(1)
     master = moves("TIC1", np.full(N, 50.0), 50.0 + 0.4 * (out - 50.0), out)
     slave = moves("FIC1", by_exception(3.0 * out - 20.0, 0.3), 3.0 * out - 20.0, wander(2), late=777)
@@ -51,31 +54,33 @@ def test_a_set_point_that_is_an_output_names_the_master() -> None:
 
 
 def test_a_set_point_in_a_ratio_names_its_leader() -> None:
-    """Where the set point goes with a PV and with no output, it keeps a ratio to that."""
+    """A set point that follows a PV and no output has a ratio to that PV."""
     leading = wander(1)
     leader = moves("FIC1", np.full(N, 50.0), leading, wander(2))
     found = links_of([leader, moves("FIC2", 0.4 * leading + 5.0, wander(3), wander(4))], LIMITS)
     assert found == {"FIC2": Link("FIC1", Tie.RATIO, pytest.approx(1.0, abs=0.01))}
 
 
-def test_two_hundred_loops_that_move_by_chance_hang_on_nothing() -> None:
-    """Of 39,800 pairs of unrelated loops none is told."""
+def test_two_hundred_loops_that_move_randomly_have_no_links() -> None:
+    """Of 39,800 pairs of unrelated loops none is reported."""
     loops = [moves(f"L{k}", wander(3 * k), wander(3 * k + 1), wander(3 * k + 2)) for k in range(200)]
     assert links_of(loops, LIMITS) == {}
 
 
 def test_steps_at_one_time_are_no_link() -> None:
-    """An operator who moves two set points at once makes no cascade, and a set point that stands is asked of none."""
+    """Two set points that an operator moves at the same time are no cascade, and a constant set point has no
+    moves.
+    """
     rng, step = np.random.default_rng(1), np.where(np.arange(N) > 4000, 20.0, 0.0)
     one = moves("A", 50.0 + step, 50.0 + step, wander(1) + step)
     still = moves("B", 30.0 + step, 30.0 + step + 0.1 * rng.standard_normal(N), wander(2))
     assert still.sp.size == 0
-    restless = moves("C", wander(3) + step, wander(4), wander(5))
-    assert links_of([one, still, restless], LIMITS) == {}
+    always_moving = moves("C", wander(3) + step, wander(4), wander(5))
+    assert links_of([one, still, always_moving], LIMITS) == {}
 
 
 def test_moves_are_kept_as_they_are() -> None:
-    """A piece of the store gives back what was put in; a record of an hour keeps nothing."""
+    """Moves read from the store equal the moves written; a record of an hour stores none."""
     put = moves("A", wander(1), wander(2), np.full(N, 50.0))
     (got,) = moves_in(moves_table([put]))
     assert (got.loop, got.first, got.op.size) == ("A", put.first, 0)
