@@ -52,7 +52,7 @@ def test_the_draft_is_read_as_loops_csv(mixed_export: Path, tmp_path: Path) -> N
 
 
 def test_a_draft_states_no_range_of_an_op_in_milliamperes(tmp_path: Path) -> None:
-    """If all OPs lie within 4 to 20, as in mA, the draft leaves their range open, and `check` reports that it is missing.
+    """If all OPs lie within 4 to 20, as in mA, the draft leaves their range open, and `check` reports that.
 
     With a range of 0 to 100 it would be percent.
     """

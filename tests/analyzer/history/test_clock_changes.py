@@ -1,4 +1,4 @@
-"""Stamps without a zone over the changes of the clock: nothing is lost, and what shows no change is not changed."""
+"""Stamps without a zone across clock changes: no sample is lost, and a clock without a change is read as such."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ NIGHTS = ("2024-03-30 20:00", "2024-10-26 20:00")
 
 
 def written(path: Path, shown: pd.DatetimeIndex) -> Path:
-    """An export of stamps as shown, with the number of each row as its value."""
+    """An export with the stamps as shown; the value of each row is its number."""
     rows = [f"{stamp:%Y-%m-%d %H:%M:%S},{k}" for k, stamp in enumerate(shown)]
     path.write_text("\n".join(["time,a.PV", *rows]) + "\n", encoding="utf-8")
     return path
 
 
 def check(paths: list[Path], truth: pd.DatetimeIndex) -> list[str]:
-    """Every sample is read, in its order, at its time; the notes."""
+    """Check that each sample is read in order and at its time; returns the notes."""
     export = open_export(paths, BERLIN)
     series = export.read(["a.PV"])["a.PV"]
     np.testing.assert_array_equal(series.stamp_s, truth.as_unit("s").asi8)
@@ -33,7 +33,7 @@ def check(paths: list[Path], truth: pd.DatetimeIndex) -> list[str]:
 @pytest.mark.parametrize("night", NIGHTS)
 @pytest.mark.parametrize("step", ["10s", "7min", "45min", "60min", "75min", "90min"])
 def test_a_changed_clock_at_any_step(tmp_path: Path, night: str, step: str) -> None:
-    """However far apart the samples, each is read at its time, and none at that of another."""
+    """At any interval, each sample is read at its own time."""
     truth = pd.date_range(
         night, "2024-10-27 20:00" if "10" in night else "2024-03-31 20:00", freq=step, tz="UTC"
     )
@@ -42,14 +42,14 @@ def test_a_changed_clock_at_any_step(tmp_path: Path, night: str, step: str) -> N
 
 @pytest.mark.parametrize("night", NIGHTS)
 def test_a_clock_that_is_not_changed(tmp_path: Path, night: str) -> None:
-    """A clock that keeps winter time is seen by its hours, read so, and told with how to state another."""
+    """A clock that keeps winter time is recognized, read as such, and reported with the option that states it."""
     truth = pd.date_range(night, periods=1000, freq="min", tz="UTC")
     notes = check([written(tmp_path / "x.csv", truth.tz_convert("Etc/GMT-1"))], truth)
     assert any("+1 h from UTC throughout; state --timezone Etc/GMT-1" in note for note in notes)
 
 
-def test_files_follow_one_that_shows_it(tmp_path: Path) -> None:
-    """The days before, which do not show that the clock is never changed, are read by that of the change."""
+def test_files_follow_one_that_shows_the_clock(tmp_path: Path) -> None:
+    """The file of the days before the change is read with the clock that the file of the change shows."""
     truth = pd.date_range("2024-10-25 22:00", periods=2880, freq="min", tz="UTC")
     shown = truth.tz_convert("Etc/GMT-1")
     files = [written(tmp_path / f"{k}.csv", shown[k : k + 1440]) for k in (0, 1440)]
@@ -57,7 +57,7 @@ def test_files_follow_one_that_shows_it(tmp_path: Path) -> None:
 
 
 def test_a_file_may_begin_in_the_second_pass(tmp_path: Path) -> None:
-    """A file cut where the clock was set back is read as winter time, and no sample takes another's place."""
+    """A file that begins where the clock was set back is read as winter time, and no sample replaces another."""
     truth = pd.date_range("2024-10-26 23:00", periods=240, freq="min", tz="UTC")
     shown = truth.tz_convert("Europe/Berlin")
     check([written(tmp_path / "1.csv", shown[:120]), written(tmp_path / "2.csv", shown[120:])], truth)
@@ -65,7 +65,7 @@ def test_a_file_may_begin_in_the_second_pass(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_midnight_written_24(tmp_path: Path, turned: bool) -> None:
-    """24:00:00 is the midnight at which the stamps run on, whether its date is that of the old day or of the new."""
+    """24:00:00 is the midnight that continues the stamps, with the date of either the old or the new day."""
     truth = pd.date_range("2024-11-21 23:00", periods=120, freq="min", tz="UTC")
     path = written(tmp_path / "x.csv", truth)
     day = "22" if turned else "21"
@@ -75,8 +75,8 @@ def test_midnight_written_24(tmp_path: Path, turned: bool) -> None:
 
 
 @pytest.mark.parametrize("stamp", ["25:10:00", "12:61:00", "12:10:61", "24:01:00", "12:10:00+99:00"])
-def test_what_no_clock_shows_is_left_out(tmp_path: Path, stamp: str) -> None:
-    """A stamp that no clock shows is left out and counted, and not carried over into the next hour or day."""
+def test_an_impossible_time_is_left_out(tmp_path: Path, stamp: str) -> None:
+    """A stamp with an impossible time is left out and counted, and not moved to the next hour or day."""
     path = written(tmp_path / "x.csv", pd.date_range("2024-11-21 08:00", periods=60, freq="s"))
     path.write_text(path.read_text().replace("08:00:30", stamp))
     export = open_export([path])

@@ -1,4 +1,4 @@
-"""Exports too big for memory are streamed once and read as if they had been read whole."""
+"""Exports too big for memory are streamed once and give the same result as exports that are read completely."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def stamp(k: int) -> str:
 
 
 def wide(path: Path) -> Path:
-    """A wide CSV in the German manner, with a text late in one column, a mode, and a line that does not fit."""
+    """A wide CSV with German conventions, a text late in one column, a mode column, and a line that does not fit."""
     rng = np.random.default_rng(1)
     lines = [";".join(["Zeit", *TAGS, "FIC000.MODE"])]
     for k in range(ROWS):
@@ -42,7 +42,7 @@ def wide(path: Path) -> Path:
 
 
 def long(path: Path, umlaut: bool = False) -> Path:
-    """A long CSV in the order of time, 80 tags interleaved, with quality."""
+    """A long CSV in the order of time with 80 interleaved tags and quality."""
     rng = np.random.default_rng(2)
     lines = ["Tag,Time,Value,Quality"]
     for k in range(ROWS):
@@ -57,7 +57,7 @@ def long(path: Path, umlaut: bool = False) -> Path:
 
 
 def both(path: Path, monkeypatch: pytest.MonkeyPatch, scratch: Path) -> tuple[Export, Export]:
-    """The export read whole, and streamed."""
+    """The export read completely, and streamed."""
     whole = open_export([path])
     monkeypatch.setattr("analyzer.history.export.WHOLE_BYTES", 100)
     monkeypatch.setattr("analyzer.history.sheet.BLOCK_BYTES", 1 << 14)
@@ -71,7 +71,7 @@ def both(path: Path, monkeypatch: pytest.MonkeyPatch, scratch: Path) -> tuple[Ex
 def test_a_tag_that_ends_in_a_quote_keeps_its_samples(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A tag is called the same, and has the same samples, whether its file is read whole or streamed."""
+    """A tag has the same name and the same samples if its file is read completely or streamed."""
     rows = [f'"FIC1 ""a""",{stamp(k)},{k},192\nFIC1 b,{stamp(k)},{-k},192\n' for k in range(ROWS)]
     (tmp_path / "x.csv").write_text("Tag,Time,Value,Quality\n" + "".join(rows))
     whole, streamed = both(tmp_path / "x.csv", monkeypatch, tmp_path)
@@ -80,8 +80,10 @@ def test_a_tag_that_ends_in_a_quote_keeps_its_samples(
 
 
 @pytest.mark.parametrize("kind", ["wide", "long", "long, umlaut late"])
-def test_streamed_is_read_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
-    """Tags, samples, quality, texts, span, notes on what was met: all as of the file that is read at once."""
+def test_a_streamed_export_equals_the_complete_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    """Tags, samples, quality, texts, span and notes of a streamed file are those of the file read completely."""
     path = wide(tmp_path / "x.csv") if kind == "wide" else long(tmp_path / "x.csv", "umlaut" in kind)
     whole, streamed = both(path, monkeypatch, tmp_path)
     assert streamed.tags == whole.tags
@@ -97,8 +99,8 @@ def test_streamed_is_read_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     assert [n for n in whole.notes if "left out" in n] == [n for n in streamed.notes if "left out" in n]
 
 
-def test_texts_that_come_late_cost_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Words behind megabytes of numbers, in one column after the other, are bad samples of those columns alone."""
+def test_late_texts_do_not_prevent_reading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Words after megabytes of numbers, in one column after another, are bad samples of those columns only."""
     path, rows, rng = tmp_path / "x.csv", 12_000, np.random.default_rng(4)
     words = {9000 + 300 * k: k for k in range(8)}
     lines = ["Time," + ",".join(TAGS[:8])]
@@ -108,7 +110,7 @@ def test_texts_that_come_late_cost_no_file(tmp_path: Path, monkeypatch: pytest.M
             cells[words[k]] = "I/O Timeout"
         lines.append(f"2026-03-02 {k // 3600:02d}:{k // 60 % 60:02d}:{k % 60:02d},{','.join(cells)}")
     path.write_text("\n".join(lines) + "\n")
-    assert path.stat().st_size > 1 << 20  # the parser settles its types on the first megabyte
+    assert path.stat().st_size > 1 << 20  # the parser decides the types on the first megabyte
     whole, streamed = both(path, monkeypatch, tmp_path)
     a, b = whole.read(TAGS[:8]), streamed.read(TAGS[:8])
     for k, tag in enumerate(TAGS[:8]):
@@ -116,8 +118,8 @@ def test_texts_that_come_late_cost_no_file(tmp_path: Path, monkeypatch: pytest.M
         assert np.flatnonzero(b[tag].bad).tolist() == [9000 + 300 * k]
 
 
-def test_a_long_parquet_is_parted_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A long Parquet file, its tags a dictionary, reads alike whether it is searched or parted by loop."""
+def test_a_long_parquet_is_divided_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A long Parquet file with a dictionary of tags gives the same result if it is searched or divided by loop."""
     n, stamps = ROWS * len(TAGS), np.arange(ROWS) * 1_000_000 + 1_772_409_600_000_000
     table = pa.table(
         {
@@ -143,8 +145,8 @@ def test_a_long_parquet_is_parted_once(tmp_path: Path, monkeypatch: pytest.Monke
         np.testing.assert_array_equal(a[tag].bad, b[tag].bad)
 
 
-def test_an_open_quote_costs_no_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A quote that is not closed does not swallow the rest of the file."""
+def test_an_open_quote_loses_no_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A quote that is not closed loses no other row of the file."""
     path = wide(tmp_path / "x.csv")
     text = path.read_text(encoding="cp1252").replace(stamp(5), '"' + stamp(5), 1)
     path.write_text(text, encoding="cp1252")
@@ -154,8 +156,10 @@ def test_an_open_quote_costs_no_rows(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert any("a quote is not closed" in note for note in streamed.notes)
 
 
-def test_a_stopped_run_s_copy_is_taken_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run that goes on streams a big export no second time, reads the same, and streams anew what changed."""
+def test_the_copy_of_a_stopped_run_is_used_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A resumed run does not stream an unchanged big export again, reads the same samples, and streams a changed
+    export again.
+    """
     path, store = long(tmp_path / "x.csv", umlaut=True), tmp_path / "store"
     monkeypatch.setattr("analyzer.history.export.WHOLE_BYTES", 100)
     first: dict[str, Series] = {}
@@ -176,7 +180,7 @@ def test_a_stopped_run_s_copy_is_taken_up(tmp_path: Path, monkeypatch: pytest.Mo
         again = opened.read(TAGS[:4])
         assert passes == []
         assert not (copies / "converted-half").exists()
-        next(copies.glob("converted-*/*.parquet")).write_bytes(b"PAR1")  # its end is lost
+        next(copies.glob("converted-*/*.parquet")).write_bytes(b"PAR1")  # without its end
         open_export([path], ReadOptions(scratch=copies))
         assert len(passes) == 1
         path.write_bytes(path.read_bytes().replace(b"192", b"000", 1))
@@ -188,8 +192,8 @@ def test_a_stopped_run_s_copy_is_taken_up(tmp_path: Path, monkeypatch: pytest.Mo
     assert not list(store.glob(".copies-*"))
 
 
-def test_copies_of_a_living_run_are_nobody_else_s(tmp_path: Path) -> None:
-    """A run takes up or removes copies of runs that have ended, never those of one that lives."""
+def test_copies_of_an_active_run_are_used_by_no_other(tmp_path: Path) -> None:
+    """A run uses or removes only copies of runs that have ended, and never those of a run that is still active."""
     with scratch(tmp_path) as living:
         (living / "converted-1").mkdir()
         (living / "converted-1" / "done.json").write_text("{}")
@@ -214,7 +218,7 @@ print(json.dumps(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no resource module")
 def test_memory_does_not_grow_with_the_file(tmp_path: Path) -> None:
-    """A long file three times as large, 75 MB, takes at most a quarter more memory to open and to read a loop of."""
+    """For a long file three times as large (75 MB), opening and reading a loop needs at most 25 % more memory."""
     peak = {}
     for times in (30, 90):
         path = tmp_path / f"{times}.csv"

@@ -1,4 +1,4 @@
-"""One table, written in many ways, reads back as the same numbers at the same times."""
+"""A table that is written in many formats gives the same numbers at the same times."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def assert_read(path: Path, table: pd.DataFrame, options: ReadOptions | None = N
     newest_first=st.booleans(),
     line_end=st.sampled_from(["\n", "\r\n"]),
 )
-def test_however_it_is_written(
+def test_any_written_format_is_read(
     written: str,
     dialect: tuple[str, str],
     encoding: str,
@@ -97,7 +97,7 @@ def test_however_it_is_written(
     newest_first: bool,
     line_end: str,
 ) -> None:
-    """Any wide CSV reads back equal to its table, however stamps, numbers and lines are written."""
+    """Each wide CSV equals its table after reading, for all formats of stamps, numbers and lines."""
     table = day()
     rows = table[::-1] if newest_first else table
     text = preamble.format(delimiter=dialect[0]) + as_text(rows, written, *dialect, quote)
@@ -109,22 +109,22 @@ def test_however_it_is_written(
 
 @pytest.mark.parametrize("written", ["%d/%m/%Y %H:%M:%S", "%m/%d/%Y %H:%M:%S"])
 def test_day_or_month_by_a_day_above_twelve(tmp_path: Path, written: str) -> None:
-    """One day above 12 anywhere in the column decides the order for all its rows."""
+    """One day above 12 in the column decides the order of day and month for all rows."""
     table = day("2024-11-12 23:59:45")
     (tmp_path / "x.csv").write_text(as_text(table, written, ",", ".", ""))
     assert any("exceeds 12" in note for note in assert_read(tmp_path / "x.csv", table))
 
 
 @pytest.mark.parametrize("written", ["%d/%m/%Y %H:%M:%S", "%m/%d/%Y %H:%M:%S"])
-def test_day_or_month_by_the_run_of_the_stamps(tmp_path: Path, written: str) -> None:
-    """Without such a day that order counts in which time runs on without a leap."""
+def test_day_or_month_by_the_order_of_the_stamps(tmp_path: Path, written: str) -> None:
+    """Without such a day, the order in which time continues without a jump is used."""
     table = day("2024-02-01 23:59:45")
     (tmp_path / "x.csv").write_text(as_text(table, written, ",", ".", ""))
     assert any("without a jump" in note for note in assert_read(tmp_path / "x.csv", table))
 
 
 def test_day_or_month_by_another_file(tmp_path: Path) -> None:
-    """A file whose dates read either way follows a file of the same export that decides."""
+    """A file with ambiguous dates follows a file of the same export with unambiguous ones."""
     for name, start in (("a.csv", "2024-11-05 08:00"), ("b.csv", "2024-11-21 08:00")):
         (tmp_path / name).write_text(as_text(day(start), "%d/%m/%Y %H:%M:%S", ",", ".", ""))
     export = open_export([tmp_path])
@@ -132,8 +132,8 @@ def test_day_or_month_by_another_file(tmp_path: Path) -> None:
     assert "a.csv: dates are read day first: as in b.csv" in export.notes
 
 
-def test_day_or_month_undecided_is_told(tmp_path: Path) -> None:
-    """Dates that fit both orders are read month first, which is told; stating the order helps."""
+def test_day_or_month_undecided_is_reported(tmp_path: Path) -> None:
+    """Dates that fit both orders are read month first with a note; a stated order changes this."""
     table = day("2024-11-05 08:00")
     (tmp_path / "x.csv").write_text(as_text(table, "%d/%m/%Y %H:%M:%S", ",", ".", ""))
     notes = open_export([tmp_path]).notes
@@ -142,7 +142,7 @@ def test_day_or_month_undecided_is_told(tmp_path: Path) -> None:
 
 
 def test_a_stated_date_format(tmp_path: Path) -> None:
-    """A stated format is followed where no detection could succeed."""
+    """A stated date format is used where no detection could succeed."""
     table = day()
     (tmp_path / "x.csv").write_text(as_text(table, "%y%j_%H.%M.%S", ",", ".", ""))
     assert_read(tmp_path / "x.csv", table, ReadOptions(date_format="%y%j_%H.%M.%S"))
@@ -152,7 +152,7 @@ def test_a_stated_date_format(tmp_path: Path) -> None:
     ("date", "time"), [("%d.%m.%Y", "%H:%M:%S"), ("%Y-%m-%d", "%H:%M:%S"), ("%m/%d/%Y", "%I:%M:%S %p")]
 )
 def test_separate_date_and_time(tmp_path: Path, date: str, time: str) -> None:
-    """Columns of dates and of times of day are one time."""
+    """A column of dates and a column of times are combined into one time."""
     table = day()
     apart = table.drop(columns="Timestamp")
     apart.insert(0, "Time", table["Timestamp"].dt.strftime(time))
@@ -173,7 +173,7 @@ def test_separate_date_and_time(tmp_path: Path, date: str, time: str) -> None:
 )
 @pytest.mark.parametrize("by_tag", [True, False])
 def test_names_of_long_columns(tmp_path: Path, names: tuple[str, str, str], by_tag: bool) -> None:
-    """Long tables are known by the historians' column names, in any order of rows."""
+    """Long tables are recognized by the column names of historians, for any order of rows."""
     table = day()
     rows = table.melt(id_vars="Timestamp", var_name="tag", value_name="value")
     rows = rows if by_tag else rows.sort_values("Timestamp")
@@ -185,7 +185,7 @@ def test_names_of_long_columns(tmp_path: Path, names: tuple[str, str, str], by_t
 
 
 def test_one_loop_a_file_named_for_it(tmp_path: Path) -> None:
-    """Bare columns PV and OP belong to the loop that the file is named for."""
+    """Columns named only PV and OP belong to the loop with the name of the file."""
     table = day()
     bare = table.rename(columns={"FIC101.PV": "PV", "FIC101.OP": "OP"})
     bare.to_csv(tmp_path / "FIC101.csv", index=False)
@@ -193,7 +193,7 @@ def test_one_loop_a_file_named_for_it(tmp_path: Path) -> None:
 
 
 def test_parquet_with_text_stamps_and_index(tmp_path: Path) -> None:
-    """Parquet with written stamps, or with the stamps as a pandas index, reads the same."""
+    """Parquet with stamps as text, or as a pandas index, gives the same result."""
     table = day()
     written = table.assign(Timestamp=table["Timestamp"].dt.strftime("%d.%m.%Y %H:%M:%S"))
     written.to_parquet(tmp_path / "a.parquet")
@@ -205,8 +205,8 @@ def test_parquet_with_text_stamps_and_index(tmp_path: Path) -> None:
         assert_read(tmp_path / f"{name}.parquet", table)
 
 
-def test_lines_that_do_not_fit_are_told(tmp_path: Path) -> None:
-    """A footer and a broken line are left out and counted; rows behind them count."""
+def test_lines_that_do_not_fit_are_reported(tmp_path: Path) -> None:
+    """A footer is left out and counted; the other rows are read."""
     table = day()
     text = as_text(table, "%Y-%m-%d %H:%M:%S", ",", ".", "")
     (tmp_path / "x.csv").write_text(text + "(30 rows affected)\n")
@@ -215,7 +215,7 @@ def test_lines_that_do_not_fit_are_told(tmp_path: Path) -> None:
 
 
 def test_a_file_too_big_to_keep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A file above the limit is opened by its first rows, with the same result."""
+    """A file above the size limit is opened by its first rows, with the same result."""
     monkeypatch.setattr("analyzer.history.sheet.WHOLE_BYTES", 100)
     table = day(n=70_000)
     (tmp_path / "x.csv").write_text(as_text(table, "%d.%m.%Y %H:%M:%S", ";", ",", ""))
@@ -223,7 +223,7 @@ def test_a_file_too_big_to_keep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_a_text_is_parsed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What was parsed to find out how a text is written serves the samples too."""
+    """A text is parsed once, both to find its format and to read its samples."""
     parsed, whole = [], sheet._parsed_sheet
     monkeypatch.setattr(sheet, "_parsed_sheet", lambda *how: parsed.append(how) or whole(*how))
     table = day()
@@ -233,7 +233,7 @@ def test_a_text_is_parsed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_latin_letter_late_in_the_file(tmp_path: Path) -> None:
-    """A file that looks like UTF-8 at first and is Windows Latin later is read."""
+    """A file that begins as UTF-8 and later contains Windows Latin letters is read."""
     table = day(n=60_000)
     text = as_text(table, "%Y-%m-%d %H:%M:%S", ",", ".", "")
     rows = "".join(f"{line},{'ü' if i == 60_000 else 'x'}\n" for i, line in enumerate(text.splitlines()))
@@ -244,8 +244,8 @@ def test_a_latin_letter_late_in_the_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("zone", "hours"), [("PST", -8), ("MST", -7), ("MET", 1), ("MEZ", 1), ("MSK", 3), ("CEST", 2), ("UTC", 0)]
 )
-def test_letters_of_a_zone_are_no_half_of_the_day(tmp_path: Path, zone: str, hours: int) -> None:
-    """PST is a zone and not an afternoon; AM and PM before a zone stay what they are."""
+def test_letters_of_a_zone_are_not_am_or_pm(tmp_path: Path, zone: str, hours: int) -> None:
+    """PST is a zone and not an afternoon; AM and PM before a zone keep their meaning."""
     table = day()
     for clock in ("%H:%M:%S", "%I:%M:%S %p", "%I:%M:%S%p"):
         local = (table["Timestamp"] + pd.Timedelta(hours=hours)).dt.strftime(f"%Y-%m-%d {clock} {zone}")

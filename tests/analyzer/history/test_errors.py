@@ -1,4 +1,4 @@
-"""What cannot be read is told: what was seen, what was expected, what to do."""
+"""A file that cannot be read is reported with the content, the expectation and the remedy."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ ROW = "2024-11-21 08:00:00"
     ],
 )
 def test_text_that_is_no_export(tmp_path: Path, content: bytes, fragments: list[str]) -> None:
-    """Each fault of a delimited text is told with the file and a remedy."""
+    """Each error of a delimited text is reported with the file and a remedy."""
     path = tmp_path / "export.csv"
     path.write_bytes(content)
     with pytest.raises(InputError) as error:
@@ -59,7 +59,7 @@ def test_text_that_is_no_export(tmp_path: Path, content: bytes, fragments: list[
 
 @pytest.mark.parametrize("content", [b"timestamp,a\n", b"PAR1 cut short", b"PAR1"])
 def test_no_parquet(tmp_path: Path, content: bytes) -> None:
-    """A file that ends as Parquet and is none, or is cut short, is told so."""
+    """A file with a Parquet name that is not Parquet, or is cut short, is reported as such."""
     path = tmp_path / "export.parquet"
     path.write_bytes(content)
     with pytest.raises(InputError, match="named as Parquet, but cannot be read as such"):
@@ -67,7 +67,7 @@ def test_no_parquet(tmp_path: Path, content: bytes) -> None:
 
 
 def test_parquet_without_time_or_rows(tmp_path: Path) -> None:
-    """Parquet without a time column, without values or without rows is told so."""
+    """Parquet without a time column, without values or without rows is reported."""
     frames = {
         "no time column": pd.DataFrame({"FIC1.PV": [1.0]}),
         "no values": pd.DataFrame({"timestamp": pd.to_datetime([ROW])}),
@@ -80,7 +80,7 @@ def test_parquet_without_time_or_rows(tmp_path: Path) -> None:
 
 
 def test_a_file_that_goes_or_breaks_after_it_was_opened(tmp_path: Path) -> None:
-    """A file that is gone or damaged when its samples are read is told as one that cannot be opened."""
+    """A Parquet file that is missing or damaged when its samples are read is reported with its name."""
     frame = pd.DataFrame({"timestamp": pd.date_range(ROW, periods=9000, freq="s"), "a": range(9000)})
     frame.to_parquet(tmp_path / "x.parquet", compression=None)
     frame.to_csv(tmp_path / "x.csv", index=False)
@@ -111,8 +111,8 @@ CELLS = (
     st.sampled_from(",;\t|"),
     st.booleans(),
 )
-def test_any_text_is_read_or_told(rows: list[list[str]], delimiter: str, headed: bool) -> None:
-    """Whatever stands in a file, it is read, or refused with an error meant for the user."""
+def test_any_text_is_read_or_refused(rows: list[list[str]], delimiter: str, headed: bool) -> None:
+    """Any content of a text file is read, or refused with an error for the user."""
     header = [["timestamp", "FIC1.PV", "x"]] if headed else []
     text = "\n".join(delimiter.join(row) for row in header + rows)
     with tempfile.TemporaryDirectory() as folder:
@@ -131,7 +131,7 @@ def test_any_text_is_read_or_told(rows: list[list[str]], delimiter: str, headed:
 
 
 def test_paths(tmp_path: Path) -> None:
-    """A missing path and a folder without exports are told; loops.csv is no export."""
+    """A missing path and a folder without exports are reported; loops.csv is no export."""
     with pytest.raises(InputError, match=r"none\.csv: no such file or folder"):
         open_export([tmp_path / "none.csv"])
     (tmp_path / "loops.csv").write_text("loop\nFIC1\n")
@@ -143,7 +143,7 @@ def test_paths(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="permissions do not bind this user")
 def test_no_permission(tmp_path: Path) -> None:
-    """A file that may not be read is told so."""
+    """A file without read permission is reported."""
     path = tmp_path / "x.csv"
     path.write_text(f"timestamp,a\n{ROW},1\n")
     path.chmod(0)
@@ -152,7 +152,7 @@ def test_no_permission(tmp_path: Path) -> None:
 
 
 def test_options_that_do_not_fit(tmp_path: Path) -> None:
-    """An unknown time zone, a wrong encoding and a wrong date format are told."""
+    """An unknown time zone, a wrong encoding and a wrong date format are reported."""
     path = tmp_path / "x.csv"
     path.write_text(f"timestamp,a\n{ROW},1\n")
     with pytest.raises(InputError, match=r"time zone 'Mars/Olympus'.*IANA"):

@@ -1,4 +1,4 @@
-"""Exports: which tags, which samples, from one file or many."""
+"""Exports: their tags and samples, from one file or several files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ RECORDINGS = Path(__file__).parents[3].parent / "shared" / "recordings"
 
 
 def plant_day(n: int = 50, start: str = "2024-11-21 08:00:00") -> pd.DataFrame:
-    """A wide table of two loops; numbers with few digits, so that any text of them is exact."""
+    """A wide table of two loops; the numbers have few digits, so that each text of them is exact."""
     noise = np.random.default_rng(7).integers(0, 100_000, (n, 3)) / 1000
     table = pd.DataFrame(noise, columns=["FIC101.SP", "FIC101.PV", "LIC102.OP"])
     table.insert(0, "timestamp", pd.date_range(start, periods=n, freq="s"))
@@ -69,15 +69,15 @@ def test_wide_and_long_csv(tmp_path: Path) -> None:
 
 
 def test_files_of_one_tag_are_joined(tmp_path: Path) -> None:
-    """One file a day gives one series over all days, whatever the order of the files."""
+    """One file for each day gives one series over all days, for any order of the files."""
     table = plant_day(60)
     table[30:].to_parquet(tmp_path / "a.parquet")
     table[:31].to_csv(tmp_path / "b.csv", index=False)
     assert_same(tmp_path, table)
 
 
-def test_contradicting_files_are_told(tmp_path: Path) -> None:
-    """Where two files disagree on a stamp the later one counts, and a note says how often."""
+def test_contradicting_files_are_reported(tmp_path: Path) -> None:
+    """If two files disagree at a stamp, the later file is used, and a note gives the number of such samples."""
     table = plant_day(10)
     table.to_parquet(tmp_path / "a.parquet")
     table.assign(**{"FIC101.PV": -1.0}).to_parquet(tmp_path / "b.parquet")
@@ -87,7 +87,7 @@ def test_contradicting_files_are_told(tmp_path: Path) -> None:
 
 
 def test_an_export_is_picklable_and_small(tmp_path: Path) -> None:
-    """An export sent to another process reads the same there, and carries no samples."""
+    """An export that is sent to another process gives the same samples there, and its pickle contains no samples."""
     table = plant_day(5000)
     table.to_parquet(tmp_path / "day.parquet")
     sent = pickle.dumps(open_export([tmp_path]))
@@ -98,7 +98,7 @@ def test_an_export_is_picklable_and_small(tmp_path: Path) -> None:
 
 
 def test_span(tmp_path: Path) -> None:
-    """The span is the first and the last stamp of all files."""
+    """The span begins with the first stamp and ends with the last stamp of all files."""
     plant_day(60).to_parquet(tmp_path / "day.parquet")
     first, last = open_export([tmp_path]).span()
     assert last - first == 59
@@ -106,7 +106,7 @@ def test_span(tmp_path: Path) -> None:
 
 
 def test_unknown_tag(tmp_path: Path) -> None:
-    """A tag that is not in the export is named, with the nearest one that is."""
+    """A tag that is missing from the export is named, with the nearest existing tag."""
     plant_day().to_parquet(tmp_path / "day.parquet")
     with pytest.raises(InputError, match=r"FIC101\.PW is not in the export.*FIC101\.PV"):
         open_export([tmp_path]).read(["FIC101.PW"])
@@ -115,7 +115,7 @@ def test_unknown_tag(tmp_path: Path) -> None:
 @pytest.mark.skipif(not RECORDINGS.exists(), reason="the real recordings lie outside the repository")
 @pytest.mark.parametrize("folder", ["isdb", "isdb-op", "refinery", "rigs"])
 def test_real_recordings(folder: str) -> None:
-    """Every tag of the real recordings is read, stamps rising, most values good."""
+    """Each tag of the real recordings is read with increasing stamps, and less than 5 % of its values are bad."""
     export = open_export([RECORDINGS / folder])
     for tag in export.tags:
         series = export.read([tag])[tag]
@@ -123,8 +123,11 @@ def test_real_recordings(folder: str) -> None:
         assert series.bad.mean() < 0.05
 
 
-def test_an_unreadable_file_in_a_folder_costs_its_own_loops(tmp_path: Path) -> None:
-    """A readme, an empty file and a damaged Parquet beside good exports are left out and told; named, refused."""
+def test_an_unreadable_file_in_a_folder_loses_only_its_own_loops(tmp_path: Path) -> None:
+    """A readme, an empty file and a damaged Parquet in a folder with good exports are left out and reported.
+
+    If such a file is named directly, it is refused.
+    """
     good = pd.DataFrame(
         {"timestamp": pd.date_range("2026-03-02", periods=50, freq="s"), "FIC1.PV": range(50)}
     )
@@ -134,7 +137,7 @@ def test_an_unreadable_file_in_a_folder_costs_its_own_loops(tmp_path: Path) -> N
     (tmp_path / "bad.parquet").write_bytes(b"PAR1 and then nothing")
     export = open_export([tmp_path])
     assert export.tags == ("FIC1.PV",)
-    told = " ".join(export.file_notes)
-    assert all(name in told for name in ("readme.txt", "empty.csv", "bad.parquet"))
+    notes = " ".join(export.file_notes)
+    assert all(name in notes for name in ("readme.txt", "empty.csv", "bad.parquet"))
     with pytest.raises(InputError, match=r"bad\.parquet"):
         open_export([tmp_path / "good.parquet", tmp_path / "bad.parquet"])

@@ -1,4 +1,6 @@
-"""Tables under preambles, parted by blanks, on clocks counting from the start; stamps that lost their seconds."""
+"""Tables after preambles, tables separated by blanks, clocks that count from the start, and stamps without
+seconds.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,7 @@ def lines(sep: str, form: str = "%Y-%m-%d %H:%M:%S", time: str = "Time") -> list
 
 
 def check(path: Path, text: list[str]) -> None:
-    """Both tags are read, every sample at its moment, and nothing is left out."""
+    """Check that both tags are read with each sample at its time, and that nothing is left out."""
     path.write_text("\n".join(text) + "\n", encoding="utf-8")
     export = open_export([path])
     assert export.tags == ("FIC1.PV", "FIC1.OP")
@@ -45,7 +47,7 @@ PREAMBLES = (
 
 @pytest.mark.parametrize("preamble", PREAMBLES)
 def test_a_preamble_as_wide_as_the_table(tmp_path: Path, preamble: list[str]) -> None:
-    """Lines of a preamble are no header where a row of names with a time's among them stands below."""
+    """Lines of a preamble are not the header if a row of names with a time column follows."""
     check(tmp_path / "x.csv", preamble + lines(";"))
 
 
@@ -53,14 +55,14 @@ def test_a_preamble_as_wide_as_the_table(tmp_path: Path, preamble: list[str]) ->
     ("form", "time"),
     [("%Y-%m-%d %H:%M:%S", "Time"), ("%Y-%m-%d %H:%M:%S", "Date Time"), ("%Y-%m-%dT%H:%M:%S", "Time")],
 )
-def test_columns_parted_by_one_blank(tmp_path: Path, form: str, time: str) -> None:
-    """Words parted by blanks are a table, also where date and time of day stand under one name."""
+def test_columns_separated_by_one_blank(tmp_path: Path, form: str, time: str) -> None:
+    """Columns separated by one blank form a table, also if date and time have one column name."""
     check(tmp_path / "x.txt", lines(" ", form, time))
 
 
 @pytest.mark.parametrize("step_s", [1, 60, 3600])
 def test_hours_minutes_and_seconds_since_the_start(tmp_path: Path, step_s: int) -> None:
-    """Times without a date that begin with zero count from the start, beyond a day too."""
+    """Times without a date that begin with zero count from the start, also beyond a day."""
     at = np.arange(60) * step_s
     rows = [f"{s // 3600}:{s // 60 % 60:02d}:{s % 60:02d},{k}" for k, s in enumerate(at)]
     (tmp_path / "x.csv").write_text("\n".join(["Elapsed,a.PV", *rows]) + "\n")
@@ -69,10 +71,12 @@ def test_hours_minutes_and_seconds_since_the_start(tmp_path: Path, step_s: int) 
     assert any("since the start" in note for note in export.notes)
 
 
-def test_many_columns_are_asked_at_once_whether_they_hold_stamps(
+def test_the_search_for_stamps_does_not_grow_with_the_columns(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """How often stamps are taken apart, which costs more than all else of opening, does not grow with the columns."""
+    """The number of calls that split stamps, the slowest part of opening, does not grow with the number of
+    columns.
+    """
     whole, calls = stamps.fields, []
     monkeypatch.setattr(stamps, "fields", lambda *texts: calls.append(1) or whole(*texts))
     met = []
@@ -89,8 +93,11 @@ def test_many_columns_are_asked_at_once_whether_they_hold_stamps(
 @pytest.mark.parametrize("form", ["%H:%M:%S", "%I:%M:%S %p"])
 @pytest.mark.parametrize("blocks", [False, True])
 def test_a_time_of_day_without_a_date_is_read(tmp_path: Path, form: str, blocks: bool) -> None:
-    """Times from 23:00 to 01:00 of the second day run on over both midnights, and that no date is stated is told;
-    in a table of one tag after another too."""
+    """Times from 23:00 to 01:00 of the third day continue over both midnights, and a note says that no date is
+    stated.
+
+    This holds too in a table of one tag after another.
+    """
     at = pd.date_range("1970-01-01 23:00", "1970-01-03 01:00", freq="60s")
     rows = [f"{t.strftime(form)},{k}" for k, t in enumerate(at)]
     if blocks:
@@ -106,7 +113,7 @@ def test_a_time_of_day_without_a_date_is_read(tmp_path: Path, form: str, blocks:
 @pytest.mark.parametrize("form", ["%m/%d/%Y %H:%M", "%m/%d/%Y %I:%M %p", "%Y-%m-%d %H:%M:00"])
 @pytest.mark.parametrize("step_s", [5, 30, 60])
 def test_stamps_that_lost_their_seconds(tmp_path: Path, long: bool, form: str, step_s: int) -> None:
-    """Samples of a minute on one stamp are refused in one line; samples a minute apart are read."""
+    """Several samples with the stamp of one minute are refused in one line; samples a minute apart are read."""
     at = pd.date_range("2024-11-21 08:00", periods=120, freq=f"{step_s}s")
     rows = [
         f"{f'{tag},' if long else ''}{t.strftime(form)},{k}"
@@ -124,7 +131,7 @@ def test_stamps_that_lost_their_seconds(tmp_path: Path, long: bool, form: str, s
 
 @pytest.mark.parametrize("mark", [",", ";", "\t"])
 def test_a_name_split_over_columns_is_one_tag(tmp_path: Path, mark: str) -> None:
-    """Area, loop and parameter in columns of their own name a tag together."""
+    """Columns of area, loop and parameter form the name of a tag together."""
     rows = [("time", "area", "loop", "parameter", "value")]
     for k, at in enumerate(MOMENTS):
         rows += [
@@ -140,7 +147,7 @@ def test_a_name_split_over_columns_is_one_tag(tmp_path: Path, mark: str) -> None
 
 @pytest.mark.parametrize("long", [False, True])
 def test_rows_of_one_stamp_need_their_interval(tmp_path: Path, long: bool) -> None:
-    """Where no stamp advances one line says what to state, and with the interval stated the rows are read."""
+    """If no stamp advances, one line says what to state; with a stated interval the rows are read."""
     rows = [f"Aug-04-07 20:47:20,{k}" for k in range(60)]
     if long:
         rows = [f"{tag},{row}" for row in rows for tag in ("a.PV", "a.OP")]

@@ -1,4 +1,4 @@
-"""Long lines and cells cost time by their length, not by its square."""
+"""The time for long lines and cells grows with their length and not with its square."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from identification.errors import InputError
 ROWS = "".join(f"2024-11-21 08:00:{k:02d},{k / 4},{k}\n" for k in range(60))
 HEAD = "time,a.PV,a.OP\n"
 LONG = 100_000
-"""Characters, of which the square takes minutes and the length milliseconds."""
+"""Characters: a time proportional to the square would be minutes, and to the length milliseconds."""
 FIRST = "2024-11-21 07:00:00,"
 LINES = {
     "points": HEAD + "a.b." * (LONG // 4) + "\n" + ROWS,
@@ -34,27 +34,29 @@ LINES = {
 
 
 ORDINARY = HEAD + ROWS * (LONG // len(ROWS))
-"""As many characters in lines as they should be: what reading them costs is the floor."""
+"""The same number of characters in ordinary lines; its reading time is the reference."""
 
 
 def read(folder: Path, text: str) -> tuple[int, float]:
-    """Characters of the longest thing said of an export of this text, and the processor time that it took [s]."""
+    """Length of the longest message about an export of this text, and its processor time [s]."""
     (folder / "x.csv").write_text(text, encoding="utf-8")
     begun = time.process_time()
     try:
         export = open_export([folder / "x.csv"], ReadOptions(scratch=folder))
         export.span()
         export.read(export.tags)
-        said = max(map(len, export.notes), default=0)
+        longest = max(map(len, export.notes), default=0)
     except InputError as error:
-        said = len(str(error))
-    return said, time.process_time() - begun
+        longest = len(str(error))
+    return longest, time.process_time() - begun
 
 
 @pytest.mark.parametrize("what", LINES)
 def test_a_long_line_is_read_in_time(tmp_path: Path, what: str) -> None:
-    """An export with one long line costs at most a hundred ordinary ones of its size, and its notes stay short."""
+    """An export with one long line takes at most a hundred times the time of an ordinary one of its size, with short
+    notes.
+    """
     floor = max(read(tmp_path, ORDINARY)[1] for _ in range(2))
-    said, cost = read(tmp_path, LINES[what])
+    longest, cost = read(tmp_path, LINES[what])
     assert cost < 100 * floor
-    assert said < 1000
+    assert longest < 1000

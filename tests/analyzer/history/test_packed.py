@@ -1,4 +1,4 @@
-"""Packed exports are read as what is in them, and bombs are refused before they burst."""
+"""Packed exports are read as their content, and decompression bombs are refused before they are unpacked."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def zipped(data: bytes) -> bytes:
     [(".csv.gz", gzip.compress), (".csv.bz2", bz2.compress), (".csv.xz", lzma.compress), (".zip", zipped)],
 )
 def test_packed_reads_as_plain(tmp_path: Path, ending: str, pack: Callable[[bytes], bytes]) -> None:
-    """A packed CSV has the samples of the plain one; nothing is written outside the scratch directory."""
+    """A packed CSV has the samples of the unpacked one, and nothing is written outside the scratch directory."""
     folder, scratch = tmp_path / "in", tmp_path / "scratch"
     folder.mkdir()
     scratch.mkdir()
@@ -49,8 +49,8 @@ def test_packed_reads_as_plain(tmp_path: Path, ending: str, pack: Callable[[byte
     assert {p.relative_to(tmp_path).parts[0] for p in tmp_path.rglob("*")} == {"in", "scratch"}
 
 
-def test_a_bomb_is_refused_before_it_bursts(tmp_path: Path) -> None:
-    """Two hundred megabytes of nothing in some hundred kilobytes are refused in one line and leave no such file."""
+def test_a_bomb_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
+    """A file of some hundred kilobytes that unpacks to 200 MB is refused in one line, and no such file remains."""
     path, scratch = tmp_path / "bomb.csv.gz", tmp_path / "scratch"
     scratch.mkdir()
     with gzip.open(path, "wb", compresslevel=6) as file:
@@ -63,7 +63,9 @@ def test_a_bomb_is_refused_before_it_bursts(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("shared", [True, False])
 def test_texts_of_megabytes_are_refused_by_the_footer(tmp_path: Path, shared: bool) -> None:
-    """A Parquet file of a few kilobytes whose texts unpack to megabytes is one line; short texts are read."""
+    """A Parquet file of a few kilobytes whose texts unpack to megabytes is refused in one line; short texts are
+    read.
+    """
     rows, start = 5, 1_772_409_600_000_000
     stamps = (start + 1_000_000 * np.arange(rows)).astype("datetime64[us]")
     for name, text in (("long", "x" * 12_000_000), ("short", "Good")):
@@ -79,7 +81,7 @@ def test_texts_of_megabytes_are_refused_by_the_footer(tmp_path: Path, shared: bo
 
 
 def test_a_long_list_of_tags_before_few_rows_is_read(tmp_path: Path) -> None:
-    """A column of tags that brings a dictionary of ten thousand into groups of a few rows is no bomb."""
+    """A dictionary of ten thousand tags in groups of a few rows is no decompression bomb."""
     tags = [f"unit-{k:05d}/controller/FIC{k:05d}.PV" for k in range(10_000)]
     rows, start = 60, 1_772_409_600_000_000
     table = pa.table(
@@ -91,12 +93,12 @@ def test_a_long_list_of_tags_before_few_rows_is_read(tmp_path: Path) -> None:
     )
     pq.write_table(table, tmp_path / "x.parquet", row_group_size=20)
     group = pq.read_metadata(tmp_path / "x.parquet").row_group(0)
-    assert group.column(0).total_uncompressed_size > 300_000  # all tags stand before twenty rows
+    assert group.column(0).total_uncompressed_size > 300_000  # all tags are stored before twenty rows
     assert open_export([tmp_path / "x.parquet"]).tags == (tags[0],)
 
 
 def test_an_archive_of_several_files_is_refused(tmp_path: Path) -> None:
-    """Which of several files is meant cannot be known: the line says what to do."""
+    """An archive of several files is refused, because the intended file is unknown."""
     with zipfile.ZipFile(tmp_path / "two.zip", "w") as archive:
         archive.writestr("a.csv", TEXT)
         archive.writestr("b.csv", TEXT)
@@ -106,7 +108,7 @@ def test_an_archive_of_several_files_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("keep", [10, 60, 200])
 def test_a_cut_archive_is_one_line(tmp_path: Path, keep: int) -> None:
-    """An archive that was cut off is told as such, never read in part."""
+    """A truncated archive is reported as such and never read in part."""
     (tmp_path / "cut.csv.gz").write_bytes(gzip.compress(TEXT.encode())[:keep])
     with pytest.raises(InputError, match="cannot be unpacked"):
         open_export([tmp_path / "cut.csv.gz"])

@@ -1,4 +1,4 @@
-"""Pairs of columns are read with a clock for each tag, however their header is written."""
+"""Pairs of columns are read with a separate clock for each tag, for all forms of the header."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ HEADERS = {
 
 
 def stamps(tag: str) -> np.ndarray:
-    """An hour of stamps of a tag, from a first one of its own [s]."""
+    """An hour of stamps of a tag, with its own first stamp [s]."""
     return START_S + TAGS.index(tag) + np.arange(0.0, 3600.0, STEPS[tag])
 
 
@@ -32,14 +32,14 @@ def number(tag: str) -> np.ndarray:
 
 
 def written(stamp_s: float, excel: bool) -> str:
-    """A stamp as a spreadsheet has it."""
+    """A stamp in the form of a spreadsheet."""
     if excel:
         return f"{stamp_s / 86400 + 25569:.8f}"
     return np.datetime64(int(stamp_s), "s").astype(object).strftime("%d-%b-%y %H:%M:%S")
 
 
 def sheet(header: str, excel: bool, quality: bool = False) -> str:
-    """The three tags side by side, the shorter ones with blanks below."""
+    """The three tags in pairs of columns; the shorter ones have blank cells at the end."""
     names, columns = [], []
     for tag in TAGS:
         names += HEADERS[header](tag)
@@ -64,10 +64,10 @@ def sheet(header: str, excel: bool, quality: bool = False) -> str:
         ("FIC101_MET", "", 0.0),
     ],
 )
-def test_a_zone_that_names_or_stamps_state_counts(
-    tmp_path: Path, name: str, behind: str, hours: float
-) -> None:
-    """As in any other table; letters behind a tag above the stamps are none."""
+def test_a_zone_in_names_or_stamps_is_used(tmp_path: Path, name: str, behind: str, hours: float) -> None:
+    """A zone in the name or in the stamps is used as in any other table; letters after a tag above the stamps are no
+    zone.
+    """
     rows = [f"2024-11-21 08:00:{k:02d}{behind},{k},2024-11-21 08:00:{k:02d}{behind},{k}" for k in range(20)]
     (tmp_path / "x.csv").write_text("\n".join([f"{name},a.PV,{name},a.OP", *rows]) + "\n")
     series = open_export([tmp_path / "x.csv"]).read(["a.PV", "a.OP"])
@@ -77,8 +77,8 @@ def test_a_zone_that_names_or_stamps_state_counts(
 
 @pytest.mark.parametrize("excel", [False, True])
 @pytest.mark.parametrize("header", HEADERS)
-def test_every_tag_is_read_on_its_own_clock(tmp_path: Path, header: str, excel: bool) -> None:
-    """Three tags at 5, 600 and 7 s come back at their own stamps with their own values."""
+def test_each_tag_is_read_with_its_own_clock(tmp_path: Path, header: str, excel: bool) -> None:
+    """Three tags at 5, 600 and 7 s are read with their own stamps and values."""
     (tmp_path / "x.csv").write_text(sheet(header, excel))
     export = open_export([tmp_path / "x.csv"])
     assert export.tags == TAGS
@@ -90,15 +90,15 @@ def test_every_tag_is_read_on_its_own_clock(tmp_path: Path, header: str, excel: 
     assert export.span() == pytest.approx((START_S, START_S + 3597.0), abs=3)
 
 
-def test_quality_beside_each_pair(tmp_path: Path) -> None:
-    """A column of quality behind each pair marks that tag's bad samples."""
+def test_quality_after_each_pair(tmp_path: Path) -> None:
+    """A quality column after each pair marks the bad samples of that tag."""
     (tmp_path / "x.csv").write_text(sheet("time and tag", False, quality=True))
     for series in open_export([tmp_path / "x.csv"]).read(TAGS).values():
         assert series.bad.tolist() == [k % 10 == 0 for k in range(series.bad.size)]
 
 
 def test_two_clocks_for_one_table_are_no_pairs(tmp_path: Path) -> None:
-    """A wide table with local and UTC stamps, side by side or at the end, is one table with one clock."""
+    """A wide table with local and UTC stamps, next to each other or at the end, is one table with one clock."""
     rows = [f"2024-11-21 08:00:{k:02d},2024-11-21 07:00:{k:02d},{k},{k}" for k in range(60)]
     (tmp_path / "a.csv").write_text("timestamp,utc,FIC101.PV,FIC101.OP\n" + "\n".join(rows))
     turned = [",".join((r.split(",")[0], *r.split(",")[2:], r.split(",")[1])) for r in rows]

@@ -1,4 +1,4 @@
-"""Parquet in the types that historians' exports and dataframes write."""
+"""Parquet in the types that exports of historians and dataframes write."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def written(folder: Path, **columns: pa.Array) -> Export:
     ids=lambda stamps: str(stamps.type),
 )
 def test_stamps_of_any_type(tmp_path: Path, stamps: pa.Array) -> None:
-    """Timestamps of any unit or zone, texts and numbers mean the same seconds."""
+    """Time stamps of any unit or zone, as texts or as numbers, give the same seconds."""
     export = written(tmp_path, timestamp=stamps, a=pa.array([1.0, 2, 3, 4]))
     assert export.read(["a"])["a"].stamp_s.tolist() == [FIRST_S + i for i in range(4)]
     assert export.span() == (FIRST_S, FIRST_S + 3)
@@ -59,14 +59,14 @@ def test_stamps_of_any_type(tmp_path: Path, stamps: pa.Array) -> None:
     ids=lambda column: str(column.type),
 )
 def test_values_of_any_type(tmp_path: Path, column: pa.Array) -> None:
-    """Integers, flags, decimals and texts of numbers are numbers."""
+    """Integers, booleans, decimals and texts of numbers are read as numbers."""
     series = written(tmp_path, timestamp=pa.array(STAMPS), a=column).read(["a"])["a"]
     assert series.value.tolist() == [1, 0, 1, 0]
     assert not series.bad.any()
 
 
-def test_nothing_and_infinity_are_bad(tmp_path: Path) -> None:
-    """Nulls, NaN and infinities are bad, and no infinity is left in the values."""
+def test_missing_and_infinite_values_are_bad(tmp_path: Path) -> None:
+    """Nulls, NaN and infinities are bad samples, and no infinity remains in the values."""
     export = written(tmp_path, timestamp=pa.array(STAMPS), a=pa.array([1, None, float("nan"), float("-inf")]))
     series = export.read(["a"])["a"]
     assert series.bad.tolist() == [False, True, True, True]
@@ -81,7 +81,7 @@ def test_days_are_stamps(tmp_path: Path) -> None:
 
 
 def test_tags_that_are_numbers(tmp_path: Path) -> None:
-    """A long file may number its tags."""
+    """The tags of a long file may be numbers."""
     export = written(
         tmp_path, time=pa.array(STAMPS), tag=pa.array([7, 7, 8, 8]), value=pa.array([1.0, 2, 3, 4])
     )
@@ -89,8 +89,8 @@ def test_tags_that_are_numbers(tmp_path: Path) -> None:
     assert export.read(["8"])["8"].value.tolist() == [3, 4]
 
 
-def test_modes_beside_numbers_in_a_long_file(tmp_path: Path) -> None:
-    """One column of values may hold numbers of one tag and modes of another."""
+def test_modes_and_numbers_in_a_long_file(tmp_path: Path) -> None:
+    """One column of values may contain numbers of one tag and modes of another."""
     export = written(
         tmp_path,
         time=pa.array(STAMPS),
@@ -104,7 +104,7 @@ def test_modes_beside_numbers_in_a_long_file(tmp_path: Path) -> None:
 
 
 def test_pages_without_end_are_refused(tmp_path, monkeypatch):
-    """A small file that a damaged page keeps from being read ends in one line, within the time that it is given."""
+    """A small file that cannot be read because of a damaged page ends in one line within the time limit."""
     path = tmp_path / "x.parquet"
     pq.write_table(pa.table({"time": pa.array([0, 1], pa.timestamp("s")), "a.PV": [1.0, 2.0]}), path)
     stop, ended = threading.Event(), []
@@ -117,7 +117,7 @@ def test_pages_without_end_are_refused(tmp_path, monkeypatch):
 
 
 def test_changed_bytes_end_in_time(tmp_path, monkeypatch):
-    """Whatever bytes of a page are changed, in any codec, no file is opened whose probe has not ended."""
+    """For changed bytes in a page, with any codec, no file is opened before its read test has ended."""
     through, probed = parquet._read_through, []
     monkeypatch.setattr(parquet, "_read_through", lambda path: (through(path), probed.append(path)))
     rng, n = np.random.default_rng(5), 400

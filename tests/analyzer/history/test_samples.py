@@ -1,4 +1,4 @@
-"""Samples that are not plain: error texts, blanks, modes, quality codes, repeated stamps, local time."""
+"""Special samples: error texts, blanks, modes, quality codes, repeated stamps, local time."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def long(cells: list[tuple[str, str]], quality: str) -> str:
 
 @pytest.mark.parametrize("text", ERROR_TEXTS)
 def test_error_texts_among_numbers(tmp_path: Path, text: str) -> None:
-    """A historian's error text among numbers is no value, is bad, and is counted."""
+    """An error text of a historian among numbers is a bad sample without a value, and is counted."""
     export, series = read(tmp_path / "x.csv", wide(["1.5", text, text, "2.5"]))
     assert series.text is None
     assert series.bad.tolist() == [False, True, True, False]
@@ -47,21 +47,21 @@ def test_error_texts_among_numbers(tmp_path: Path, text: str) -> None:
 
 
 def test_mostly_error_texts_are_no_mode(tmp_path: Path) -> None:
-    """A tag that is in error most of the time is a tag of bad numbers, not a text tag."""
+    """A tag with error texts most of the time has bad numbers and is no text tag."""
     _, series = read(tmp_path / "x.csv", wide(["Bad Input"] * 8 + ["3"]))
     assert series.text is None
     assert series.bad.tolist() == [True] * 8 + [False]
 
 
 def test_blanks_are_no_values(tmp_path: Path) -> None:
-    """A blank cell is no value, and bad; the note names reporting by exception."""
+    """A blank cell is a bad sample without a value; the note mentions reporting by exception."""
     export, series = read(tmp_path / "x.csv", "timestamp,FIC1.PV,FIC1.OP\n2024-01-01,1,2\n2024-01-02,,3\n")
     assert series.bad.tolist() == [False, True]
     assert any("1 cells are blank" in note and "exception" in note for note in export.notes)
 
 
 def test_modes_are_texts(tmp_path: Path) -> None:
-    """A tag of texts keeps them; only blanks and error texts are bad."""
+    """A text tag keeps its texts; only blanks and error texts are bad."""
     _, series = read(tmp_path / "x.csv", wide(["AUTO", "MAN", "I/O Timeout", "AUTO"]))
     assert series.text is not None
     assert series.text.tolist() == ["AUTO", "MAN", "I/O Timeout", "AUTO"]
@@ -70,7 +70,7 @@ def test_modes_are_texts(tmp_path: Path) -> None:
 
 
 def test_a_stray_word_among_numbers(tmp_path: Path) -> None:
-    """A word that is no known error text, among numbers, is bad and counted too."""
+    """An unknown word among numbers is bad and counted too."""
     export, series = read(tmp_path / "x.csv", wide(["1", "2", "Kaputt", "4"]))
     assert series.bad.tolist() == [False, False, True, False]
     assert any("'Kaputt'" in note for note in export.notes)
@@ -91,20 +91,20 @@ def test_a_stray_word_among_numbers(tmp_path: Path) -> None:
     ],
 )
 def test_quality_codes(tmp_path: Path, column: str, codes: list[str], bad: list[bool]) -> None:
-    """OPC DA, OPC UA, confidence and text qualities are told apart by the codes that occur."""
+    """The codes that occur distinguish OPC DA, OPC UA, confidence and text qualities."""
     _, series = read(tmp_path / "x.csv", long([("1", code) for code in codes], column))
     assert series.bad.tolist() == bad
 
 
 def test_stated_good_quality(tmp_path: Path) -> None:
-    """StatedSettings codes count as good, and no others."""
+    """The stated codes are good, and no others."""
     options = ReadOptions(good_quality=("64", "192"))
     _, series = read(tmp_path / "x.csv", long([("1", "64"), ("1", "192"), ("1", "216")], "quality"), options)
     assert series.bad.tolist() == [False, False, True]
 
 
-def test_quality_beside_wide_columns(tmp_path: Path) -> None:
-    """A quality column beside a tag's column is no tag, and marks its bad samples."""
+def test_quality_next_to_wide_columns(tmp_path: Path) -> None:
+    """A quality column next to the column of a tag is no tag, and marks the bad samples of that tag."""
     text = "time,FIC1.PV,FIC1.PV.quality\n2024-01-01 08:00:00,1,192\n2024-01-01 08:00:01,2,8\n"
     export, series = read(tmp_path / "x.csv", text)
     assert export.tags == ("FIC1.PV",)
@@ -113,7 +113,7 @@ def test_quality_beside_wide_columns(tmp_path: Path) -> None:
 
 
 def test_repeated_stamps_keep_the_last(tmp_path: Path) -> None:
-    """Of equal stamps the last in the file counts, however the file is ordered, and the note counts them."""
+    """Of equal stamps the last one in the file is used, and a note counts them."""
     text = (
         "time,a\n2024-01-01 08:00:00,1\n2024-01-01 08:00:01,2\n2024-01-01 08:00:01,3\n2024-01-01 08:00:02,4\n"
     )
@@ -123,7 +123,7 @@ def test_repeated_stamps_keep_the_last(tmp_path: Path) -> None:
 
 
 def test_unreadable_stamps_are_left_out(tmp_path: Path) -> None:
-    """A row whose stamp is broken is left out and counted."""
+    """A row with an unreadable stamp is left out and counted."""
     export, series = read(tmp_path / "x.csv", wide(["1", "2", "3"]).replace("08:00:01", "08:xx"))
     assert series.value.tolist() == [1, 3]
     assert any(note.startswith("1 samples have no readable time stamp") for note in export.notes)
@@ -135,8 +135,8 @@ def berlin(first: str, n: int) -> pd.DatetimeIndex:
 
 @pytest.mark.parametrize("newest_first", [False, True])
 @pytest.mark.parametrize("layout", ["wide", "long"])
-def test_the_hour_that_autumn_repeats(tmp_path: Path, newest_first: bool, layout: str) -> None:
-    """Local stamps of the night that repeats an hour give rising UTC, nothing lost, and a note."""
+def test_the_repeated_hour_in_autumn(tmp_path: Path, newest_first: bool, layout: str) -> None:
+    """Local stamps of the night with a repeated hour give increasing UTC without a lost sample, and a note."""
     index = berlin("2024-10-26 22:00", 30)
     table = pd.DataFrame({"time": index.strftime("%Y-%m-%d %H:%M:%S"), "a.PV": range(30), "a.OP": range(30)})
     if layout == "long":
@@ -149,8 +149,10 @@ def test_the_hour_that_autumn_repeats(tmp_path: Path, newest_first: bool, layout
     assert "x.csv: stamps state no time zone, taken as Europe/Berlin" in export.notes
 
 
-def test_the_hour_that_spring_leaves_out(tmp_path: Path) -> None:
-    """Local stamps across the missing hour run on without a gap; stamps within it are left out and told."""
+def test_the_missing_hour_in_spring(tmp_path: Path) -> None:
+    """Local stamps across the missing hour continue without a gap; stamps within that hour are left out and
+    reported.
+    """
     index = berlin("2024-03-30 23:00", 30)
     rows = [f"{stamp:%Y-%m-%d %H:%M:%S},{i}" for i, stamp in enumerate(index)]
     rows.insert(12, "2024-03-31 02:30:00,99")
@@ -161,7 +163,7 @@ def test_the_hour_that_spring_leaves_out(tmp_path: Path) -> None:
 
 
 def test_stamps_with_an_offset_need_no_zone(tmp_path: Path) -> None:
-    """A stated zone does not move stamps that carry their offset."""
+    """A stated zone does not move stamps with an offset."""
     text = "time,a\n2024-07-01T10:00:00+02:00,1\n2024-07-01 04:30:00-0400,2\n"
     _, series = read(tmp_path / "x.csv", text, ReadOptions(timezone="Asia/Tokyo"))
     assert series.stamp_s[0] == pd.Timestamp("2024-07-01 08:00").timestamp()
@@ -169,7 +171,7 @@ def test_stamps_with_an_offset_need_no_zone(tmp_path: Path) -> None:
 
 
 def test_a_flow_called_q_is_no_quality(tmp_path):
-    """A tag that ends like a quality column, and holds values, is a tag; its neighbour loses no sample to it."""
+    """A tag with values and the ending of a quality column is a tag, and its neighbour loses no sample."""
     rows = "".join(
         f"2026-03-02 00:{k // 60:02d}:{k % 60:02d},{50 + k / 10:.1f},{200 + k / 7:.3f}\n" for k in range(300)
     )
@@ -180,7 +182,7 @@ def test_a_flow_called_q_is_no_quality(tmp_path):
 
 
 def test_values_called_data_are_values(tmp_path):
-    """Data is a date in Italian and a value in English: floats of that name are values of a long table."""
+    """'Data' is a date in Italian and a value in English: floats with that name are the values of a long table."""
     rows = "".join(f"FIC1.PV,2026-03-02 00:00:{k:02d},{50 + k / 10:.1f}\n" for k in range(60))
     (tmp_path / "x.csv").write_text("Tag,Time,Data\n" + rows)
     export = open_export([tmp_path / "x.csv"])

@@ -1,4 +1,4 @@
-"""What exports hold is read or told: nothing goes without a word."""
+"""The content of an export is read or reported: nothing is lost silently."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ FORMATS = ("%Y-%m-%d %H:%M:%S", "%d/%m/%Y %H:%M:%S", "%d-%b-%y %H:%M:%S")
 
 
 def rows(formats: tuple[str, ...], n: int = 300) -> list[str]:
-    """Lines of samples a minute apart, each third written otherwise."""
+    """Lines of samples a minute apart, with another date format in each part."""
     stamps = [START + timedelta(minutes=k) for k in range(n)]
     return [f"{t.strftime(formats[k * len(formats) // n])},{k}" for k, t in enumerate(stamps)]
 
 
 @pytest.mark.parametrize("formats", [FORMATS, FORMATS[::-1], (FORMATS[0], "%m/%d/%Y %H:%M:%S")])
-def test_several_ways_of_writing_dates_lose_nothing(tmp_path: Path, formats: tuple[str, ...]) -> None:
-    """ISO first and 02/03/2026 after it: the order of day and month is the one that leaves no leap in time."""
+def test_several_date_formats_lose_no_sample(tmp_path: Path, formats: tuple[str, ...]) -> None:
+    """In a file with several date formats, the order of day and month is the one without a jump in time."""
     path = tmp_path / "mixed.csv"
     path.write_text("timestamp,FIC1.PV\n" + "\n".join(rows(formats)) + "\n", encoding="utf-8")
     found = open_export([path]).read(["FIC1.PV"])["FIC1.PV"]
@@ -40,8 +40,8 @@ def test_several_ways_of_writing_dates_lose_nothing(tmp_path: Path, formats: tup
         "# made by X\n2026-03-02,2026-03-03\n",
     ],
 )
-def test_a_preamble_above_the_header_is_passed_over(tmp_path: Path, above: str) -> None:
-    """Lines as wide as the table, even with dates in them, do not take the place of the header below."""
+def test_a_preamble_above_the_header_is_skipped(tmp_path: Path, above: str) -> None:
+    """Lines as wide as the table, even with dates, do not replace the header that follows."""
     path = tmp_path / "preamble.csv"
     path.write_text(above + "timestamp,FIC1.PV\n" + "\n".join(rows(FORMATS[:1])) + "\n", encoding="utf-8")
     found = open_export([path])
@@ -49,20 +49,22 @@ def test_a_preamble_above_the_header_is_passed_over(tmp_path: Path, above: str) 
     assert found.read(["FIC1.PV"])["FIC1.PV"].value.size == 300
 
 
-def test_packed_files_in_a_folder_are_told(tmp_path: Path) -> None:
-    """A folder's 7z beside its CSV are named as not read; a folder of nothing else is refused by name."""
+def test_packed_files_in_a_folder_are_reported(tmp_path: Path) -> None:
+    """7z files in a folder with a CSV are named as not read; a folder without other files is refused with their
+    names.
+    """
     (tmp_path / "more.csv.7z").write_bytes(b"7z\xbc\xaf")
     (tmp_path / "rest.7z").write_bytes(b"7z\xbc\xaf")
     refused = CliRunner().invoke(main, ["check", str(tmp_path)])
     assert refused.exit_code == 2
     assert "more.csv.7z, rest.7z not read: unpack it" in refused.stderr
     (tmp_path / "a.csv").write_text("timestamp,FIC1.PV\n" + "\n".join(rows(FORMATS[:1])), encoding="utf-8")
-    told = [str(note) for note in open_export([tmp_path]).file_notes]
-    assert any("more.csv.7z, rest.7z not read" in note for note in told)
+    notes = [str(note) for note in open_export([tmp_path]).file_notes]
+    assert any("more.csv.7z, rest.7z not read" in note for note in notes)
 
 
 def test_check_without_loops_is_no_success(tmp_path: Path) -> None:
-    """An export in which no loop is found ends `check` with 2 and one line that says how to name them."""
+    """For an export without a loop, `check` ends with 2 and one line that says how to name loops."""
     path = tmp_path / "x.csv"
     path.write_text("timestamp,a,b\n2026-03-02 00:00:00,1,2\n2026-03-02 00:00:01,1,2\n", encoding="utf-8")
     result = CliRunner().invoke(main, ["check", str(path)])

@@ -1,4 +1,4 @@
-"""Workbooks are read as the tables in their sheets; what cannot be read is one line."""
+"""Workbooks are read as the tables of their sheets; an unreadable workbook gives one line."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ STAMPS = [BEGIN + dt.timedelta(seconds=5 * k) for k in range(N)]
 
 
 def write(path: Path, sheets: dict[str, list[list[object]]]) -> Path:
-    """A workbook of these sheets."""
+    """A workbook with the given sheets."""
     book = openpyxl.Workbook()
     book.remove(book.active)
     for name, rows in sheets.items():
@@ -42,13 +42,13 @@ def write(path: Path, sheets: dict[str, list[list[object]]]) -> Path:
 
 
 def wide(loop: str, pv: np.ndarray = PV) -> list[list[object]]:
-    """A title, a line of tags and samples, a column a tag."""
+    """A title, a line of tags, and samples with one column for each tag."""
     rows = [[t, float(p), float(o)] for t, p, o in zip(STAMPS, pv, OP, strict=True)]
     return [["Trend report"], ["Time", f"{loop}.PV", f"{loop}.OP"], *rows]
 
 
 def test_a_wide_sheet_reads_as_its_cells(tmp_path):
-    """Stamps kept as dates and values kept as numbers come back as they were put in."""
+    """Stamps that are stored as dates and values that are stored as numbers are read unchanged."""
     found = open_export([write(tmp_path / "day.xlsx", {"Data": wide("FIC1")})])
     assert found.tags == ("FIC1.PV", "FIC1.OP")
     series = found.read(["FIC1.PV"])["FIC1.PV"]
@@ -58,7 +58,7 @@ def test_a_wide_sheet_reads_as_its_cells(tmp_path):
 
 
 def test_serial_days_without_a_format_are_stamps(tmp_path):
-    """Cells that hold days since 1899-12-30 as plain numbers are read as those days."""
+    """Cells with days since 1899-12-30 as numbers are read as those days."""
     first = (BEGIN - dt.datetime(1899, 12, 30)).days
     rows = [["Time", "FIC1.PV", "FIC1.OP"]]
     rows += [[first + 5 * k / 86400, float(PV[k]), float(OP[k])] for k in range(N)]
@@ -68,7 +68,7 @@ def test_serial_days_without_a_format_are_stamps(tmp_path):
 
 
 def test_binary_and_open_workbooks_read_as_their_cells(tmp_path):
-    """The sheet of an xlsb and of an ods workbook, each by its own specification, reads as a sheet of xlsx does."""
+    """A sheet of an xlsb or ods workbook, written by its own specification, is read as a sheet of xlsx."""
     first = (BEGIN - dt.datetime(1899, 12, 30)).days
     head = ["Time", "FIC1.PV", "FIC1.OP"]
     rows = [head, *([first + 5 * k / 86400, float(PV[k]), float(OP[k])] for k in range(N))]
@@ -84,8 +84,10 @@ def test_binary_and_open_workbooks_read_as_their_cells(tmp_path):
 
 
 @pytest.mark.parametrize("far", [(9, 20), (199_999, 2000)])
-def test_a_stray_cell_is_named_where_it_makes_a_sheet_vast(tmp_path, far):
-    """A cell beside a small table is read over; one that spans four hundred million cells is refused by its name."""
+def test_a_stray_cell_is_named_if_it_makes_a_sheet_huge(tmp_path, far):
+    """A stray cell near a small table is ignored; one that extends the sheet to 400 million cells is refused with its
+    name.
+    """
     row, column = far
     table = [(r, c, float(10 * r + c)) for r in range(5) for c in range(3)]
     rows = "".join(open_row(*(float(10 * r + c) for c in range(3))) for r in range(5))
@@ -105,8 +107,8 @@ def test_a_stray_cell_is_named_where_it_makes_a_sheet_vast(tmp_path, far):
 
 
 @pytest.mark.parametrize("block", [11, 64, 1000])
-def test_records_of_a_binary_sheet_are_found_wherever_blocks_end(monkeypatch, block):
-    """Kinds and first numbers of records come back, whatever parts of the sheet are read at a time."""
+def test_records_of_a_binary_sheet_are_found_for_any_block_size(monkeypatch, block):
+    """Kinds and first numbers of records are found for any block size of reading."""
     rng = random.Random(block)
     wrote = [(rng.randrange(16_384), rng.randbytes(rng.choice([4, 8, 130, 5000]))) for _ in range(40)]
     monkeypatch.setattr(spans, "BLOCK_BYTES", block)
@@ -115,7 +117,7 @@ def test_records_of_a_binary_sheet_are_found_wherever_blocks_end(monkeypatch, bl
 
 
 def test_a_long_sheet_reads_with_its_quality(tmp_path):
-    """Tag, time, value and quality in rows: bad samples are bad, texts are none."""
+    """With tag, time, value and quality in rows, bad samples are bad and texts are no values."""
     rows: list[list[object]] = [["TagName", "Timestamp", "Value", "Quality"]]
     for k, t in enumerate(STAMPS):
         rows.append(["FIC1.PV", t, float(PV[k]), "Bad" if k == 7 else "Good"])
@@ -125,8 +127,10 @@ def test_a_long_sheet_reads_with_its_quality(tmp_path):
     assert np.flatnonzero(found["FIC1.OP"].bad | ~np.isfinite(found["FIC1.OP"].value)).tolist() == [9]
 
 
-def test_sheets_are_tables_of_their_own_and_a_cover_is_left_out(tmp_path):
-    """Two sheets of two loops both count; a sheet of prose and an empty one cost nothing, and the prose is told."""
+def test_sheets_are_separate_tables_and_a_cover_is_left_out(tmp_path):
+    """Two sheets of two loops are both read; a sheet of prose and an empty one are left out, and the prose is
+    reported.
+    """
     prose = [["About", "this"], ["made for", "the day shift"], ["by", "hand"]]
     sheets = {"Cover": prose, "FIC1": wide("FIC1"), "Empty": [], "FIC2": wide("FIC2", PV + 1)}
     found = open_export([write(tmp_path / "day.xlsx", sheets)])
@@ -136,7 +140,7 @@ def test_sheets_are_tables_of_their_own_and_a_cover_is_left_out(tmp_path):
 
 
 def test_a_folder_of_workbooks_is_an_export(tmp_path):
-    """A workbook a loop in a folder, with the lock file of an open one beside, reads as one export."""
+    """A folder with one workbook for each loop, and the lock file of an open one, is read as one export."""
     for loop in ("FIC1", "FIC2"):
         write(tmp_path / f"{loop}.xlsx", {"Data": wide(loop)})
     (tmp_path / "~$FIC1.xlsx").write_bytes(b"\x00")
@@ -144,15 +148,15 @@ def test_a_folder_of_workbooks_is_an_export(tmp_path):
 
 
 def test_a_night_runs_on_a_workbook(tmp_path):
-    """`triage run` assesses the loops of a workbook as those of any export."""
+    """`triage run` assesses the loops of a workbook as those of other exports."""
     path = write(tmp_path / "day.xlsx", {"Data": wide("FIC1")})
     done = CliRunner().invoke(main, ["run", str(path), "--store", str(tmp_path / "store")])
     assert done.exit_code == 0, done.output
     assert "1 of 1 loops assessed" in done.output
 
 
-def test_text_that_is_only_called_a_workbook_is_read_as_text(tmp_path):
-    """Many tools write tabs and call the file xls: what it holds decides."""
+def test_text_with_the_name_of_a_workbook_is_read_as_text(tmp_path):
+    """A text file with the ending xls is read as text: the content decides."""
     lines = [f"{t.isoformat(sep=' ')}\t{p}\t{o}" for t, p, o in zip(STAMPS, PV, OP, strict=True)]
     path = tmp_path / "report.xls"
     path.write_text("Time\tFIC1.PV\tFIC1.OP\n" + "\n".join(lines) + "\n")
@@ -160,7 +164,9 @@ def test_text_that_is_only_called_a_workbook_is_read_as_text(tmp_path):
 
 
 def test_damage_is_one_line(tmp_path):
-    """A workbook cut short, one that is none, and one with no table each end in a line that says what to do."""
+    """A truncated workbook, a file that is no workbook, and a workbook without a table each give one line with a
+    remedy.
+    """
     whole = write(tmp_path / "whole.xlsx", {"Data": wide("FIC1")}).read_bytes()
     (tmp_path / "cut.xlsx").write_bytes(whole[: len(whole) // 2])
     (tmp_path / "none.xlsx").write_bytes(b"hello, world")
@@ -176,7 +182,7 @@ def test_damage_is_one_line(tmp_path):
 
 
 def test_a_bomb_is_refused_by_its_declared_size(tmp_path):
-    """A workbook whose sheet unpacks to a hundred times what any sheet does is not unpacked."""
+    """A workbook with a sheet that unpacks to 300 MB is not unpacked."""
     path = tmp_path / "bomb.xlsx"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("xl/worksheets/sheet1.xml", bytes(300_000_000))
@@ -184,8 +190,8 @@ def test_a_bomb_is_refused_by_its_declared_size(tmp_path):
         open_export([path], ReadOptions(scratch=tmp_path))
 
 
-def test_without_the_extra_the_line_says_how_to_get_it(tmp_path, monkeypatch):
-    """Where the package that reads workbooks is missing, the line names the extra, and CSV as the other way."""
+def test_without_the_extra_the_line_says_how_to_install_it(tmp_path, monkeypatch):
+    """If the package that reads workbooks is missing, the line names the extra and CSV as an alternative."""
     path = write(tmp_path / "day.xlsx", {"Data": wide("FIC1")})
     monkeypatch.setitem(sys.modules, "python_calamine", None)
     with pytest.raises(InputError, match=r"loop-triage\[excel\].*save the sheet as CSV"):

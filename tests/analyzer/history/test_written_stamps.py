@@ -1,4 +1,4 @@
-"""Stamps in words and zones of many lands: each is the moment that it says, or is refused in one line."""
+"""Stamps with words and zones of many countries are read at their time, or refused in one line."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ MOMENTS = [FIRST + timedelta(seconds=5 * k) for k in range(60)]
 
 
 def written(path: Path, show: Callable[[datetime], str], time: str = "Time") -> Path:
-    """An export whose stamps are shown so."""
+    """An export with the stamps in the given form."""
     rows = [f"{show(at)};{k}" for k, at in enumerate(MOMENTS)]
     path.write_text("\n".join([f"{time};a.PV", *rows]) + "\n", encoding="utf-8")
     return path
 
 
 def check(path: Path, timezone: str | None = None) -> list[str]:
-    """All stamps are the moments; the notes."""
+    """Check that all stamps have the right times; returns the notes."""
     export = open_export([path], ReadOptions(timezone=timezone))
     stamp_s = export.read(["a.PV"])["a.PV"].stamp_s
     np.testing.assert_allclose(stamp_s, [at.timestamp() for at in MOMENTS], rtol=0, atol=1e-3)
@@ -52,7 +52,7 @@ NOVEMBER = (
 
 @pytest.mark.parametrize("month", NOVEMBER)
 def test_a_month_in_another_language(tmp_path: Path, month: str) -> None:
-    """The eleventh month by its name."""
+    """November is recognized by its name."""
     check(written(tmp_path / "x.csv", lambda at: f"{at:%d}. {month} {at:%Y %H:%M:%S}"))
 
 
@@ -62,7 +62,7 @@ JULY = ("Ιουλίου", "июля", "Temmuz", "lipca", "juillet", "liepos", "h
 
 @pytest.mark.parametrize(("name", "month"), [*((n, 6) for n in JUNE), *((n, 7) for n in JULY)])
 def test_june_is_not_july(tmp_path: Path, name: str, month: int) -> None:
-    """Months whose names begin alike are told apart, in the form that stands beside a day."""
+    """Months with similar names are distinguished, in the form used with a day."""
     path = written(tmp_path / "x.csv", lambda at: f"{at:%d} {name} {at:%Y %H:%M:%S}")
     stamp_s = open_export([path]).read(["a.PV"])["a.PV"].stamp_s
     assert stamp_s[0] == datetime(2024, month, 21, 8, tzinfo=UTC).timestamp()
@@ -92,7 +92,7 @@ SHOWN = (
 
 @pytest.mark.parametrize("form", SHOWN)
 def test_a_stamp_in_words(tmp_path: Path, form: str) -> None:
-    """ctime, long English, days of the week, the time of day first, Spanish and Chinese dates."""
+    """Stamps of ctime, long English, weekday names, the time of day first, Spanish and Chinese dates are read."""
     check(written(tmp_path / "x.csv", lambda at: at.strftime(form)))
 
 
@@ -107,8 +107,8 @@ ZONES = (
 
 
 @pytest.mark.parametrize(("behind", "hours"), ZONES)
-def test_a_zone_behind_the_stamp(tmp_path: Path, behind: str, hours: float) -> None:
-    """Letters, names and offsets of zones, in brackets or not."""
+def test_a_zone_after_the_stamp(tmp_path: Path, behind: str, hours: float) -> None:
+    """Letters, names and offsets of zones are read, with or without brackets."""
     east = timedelta(hours=hours)
     check(written(tmp_path / "x.csv", lambda at: f"{at + east:%Y-%m-%d %H:%M:%S}{behind}"))
 
@@ -119,7 +119,7 @@ def test_a_zone_behind_the_stamp(tmp_path: Path, behind: str, hours: float) -> N
 )
 @pytest.mark.parametrize("name", ["Time ({})", "Timestamp [{}]", "Timestamp {}"])
 def test_a_zone_in_the_column_s_name(tmp_path: Path, name: str, zone: str, hours: float) -> None:
-    """The zone in the name of the column is that of its stamps."""
+    """The zone in the name of a column is the zone of its stamps."""
     east = timedelta(hours=hours)
     check(written(tmp_path / "x.csv", lambda at: f"{at + east:%Y-%m-%d %H:%M:%S}", name.format(zone)))
 
@@ -128,7 +128,7 @@ def test_a_zone_in_the_column_s_name(tmp_path: Path, name: str, zone: str, hours
     ("letters", "zone", "hours"), [("CST", "America/Chicago", -6.0), ("CST", "Asia/Shanghai", 8.0)]
 )
 def test_letters_of_several_zones(tmp_path: Path, letters: str, zone: str, hours: float) -> None:
-    """Letters that mean several zones are refused behind a stamp and told in a name, until the zone is stated."""
+    """Letters of several zones are refused after a stamp and noted in a column name, until the zone is stated."""
     east = timedelta(hours=hours)
     behind = written(tmp_path / "x.csv", lambda at: f"{at + east:%Y-%m-%d %H:%M:%S} {letters}")
     named = written(tmp_path / "y.csv", lambda at: f"{at + east:%Y-%m-%d %H:%M:%S}", f"Time ({letters})")
@@ -139,16 +139,16 @@ def test_letters_of_several_zones(tmp_path: Path, letters: str, zone: str, hours
     check(named, zone)
 
 
-def test_eastern_time_has_summer(tmp_path: Path) -> None:
-    """Where the stated zone calls itself EST, a column so named follows that zone in summer too."""
+def test_eastern_time_has_summer_time(tmp_path: Path) -> None:
+    """If the stated zone uses the name EST, a column with that name follows the zone in summer too."""
     rows = "\n".join(f"2024-07-01 08:00:{k:02d};{k}" for k in range(60))
     (tmp_path / "x.csv").write_text(f"Time (EST);a.PV\n{rows}\n")
     export = open_export([tmp_path / "x.csv"], ReadOptions(timezone="America/New_York"))
     assert export.read(["a.PV"])["a.PV"].stamp_s[0] == datetime(2024, 7, 1, 12, tzinfo=UTC).timestamp()
 
 
-def test_times_that_pass_a_day_need_no_name(tmp_path: Path) -> None:
-    """A column of times such as 25:10:03 is the clock, counted from the start, whatever its name is."""
+def test_times_beyond_a_day_need_no_column_name(tmp_path: Path) -> None:
+    """A column of times such as 25:10:03 is the clock, counted from the start, under any name."""
     rows = "".join(f"25:10:{k:02d},{k},{2 * k}\n" for k in range(40))
     (tmp_path / "x.csv").write_text("Z1,A,B\n" + rows)
     export = open_export([tmp_path / "x.csv"])
@@ -164,13 +164,13 @@ def test_times_that_pass_a_day_need_no_name(tmp_path: Path) -> None:
     ],
 )
 def test_croatian_months(written: str, month: int) -> None:
-    """Croatian names are months of their own where they are not Polish or Czech ones."""
+    """Croatian month names are read if they are not Polish or Czech ones."""
     parts = stamps.fields(pa.array([written]))
     assert parts is not None
     assert stamps.stamp_seconds(parts)[0] == datetime(2026, month, 5, 8, tzinfo=UTC).timestamp()
 
 
-def test_a_month_of_two_languages_is_the_zone_s() -> None:
+def test_a_month_of_two_languages_is_that_of_the_zone() -> None:
     """Listopad is October in Zagreb and November in Warsaw."""
     for zone, month in (("Europe/Zagreb", 10), ("Europe/Warsaw", 11)):
         parts = stamps.fields(pa.array(["05 listopad 2026 08:00"]), zone)
@@ -181,7 +181,7 @@ def test_a_month_of_two_languages_is_the_zone_s() -> None:
 @pytest.mark.parametrize("written", ["{} Central European Standard Time", "{} (W. Europe Standard Time)"])
 @pytest.mark.parametrize(("month", "hours"), [(1, 1), (7, 2)])
 def test_zones_as_windows_names_them(tmp_path: Path, written: str, month: int, hours: int) -> None:
-    """A zone in words behind the stamps is that zone, its summer time too; one that nobody knows is refused."""
+    """A zone in words after the stamps is that zone with its summer time; an unknown zone is refused."""
     at = [f"2026-{month:02d}-05 08:00:{k:02d}" for k in range(60)]
     path = tmp_path / "x.csv"
     path.write_text("time,a.PV\n" + "".join(f"{written.format(t)},{k}\n" for k, t in enumerate(at)))
@@ -195,7 +195,7 @@ def test_zones_as_windows_names_them(tmp_path: Path, written: str, month: int, h
 
 @pytest.mark.parametrize(("unit", "unit_s"), [("us", 1e-6), ("µs", 1e-6), ("ns", 1e-9), ("ms", 1e-3)])
 def test_a_unit_in_the_name_is_the_unit(tmp_path: Path, unit: str, unit_s: float) -> None:
-    """A clock of the size of another is read in the unit that its column's name states: 10 ms stay 10 ms."""
+    """A clock is read in the unit of its column name: 10 ms stay 10 ms."""
     step = round(0.01 / unit_s)
     rows = "".join(f"{123456789 + k * step},{k % 7}\n" for k in range(100))
     (tmp_path / "x.csv").write_text(f"time ({unit}),a.PV\n{rows}", encoding="utf-8")
