@@ -1,4 +1,4 @@
-"""Advice from a verdict: the model that settings are sought on, its uncertainty, the load, and abstentions."""
+"""Advice for a verdict: the tuning model, its uncertainty, the load, and cases without advice."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from tuning.limits import LIMITS
 ROLES = ("sp", "pv", "op")
 TANK = Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5)
 PIPE = Sketch("valve", (12.0, 150.0, 6.0), 0.65, 30.0, backlash=2.5, load_std=0.1)
-SWUNG = Sketch("load", (1.4, 90.0, 10.0), 0.8, 120.0, load_std=0.3, sine=3.0, sine_s=300.0)
+OSCILLATING_LOAD = Sketch("load", (1.4, 90.0, 10.0), 0.8, 120.0, load_std=0.3, sine=3.0, sine_s=300.0)
 
 
 def assessed(sketch: Sketch, hours: float = 3.0) -> Assessment:
@@ -41,32 +41,34 @@ def assessed(sketch: Sketch, hours: float = 3.0) -> Assessment:
 
 @pytest.fixture(scope="module")
 def tank() -> Assessment:
-    """A tank whose time constant outlasts what the record tells."""
+    """A tank whose time constant is too long to be identified from the record."""
     return assessed(TANK)
 
 
 @pytest.fixture(scope="module")
 def pipe() -> Assessment:
-    """A lag of 150 s with play, whose record tells the time constant."""
+    """A lag of 150 s with backlash, whose record identifies the time constant."""
     return assessed(PIPE, 6.0)
 
 
 def settings(found: Assessment, sketch: Sketch, **stated: object):
-    """The advice on one assessed sketch."""
+    """The advice for one assessed sketch."""
     row = spec(kp=sketch.kp, ti=sketch.ti, **stated)
     return advise(found, row, sketch.controller, 100.0, CONFIG)
 
 
-def test_play_before_a_known_lag_gets_ti_of_at_least_the_lag(pipe):
-    """With play before a lag that the record tells, Ti is at least the lag and the gain about kept."""
+def test_backlash_before_a_known_lag_gets_ti_of_at_least_the_lag(pipe):
+    """With backlash before an identifiable lag, Ti is at least about the lag and the gain is about kept."""
     advice = settings(pipe, PIPE)
     assert advice.action == "retune"
     assert advice.ti_new > 0.8 * PIPE.process[1]
     assert LIMITS.gain_down * 0.99 < advice.kp_new / PIPE.kp < LIMITS.gain_up * 1.01
 
 
-def test_unknown_lag_is_sought_as_an_integrator(tank):
-    """Where the record tells gain over time constant alone, settings are sought for an integrator of that slope."""
+def test_unknown_lag_is_modelled_as_an_integrator(tank):
+    """If the record identifies only gain over time constant, settings are computed for an integrator of that
+    slope.
+    """
     fit = tank.verdict.fit
     assert lag_factor(fit, True, CONFIG.advice) is None
     process = tuned(fit, True, CONFIG.advice)
@@ -74,8 +76,8 @@ def test_unknown_lag_is_sought_as_an_integrator(tank):
     assert process.slope == pytest.approx(TANK.process[0] / TANK.process[1], rel=0.1)
 
 
-def test_known_lag_is_sought_as_a_lag(pipe):
-    """Where the record tells the time constant, settings are sought for that lag, within a quarter."""
+def test_known_lag_is_modelled_as_a_lag(pipe):
+    """If the record identifies the time constant, settings are computed for that lag, which is right within 25 %."""
     process = tuned(pipe.verdict.fit, True, CONFIG.advice)
     assert isinstance(process, Fopdt)
     assert process.time_constant_s == pytest.approx(PIPE.process[1], rel=0.25)
@@ -93,7 +95,7 @@ def test_proposal_is_stable_on_the_true_process(tank, pipe):
 
 
 def test_samples_spread_about_the_fit(tank):
-    """Samples keep the sign and kind of the process; their slopes spread no more than threefold about the fit's."""
+    """Samples keep the sign and the kind of the process; their slopes are within a factor of three of the fit."""
     loop, fit, _ = sought_for(tank.verdict, TANK.controller, CONFIG.advice)
     samples = uncertain(fit, loop, 40)
     ratio = np.array([one.process.slope / loop.process.slope for one in samples])
@@ -104,12 +106,12 @@ def test_samples_spread_about_the_fit(tank):
 
 
 def test_same_seed_same_samples(tank):
-    """The same night gets the same advice twice."""
+    """The same night gives the same advice twice."""
     assert settings(tank, TANK) == settings(tank, TANK)
 
 
 def test_load_keeps_the_noise_of_a_scan(tank):
-    """The reconstructed load moves from scan to scan by the noise that was put in, though blocks have lost it."""
+    """The reconstructed load has the simulated noise from scan to scan, although block means have lost it."""
     m = tank.verdict.measured
     fit = tank.verdict.fit
     assert scan_noise(m.window, TANK.controller) == pytest.approx(TANK.noise, rel=0.15)
@@ -122,9 +124,10 @@ def test_load_keeps_the_noise_of_a_scan(tank):
 @pytest.mark.parametrize(
     ("filter_s", "rounding"), [(0.0, 0.0), (5.0, 0.0), (20.0, 0.0), (20.0, 0.001), (0.0, 0.05)]
 )
-def test_noise_is_read_behind_a_filter_of_pv(filter_s: float, rounding: float) -> None:
-    """White noise of PV is read from OP within a tenth, whatever filter the controller has before it, and OP's
-    rounding is no noise."""
+def test_noise_is_estimated_with_a_filter_of_pv(filter_s: float, rounding: float) -> None:
+    """White noise of PV is estimated from OP within 10 % for each PV filter of the controller; rounding of OP is no
+    noise.
+    """
     rng, n, size = np.random.default_rng(1), 20_000, 0.1
     noise, seen, last = size * rng.standard_normal(n), np.empty(n), 0.0
     for k in range(n):
@@ -140,9 +143,11 @@ def test_noise_is_read_behind_a_filter_of_pv(filter_s: float, rounding: float) -
 
 @pytest.mark.parametrize("every", [1, 4])
 @pytest.mark.parametrize(("td", "narrow", "filter_s"), [(16.0, 8.0, 0.0), (30.0, 10.0, 3.0), (0.0, 8.0, 3.0)])
-def test_noise_is_read_behind_a_derivative(td: float, narrow: float, filter_s: float, every: int) -> None:
-    """White noise of PV is read from OP within a tenth behind a PID too, also from one scan in four: a derivative
-    makes several times as much of it in OP as the gain does."""
+def test_noise_is_estimated_with_a_derivative(td: float, narrow: float, filter_s: float, every: int) -> None:
+    """White noise of PV is estimated from OP within 10 % with a PID too, also from one scan in four.
+
+    A derivative makes several times as much noise in OP as the gain does.
+    """
     rng, n, size = np.random.default_rng(1), 80_000, 0.1
     noise, op, seen, last, slope = size * rng.standard_normal(n), np.empty(n), 0.0, 0.0, 0.0
     lag_s = td / narrow
@@ -158,7 +163,7 @@ def test_noise_is_read_behind_a_derivative(td: float, narrow: float, filter_s: f
 
 
 def test_mirror_image_gets_mirrored_settings(pipe):
-    """With OP turned about and a direct-acting controller, the advice is the same with the gain's sign turned."""
+    """With OP mirrored and a direct-acting controller, the advice is the same with the other sign of the gain."""
     trends = simulate(PIPE, 6.0)
     turned = replace(PIPE, kp=-PIPE.kp)
     other = assess(prepared(replace(trends, op=100 - trends.op)), turned.controller, CONFIG)
@@ -169,7 +174,7 @@ def test_mirror_image_gets_mirrored_settings(pipe):
 
 
 def test_units_and_form_of_the_plant(pipe):
-    """In minutes and proportional band the advice is the one in seconds and percent, converted."""
+    """In minutes and proportional band, the advice is the converted advice in seconds and percent."""
     plain = settings(pipe, PIPE)
     other = settings(pipe, PIPE, ti_unit="min", gain_unit="band")
     assert other.ti_new == pytest.approx(plain.ti_new / 60, rel=0.01)
@@ -177,34 +182,39 @@ def test_units_and_form_of_the_plant(pipe):
 
 
 def test_load_is_left_alone():
-    """A loop that a machine swings gets the action to find the disturbance, and no settings."""
-    found = assessed(SWUNG)
-    advice = settings(found, SWUNG)
+    """A loop that a load oscillates gets the action to find the disturbance, and no settings."""
+    found = assessed(OSCILLATING_LOAD)
+    advice = settings(found, OSCILLATING_LOAD)
     assert found.verdict.cause == "load"
     assert (advice.action, advice.kp_new, advice.ti_new) == ("find disturbance", None, None)
-    assert propose(found.verdict, SWUNG.controller, 300.0, CONFIG).proposal.action == "find disturbance"
+    assert (
+        propose(found.verdict, OSCILLATING_LOAD.controller, 300.0, CONFIG).proposal.action
+        == "find disturbance"
+    )
 
 
 def test_no_cause_no_settings(pipe):
-    """Verdicts without a cause and verdicts that abstain get no settings."""
+    """Verdicts without a cause and verdicts that lack data get no settings."""
     row = spec(kp=1.0, ti=10.0)
-    asked = [
+    cases = [
         replace(pipe, verdict=v)
         for v in (NO_CAUSE, not_assessed(Requirement(MissingData.OP, RequirementKind.OP)))
     ]
-    assert [advise(a, row, Pid(1, 10), 100.0, CONFIG).action for a in asked] == ["none", "needs data"]
+    assert [advise(a, row, Pid(1, 10), 100.0, CONFIG).action for a in cases] == ["none", "needs data"]
 
 
 def test_a_calm_loop_is_left_alone(pipe):
-    """A loop with play that does not oscillate gets no settings, for at its own nothing cycles; its valve, worn all
-    the same, is for the next shutdown."""
+    """A loop with backlash that does not oscillate gets no settings.
+
+    Its worn valve is still to be repaired at the next shutdown.
+    """
     advice = settings(replace(pipe, oscillations=Oscillations()), PIPE)
     assert (advice.action, advice.due) == ("repair valve", "next shutdown")
     assert (advice.kp_new, advice.ti_new) == (None, None)
 
 
 def test_one_hour_is_a_hint():
-    """One hour of a plainly cycling loop: its cause at 75 % at most, no settings, and what they would need."""
+    """One hour of a clearly oscillating loop gives its cause with at most 75 %, no settings, and the missing data."""
     found = assessed(PIPE, 1.0)
     assert found.verdict.cause == "valve"
     assert max(found.verdict.confidence.values()) == 75
@@ -215,8 +225,11 @@ def test_one_hour_is_a_hint():
 
 @pytest.mark.parametrize(("every", "action"), [(15, "repair valve"), (5, "retune")])
 def test_a_sample_for_each_half_of_ti_gives_no_settings(every, action):
-    """At 15 s a sample a loop with Ti 30 s, whose scan is not stated, gets no settings but what they would need, and
-    its worn valve is stroked all the same, for that needs none; at 5 s it gets some."""
+    """At a sample every 15 s, a loop with Ti 30 s and no stated scan gets no settings, but the repair of its worn
+    valve.
+
+    The reason states the required interval; at 5 s the loop gets settings.
+    """
     t = simulate(PIPE, 24.0)
     thin = {
         f"L.{n.upper()}": series(START_S + np.arange(0.0, t.pv.size, every), getattr(t, n)[::every])
@@ -229,8 +242,10 @@ def test_a_sample_for_each_half_of_ti_gives_no_settings(every, action):
     assert ("sample every 7.5 s" in advice.reason) == (action == "repair valve")
 
 
-def test_cycles_too_fast_for_the_sampling_are_not_denied():
-    """Below three samples a cycle a cycling loop is not said to be calm: what it takes to see is said."""
+def test_cycles_too_fast_for_the_sampling_are_not_excluded():
+    """With fewer than three samples a cycle, an oscillating loop is not reported as steady; the required sampling is
+    reported.
+    """
     t = simulate(TANK, 24.0)
     every = 90
     thin = {
@@ -247,22 +262,22 @@ def test_cycles_too_fast_for_the_sampling_are_not_denied():
     assert row["cause"] == "undecided"
 
 
-def test_stale_settings_are_told_and_nothing_is_advised():
-    """A loop that runs at another gain and Ti than stated is told so, both pairs in the controller's own units."""
+def test_outdated_settings_are_reported_without_advice():
+    """A loop that runs with other settings than stated is reported, with both pairs in the controller's own units."""
     stated = replace(PIPE, kp=PIPE.kp / 2, ti=3 * PIPE.ti)
     found = assess(prepared(simulate(PIPE, 6.0)), stated.controller, CONFIG)
     row = spec(kp=100 / stated.kp, ti=stated.ti / 60, ti_unit="min", gain_unit="band")
     advice = advise(found, row, stated.controller, 100.0, CONFIG)
     assert (advice.action, advice.kp_new, advice.ti_new) == ("check settings", None, None)
     assert f"stated Kp {100 / stated.kp:.3g} % band, Ti {stated.ti / 60:.3g} min" in advice.reason
-    told = re.search(r"recorded about Kp ([\d.]+) % band, Ti ([\d.]+) min", advice.reason)
-    assert told is not None
-    assert float(told[1]) == pytest.approx(100 / PIPE.kp, rel=0.1)
-    assert float(told[2]) == pytest.approx(PIPE.ti / 60, rel=0.15)
+    recorded = re.search(r"recorded about Kp ([\d.]+) % band, Ti ([\d.]+) min", advice.reason)
+    assert recorded is not None
+    assert float(recorded[1]) == pytest.approx(100 / PIPE.kp, rel=0.1)
+    assert float(recorded[2]) == pytest.approx(PIPE.ti / 60, rel=0.15)
 
 
 def test_a_model_beyond_its_record_gets_no_advice(pipe):
-    """A fit whose dead time is a third of the record gets no settings, and its reason says why."""
+    """A fit whose dead time is a third of the record gets no settings, and the reason says why."""
     m = pipe.verdict.measured
     late = m.play.moved(dead_time_s=m.window.duration_s / 3)
     verdict = replace(pipe.verdict, measured=replace(m, play=late), fault="backlash")
@@ -271,15 +286,15 @@ def test_a_model_beyond_its_record_gets_no_advice(pipe):
     assert "dead time" in p.reason
 
 
-def test_unstated_settings_are_asked_for(pipe):
-    """Without kp and ti there are no new ones, and the reason says what is missing; the valve is told anyway."""
+def test_unstated_settings_are_requested(pipe):
+    """Without kp and ti there are no new settings, and the reason says so; the valve fault is still reported."""
     advice = advise(pipe, spec(), None, 100.0, CONFIG)
     assert advice.action == "repair valve"
     assert "no kp and ti" in advice.reason
 
 
-def test_settings_are_not_asked_for_where_they_would_help_nothing(pipe):
-    """On a record that bears no settings the reason is the record, stated kp and ti or not."""
+def test_settings_are_not_requested_if_they_would_not_help(pipe):
+    """If the record does not allow settings, the reason is the record, with or without stated kp and ti."""
     packed = replace(
         pipe, for_settings=Requirement(MissingData.UNCOMPRESSED, RequirementKind.UNCOMPRESSED, (90.0,))
     )
@@ -287,47 +302,54 @@ def test_settings_are_not_asked_for_where_they_would_help_nothing(pipe):
     assert reasons == {f"no new settings: {packed.for_settings}"}
 
 
-def test_wrong_sign_is_told(pipe):
-    """A gain of the wrong sign gets no settings and says that the controller would act the wrong way."""
+def test_wrong_sign_is_reported(pipe):
+    """A gain of the wrong sign gets no settings, and the reason says that the controller would act the wrong way."""
     turned = replace(PIPE.controller, kp=-PIPE.kp)
     p = propose(pipe.verdict, turned, 100.0, CONFIG).proposal
     assert (p.action, p.controller) == ("check settings", None)
     assert "wrong way" in p.reason
 
 
-def test_integral_off_is_told(pipe):
-    """Without integral action, as stated, a loop that cycles by it is sent to check its settings."""
+def test_missing_integral_action_is_reported(pipe):
+    """If no integral action is stated for a loop that oscillates by integral action, its settings are to be
+    checked.
+    """
     p = propose(pipe.verdict, replace(PIPE.controller, ti_s=math.inf), 100.0, CONFIG).proposal
     assert (p.action, p.controller) == ("check settings", None)
     assert "check kp and ti" in p.reason
 
 
-def test_play_is_the_model_where_it_cycles_by_itself(tank):
-    """Where the loop with the identified play cycles, that play is the model, and so are its samples."""
+def test_backlash_is_in_the_model_if_it_causes_a_cycle(tank):
+    """If the loop oscillates with the identified backlash, that backlash is in the model and in all its samples."""
     loop, fit, others = sought_for(tank.verdict, TANK.controller, CONFIG.advice)
     assert loop.valve == Backlash(fit.valve.stickband)
     assert all(isinstance(one.valve, Backlash) for one in others)
 
 
-def test_a_calm_loop_witnesses_no_width_that_its_stretches_do_not_bear_out(pipe):
-    """Stick-slip that was tried on a calm loop is not told slip by slip: its width is none where single stretches
-    alone speak for it."""
+def test_a_loop_without_a_cycle_stores_no_width_from_single_stretches(pipe):
+    """For a loop without a cycle, stick-slip does not count as evidence, and no width is stored, if only single
+    stretches support it.
+    """
     m = pipe.verdict.require_measured
     tried = m.play.moved(valve=m.play.valve._replace(sliding=0.25 * m.play.valve.stickband))
     single = replace(m, stick_slip=tried, steady=0.0, asked=0.0)
     calm = replace(pipe.verdict, measured=single, steady=None)
-    said = json.loads(witness(calm, False, prepared(simulate(PIPE, 6.0)), CONFIG) or "")
-    assert "slope" in said
-    assert "width" not in said
-    assert max(said["profile"]) == 0.0
+    evidence = json.loads(witness(calm, False, prepared(simulate(PIPE, 6.0)), CONFIG) or "")
+    assert "slope" in evidence
+    assert "width" not in evidence
+    assert max(evidence["profile"]) == 0.0
 
 
-def test_loops_that_a_cycle_cannot_tell_apart_have_its_loop_gain(pipe):
-    """The product of process and describing function at the cycle is that of the fitted loop, for a process that
-    integrates, behind a valve as wide and a wider one; the load is what each leaves of the same record."""
+def test_loops_that_a_cycle_does_not_distinguish_have_its_loop_gain(pipe):
+    """The product of process and describing function at the cycle is that of the fitted loop.
+
+    This holds for an integrating process with a valve of equal width and with a wider one; each has its own residual
+    load.
+    """
     fit, period_s = pipe.verdict.fit, pipe.oscillations.first.period_s
     loop = sought_for(pipe.verdict, PIPE.controller, CONFIG.advice)[0]
-    late = 0.25 * period_s  # an integrator and a wider valve take their phase from the dead time
+    # An integrator and a wider valve have less phase lag, which the dead time replaces.
+    late = 0.25 * period_s
     fit = fit.moved(dead_time_s=fit.dead_time_s + late)
     loop = replace(loop, process=replace(loop.process, dead_time_s=loop.process.dead_time_s + late))
     swing, omega = 0.5 * fit.p.cycle_range, 2.0 * math.pi / period_s

@@ -1,4 +1,4 @@
-"""What each half-cycle shows of a valve; the loops of benchmarks/world share no code with the packages."""
+"""Evidence of each half-cycle for a valve fault; the loops of benchmarks/world share no code with the packages."""
 
 from __future__ import annotations
 
@@ -8,25 +8,28 @@ from benchmarks.world.recorder import recorded
 
 
 def row_of(seed: int, kind: str, number: int) -> dict[str, object]:
-    """The night's row of one loop of the world, recorded at 1 s."""
+    """The row of a night for one loop of the world, recorded at 1 s."""
     d = drawn(seed, number + 1, (kind,))[number]
     return told([d], {d.name: recorded(run(d), "plain", d.seed)}, 1)[d.name]
 
 
 def test_a_stem_that_jumps_by_its_whole_stickband_is_found() -> None:
-    """The valve of a stem that jumps by 98 % of its stickband is named, though backlash explains nothing of it."""
+    """The valve fault of a stem that jumps by 98 % of its stickband is named, although backlash explains no part of
+    it.
+    """
     row = row_of(573, "stiction", 1)
     assert (row["cause"], row["valve_fault"]) == ("valve", "stiction")
 
 
-def test_a_few_half_cycles_after_set_point_moves_are_no_valve() -> None:
-    """A tight loop in which 68 of 121 half-cycles suit backlash, those after set point moves by far, has no valve
-    fault."""
+def test_a_few_half_cycles_after_set_point_moves_are_no_valve_fault() -> None:
+    """A tight loop has no valve fault although 68 of 121 half-cycles fit backlash, mainly those after set point
+    moves.
+    """
     row = row_of(573, "tight", 4)
     assert (row["cause"], row["valve_fault"]) == ("tuning", "none")
 
 
-def test_a_steady_load_is_steady_beside_set_point_moves() -> None:
-    """A sine that acts on a loop with eight set point moves keeps its size, and is named."""
+def test_a_steady_load_is_steady_under_set_point_moves() -> None:
+    """A sine load on a loop with eight set point moves has a constant size, and is named as the cause."""
     row = row_of(577, "load", 4)
     assert (row["cause"], row["valve_fault"]) == ("load", "none")

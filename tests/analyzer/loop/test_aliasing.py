@@ -1,4 +1,4 @@
-"""Periods that the sampling folds, told from a loop's own by its control law."""
+"""Aliased periods are distinguished from the loop's own periods by its control law."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PID = Pid(0.5, 4.0, scan_s=1.0)
 
 
 def sampled(period_s: float, pid: Pid = PID, noise: float = 0.05, seed: int = 1) -> LoopRecord:
-    """Every tenth row of a day in which the error is a sine, and OP a PI law of it at each second."""
+    """Each tenth row of a day in which the error is a sine, and OP follows it by a PI law at each second."""
     rng, k = np.random.default_rng(seed), np.arange(86_400)
     error = np.sin(2.0 * np.pi * k / period_s) + noise * rng.normal(size=k.size)
     op = 50.0 + pid.kp * (error + np.cumsum(error - error.mean()) / pid.ti_s)
@@ -23,33 +23,35 @@ def sampled(period_s: float, pid: Pid = PID, noise: float = 0.05, seed: int = 1)
     return LoopRecord("L", 0.0, float(EVERY), np.full(none.size, 50.0), (50.0 - error)[rows], op[rows], none)
 
 
-def test_a_loop_s_own_period_is_known_by_the_law() -> None:
+def test_a_loop_s_own_period_is_identified_by_the_control_law() -> None:
     """A cycle of 69 s sampled every 10 s is the loop's own, although its integral time is 4 s."""
     assert is_own_period(sampled(69.0), 69.0, PID)
 
 
 @pytest.mark.parametrize("fold", [1, 2, 3])
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_a_folded_period_is_none_of_the_loop_s(fold: int, side: float) -> None:
-    """Cycles of 1/(k/10 s -+ 1/69 s), which rows of 10 s show at 69 s, are not taken for one of 69 s."""
+def test_an_aliased_period_is_not_the_loop_s_own(fold: int, side: float) -> None:
+    """Cycles with frequency k/10 s ± 1/69 s, which appear as 69 s in rows of 10 s, are not taken for a cycle of 69
+    s.
+    """
     true_s = 1.0 / (fold / EVERY + side / 69.0)
     assert not is_own_period(sampled(true_s), 69.0, PID)
 
 
-def test_a_law_that_is_alike_at_all_periods_tells_nothing() -> None:
-    """Proportional action alone cannot tell a folded period."""
+def test_a_law_that_is_equal_at_all_periods_identifies_no_period() -> None:
+    """Proportional action alone cannot identify an aliased period."""
     alone = Pid(0.5, np.inf, scan_s=1.0)
     assert not is_own_period(sampled(69.0, alone), 69.0, alone)
 
 
 @pytest.mark.parametrize("pid", [Pid(0.5, 4.0, scan_s=0.0), Pid(0.0, 4.0), Pid(-0.5, 4.0)])
-def test_any_stated_controller_is_answered(pid: Pid) -> None:
-    """A continuous controller, one without a gain and one of the other direction end in an answer."""
+def test_any_stated_controller_gives_a_result(pid: Pid) -> None:
+    """A continuous controller, one without a gain and one of the other direction give a result."""
     assert is_own_period(sampled(69.0), 69.0, pid) is (pid.kp > 0.0)
 
 
-def test_an_op_of_its_own_tells_nothing() -> None:
-    """OP that does not follow the error shows no period of a law."""
+def test_an_independent_op_identifies_no_period() -> None:
+    """An OP that does not follow the error shows no period of a control law."""
     record, other = sampled(69.0, seed=2), sampled(55.0, seed=3)
     apart = LoopRecord("L", 0.0, float(EVERY), record.sp, record.pv, other.op, record.bad)
     assert not is_own_period(apart, 69.0, PID)

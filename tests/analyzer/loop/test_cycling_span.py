@@ -1,4 +1,4 @@
-"""A cycle of some hours is found, and judged, in these hours, whatever the rest of the day does."""
+"""A cycle of some hours is found and assessed in these hours, independently of the rest of the day."""
 
 from __future__ import annotations
 
@@ -18,17 +18,19 @@ PER_H = int(3600 / DT_S)
 CONTROLLER = Pid(0.6, 40.0, scan_s=DT_S)
 
 
-def day(hours: int, play: float, seed: int = 5, begins: int = 0) -> LoopRecord:
-    """A day of a lag of 200 s under PI whose valve has a play [% of OP] for some hours that begin
-    with a knock; noise and a slow load."""
+def day(hours: int, backlash: float, seed: int = 5, begins: int = 0) -> LoopRecord:
+    """A day of a lag of 200 s under PI, whose valve has backlash [% of OP] for some hours.
+
+    These hours begin with a step of PV; noise and a slow load act all day.
+    """
     rng, n = np.random.default_rng(seed), 24 * PER_H
     noise, load = rng.normal(0.0, 0.05, n), np.cumsum(rng.normal(0.0, 0.01, n))
     pv, op = np.zeros(n), np.zeros(n)
     y, stem, total = 0.0, 0.0, 0.0
     for k in range(n):
         worn = begins * PER_H <= k < (begins + hours) * PER_H
-        half = 0.5 * play if worn else 0.0
-        y += 2.0 * (play > 0.0 and k == begins * PER_H)
+        half = 0.5 * backlash if worn else 0.0
+        y += 2.0 * (backlash > 0.0 and k == begins * PER_H)
         if k > 0:
             stem = min(max(stem, op[k - 1] - half), op[k - 1] + half)
             y += (2.0 * stem + load[k] - y) * (1.0 - np.exp(-DT_S / 200.0))
@@ -40,7 +42,9 @@ def day(hours: int, play: float, seed: int = 5, begins: int = 0) -> LoopRecord:
 
 @pytest.mark.parametrize("begins", [0, 6, 14])
 def test_the_share_of_a_cycle_is_that_of_its_hours(begins: int) -> None:
-    """A valve that plays for nine hours of a day makes its loop cycle for 37 % of the time, whenever that is."""
+    """A valve with backlash for nine hours of a day makes its loop oscillate for 37.5 % of the time, at any start
+    hour.
+    """
     found, span = detect_where_it_cycles(day(9, 4.0, begins=begins), LIMITS)
     assert found.first is not None
     assert found.first.oscillating_pct == pytest.approx(37.5, abs=9.0)
@@ -50,7 +54,7 @@ def test_the_share_of_a_cycle_is_that_of_its_hours(begins: int) -> None:
 
 
 def test_quiet_hours_leave_the_cause_as_it_is() -> None:
-    """The valve is named from nine hours of its cycle within a day as from these hours alone."""
+    """The valve fault is named from nine hours of its cycle within a day as from these hours alone."""
     whole = day(9, 4.0)
     for record in (whole, whole.span(0, 9 * PER_H)):
         found = assess(Prepared(record, Scale(0, 100, 0, 100, False), 0, 0, ()), CONTROLLER, Config())
@@ -59,14 +63,14 @@ def test_quiet_hours_leave_the_cause_as_it_is() -> None:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_day_of_noise_and_drift_has_no_cycling_hours(seed: int) -> None:
-    """Of a sound valve's days under a slow load and noise no hours are taken for a cycle."""
+    """A day of a valve without fault under a slow load and noise has no hours that are taken for a cycle."""
     found, span = detect_where_it_cycles(day(0, 0.0, seed), LIMITS)
     assert found.first is None
     assert span == (0, 24 * PER_H)
 
 
 def test_a_loud_hour_of_noise_is_no_cycle() -> None:
-    """Hours in which the noise is ten times as large are no cycle: what is loud must be regular too."""
+    """Hours in which the noise is ten times as large are no cycle: a cycle must also be regular."""
     for seed in range(6):
         rng, n = np.random.default_rng(seed), 24 * PER_H
         x = rng.normal(0.0, 0.05, n)

@@ -1,4 +1,4 @@
-"""Experiments that lie in a record, through the commands: check, run, tune, explain, test-plan and the page."""
+"""Experiments in a record, with the commands check, run, tune, explain, test-plan and pages."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ shared = pytest.mark.skipif(
 )
 
 
-def said(*arguments):
-    """What a command prints on stdout."""
+def output_of(*arguments):
+    """The output of a command on stdout."""
     done = CliRunner().invoke(main, list(map(str, arguments)), catch_exceptions=False)
     assert done.exit_code == 0, done.output
     return done.stdout
 
 
-def taught(name, loops=None):
-    """What the experiments of a file of the study tell of its one loop."""
+def learned_from(name, loops=None):
+    """The results of the experiments in a file of the study for its one loop."""
     export = INPUTS / f"{name}.csv"
     plant = opened(asked_of([export], loops and INPUTS / loops, None, Config()))
     one = plant.last_night(plant.loops[0])
@@ -57,9 +57,11 @@ def bump(tmp_path_factory):
 
 
 def test_a_night_in_manual_with_a_bump_test_has_model_and_settings(bump, tmp_path):
-    """`run` keeps gain, lag, dead time and new settings of a loop that was in manual all night."""
-    said("run", bump / "bump.csv", "--loops", bump / "loops.csv", "--store", tmp_path / "s", "--jobs", "1")
-    (row,) = json.loads(said("rank", tmp_path / "s", "--format", "json"))
+    """`run` stores gain, lag, dead time and new settings of a loop that was in manual all night."""
+    output_of(
+        "run", bump / "bump.csv", "--loops", bump / "loops.csv", "--store", tmp_path / "s", "--jobs", "1"
+    )
+    (row,) = json.loads(output_of("rank", tmp_path / "s", "--format", "json"))
     assert row["status"] == "ok"
     assert row["gain"] == pytest.approx(1.2, rel=0.05)
     assert row["time_constant_s"] == pytest.approx(100.0, rel=0.1)
@@ -67,7 +69,7 @@ def test_a_night_in_manual_with_a_bump_test_has_model_and_settings(bump, tmp_pat
     assert row["action"] == "retune"
     assert row["kp_new"] > 0.4
     assert "model from steps of OP" in row["reason"]
-    said("pages", tmp_path / "s", "--out", tmp_path / "p")
+    output_of("pages", tmp_path / "s", "--out", tmp_path / "p")
     (page,) = (tmp_path / "p").glob("T1-*.html")
     assert "Experiments" in page.read_text()
     morning = (tmp_path / "p" / "index.html").read_text()
@@ -76,27 +78,31 @@ def test_a_night_in_manual_with_a_bump_test_has_model_and_settings(bump, tmp_pat
     assert json.loads(beliefs["constants"][0])["gain"][0] == pytest.approx(1.2, rel=0.05)
 
 
-def test_check_and_tune_tell_the_experiment(bump):
-    """`check` lists it with its span; `tune` prints model, SIMC's settings and what the test leaves open."""
+def test_check_and_tune_report_the_experiment(bump):
+    """`check` lists the experiment with its span; `tune` prints the model, SIMC settings and what the test does not
+    identify.
+    """
     arguments = bump / "bump.csv", "--loops", bump / "loops.csv"
-    checked = said("check", *arguments)
+    checked = output_of("check", *arguments)
     assert "experiment 2026-05-04 08:00 to" in checked
     assert "fit only for a model from its experiments" in checked
-    tuned = said("tune", *arguments, "--loop", "T1")
+    tuned = output_of("tune", *arguments, "--loop", "T1")
     assert "SIMC with tau_c = dead time: kp" in tuned
     assert "not identified by the experiment: the process outside OP 38 to 45 %" in tuned
 
 
 def test_a_test_plan_names_size_levels_and_times(bump):
-    """`test-plan` tells the step against noise, both directions, how long, and how well it should tell the gain."""
-    plan = said("test-plan", bump / "bump.csv", "--loops", bump / "loops.csv", "--loop", "T1")
+    """`test-plan` prints the step size against noise, both directions, the duration, and the expected accuracy of the
+    gain.
+    """
+    plan = output_of("test-plan", bump / "bump.csv", "--loops", bump / "loops.csv", "--loop", "T1")
     assert "step of OP:" in plan
     assert plan.count("→") == 4
     assert "accuracy of the gain" in plan
 
 
 def test_op_at_zero_before_and_after_a_test_is_no_limit(tmp_path):
-    """An oven stepped 0, 30, 0 % by a script, no SP and no mode recorded: its record is in manual, OP at no limit."""
+    """An oven stepped 0, 30, 0 % by a script, without SP and mode, is a record in manual without OP at a limit."""
     t = np.arange(0.0, 12000.0, 10.0)
     op = np.where((t > 600.0) & (t < 6000.0), 30.0, 0.0)
     pv, y = np.empty(t.size), 0.0
@@ -106,16 +112,16 @@ def test_op_at_zero_before_and_after_a_test_is_no_limit(tmp_path):
     pv += 25.0 + 0.1 * np.random.default_rng(3).normal(size=t.size)
     stamps = pd.date_range("2026-05-04 08:00", periods=t.size, freq="10s")
     pd.DataFrame({"timestamp": stamps, "T5.PV": pv, "T5.OP": op}).to_csv(tmp_path / "oven.csv", index=False)
-    assert "saturated" not in said("check", tmp_path / "oven.csv")
-    said("run", tmp_path / "oven.csv", "--store", tmp_path / "s", "--jobs", "1")
-    (row,) = json.loads(said("rank", tmp_path / "s", "--format", "json"))
+    assert "saturated" not in output_of("check", tmp_path / "oven.csv")
+    output_of("run", tmp_path / "oven.csv", "--store", tmp_path / "s", "--jobs", "1")
+    (row,) = json.loads(output_of("rank", tmp_path / "s", "--format", "json"))
     assert "model from steps of OP" in row["reason"]
     assert "limit" not in row["reason"]
-    assert row["action"] == "check settings"  # none are stated, and the model has some
+    assert row["action"] == "check settings"  # no settings are stated, and the model has settings
 
 
-def test_a_loop_in_automatic_is_not_taken_for_an_experiment():
-    """Of the sample mill's 22 loops FIC2117 alone, which operators move in manual, has experiments by hand."""
+def test_a_loop_in_automatic_has_no_experiment_by_hand():
+    """Of the 22 loops of the sample mill, only FIC2117, which operators move in manual, has experiments by hand."""
     mill = Path(__file__).parents[3] / "sample_data"
     arguments = (
         "check",
@@ -135,8 +141,8 @@ def test_a_loop_in_automatic_is_not_taken_for_an_experiment():
 
 @shared
 def test_the_bump_test_of_the_study():
-    """OP stepped 40, 45, 38, 44 % in manual: gain 1.8, time constant 90 s, dead time 20 s (inputs/README.md)."""
-    e = taught("bump-test", "bump-test-loops.csv").model.estimates
+    """OP stepped 40, 45, 38, 44 % in manual gives gain 1.8, time constant 90 s, dead time 20 s (inputs/README.md)."""
+    e = learned_from("bump-test", "bump-test-loops.csv").model.estimates
     assert e["gain"].value == pytest.approx(1.8, rel=0.02)
     assert e["lags_s"].value == pytest.approx(90.0, rel=0.03)
     assert e["dead_time_s"].value == pytest.approx(20.0, abs=1.1)
@@ -145,8 +151,10 @@ def test_the_bump_test_of_the_study():
 @shared
 @pytest.mark.parametrize("name", ["step-test-even", "step-test-jitter"])
 def test_an_oven_stepped_from_its_limit(name):
-    """OP 0, 30, 0 %: gain 2.0 in own units, lags 2,400 and 450 s, dead time 300 s, jitter or not."""
-    found = taught(name)
+    """OP 0, 30, 0 % gives gain 2.0 in its own units, lags 2,400 and 450 s and dead time 300 s, with or without
+    jitter.
+    """
+    found = learned_from(name)
     e, scale = found.model.estimates, found.prepared.scale
     assert e["gain"].value * scale.span / scale.op_span == pytest.approx(2.0, rel=0.03)
     assert e["time_constant_s"].value == pytest.approx(2400.0, rel=0.05)
@@ -155,9 +163,9 @@ def test_an_oven_stepped_from_its_limit(name):
 
 
 @shared
-def test_a_long_step_is_fitted_whole():
-    """One step at ten samples a second: gain .60, lag 170 s, dead time 150 s (inputs/README.md)."""
-    e = taught("long-step-test", "long-step-test-loops.csv").model.estimates
+def test_a_long_step_is_fitted_completely():
+    """One step at ten samples a second gives gain 0.60, lag 170 s, dead time 150 s (inputs/README.md)."""
+    e = learned_from("long-step-test", "long-step-test-loops.csv").model.estimates
     assert e["gain"].value == pytest.approx(0.6, rel=0.02)
     assert e["lags_s"].value == pytest.approx(170.0, rel=0.03)
     assert e["dead_time_s"].value == pytest.approx(150.0, rel=0.03)
@@ -165,15 +173,17 @@ def test_a_long_step_is_fitted_whole():
 
 @shared
 def test_a_warm_up_has_a_heater_s_sign():
-    """A heater of lags 250 and 25 s under PI from cold: gain positive, the sum of lags in its interval."""
-    e = taught("warm-up", "warm-up-loops.csv").model.estimates
+    """A heater with lags of 250 and 25 s under PI from cold gives a positive gain and a sum of lags from 200 to 330
+    s.
+    """
+    e = learned_from("warm-up", "warm-up-loops.csv").model.estimates
     assert e["gain"].low > 0
     assert 200.0 < e["lags_s"].value < 330.0
     assert e["second_lag_s"].value == pytest.approx(25.0, rel=0.2)
 
 
-def test_a_model_against_the_controller_tells_nothing(tmp_path):
-    """Set point steps of a loop whose stated controller acts the other way give no model."""
+def test_a_model_against_the_controller_is_not_reported(tmp_path):
+    """Set point steps of a loop whose stated controller acts in the other direction give no model."""
     rng, y, integral = np.random.default_rng(5), 0.0, 0.0
     sp = np.repeat([50.0, 55.0, 48.0, 53.0], 900)
     pv, op = np.empty(sp.size), np.full(sp.size, 40.0)

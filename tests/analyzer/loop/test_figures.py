@@ -1,4 +1,4 @@
-"""Figures of a loop against plain loops over the samples."""
+"""Figures of a loop agree with simple sums over the samples."""
 
 from __future__ import annotations
 
@@ -48,11 +48,11 @@ def night(seed: int = 1, dt_s: float = 1.0) -> LoopRecord:
     return replace(made, bad=gap, masks={"gap": gap, "manual": manual, "saturated": (op <= 2) | (op >= 98)})
 
 
-# Slow twins: one sample after the other
+# Slow reference implementations: one sample after the other
 
 
 def slow_figures(r: LoopRecord) -> dict[str, float]:
-    """The figures that are sums over samples, each sample weighing its interval."""
+    """The figures that are sums over samples; each sample is weighted by its interval."""
     weight = error = square = total = limited = served = automatic = good = 0.0
     manual, limit = r.mask("manual"), r.mask("saturated")
     for k in range(len(r)):
@@ -80,7 +80,7 @@ def slow_figures(r: LoopRecord) -> dict[str, float]:
 
 
 def slow_travel(signal: list[float], deadband: float) -> tuple[float, int]:
-    """Travel and reversals of a pointer in a slot of the deadband's width that the signal pushes along."""
+    """Travel and reversals of a pointer that the signal pushes at the two edges of its deadband."""
     pointer, path, turns, way = signal[0], 0.0, 0, 0
     for x in signal:
         move = 0.0
@@ -96,7 +96,7 @@ def slow_travel(signal: list[float], deadband: float) -> tuple[float, int]:
 
 
 def slow_crossings(error: list[float], band: float) -> int:
-    """How often an error is met beyond the band on the side where it was not last."""
+    """The number of times that an error exceeds the band on the other side than last time."""
     last, count = 0, 0
     for e in error:
         if abs(e) > band:
@@ -108,8 +108,8 @@ def slow_crossings(error: list[float], band: float) -> int:
 
 @pytest.mark.parametrize("seed", [1, 11, 21])
 @pytest.mark.parametrize("dt_s", [1.0, 5.0])
-def test_figures_agree_with_slow_twin(seed, dt_s):
-    """Error, variability and shares of time are those of a plain loop over the good samples in automatic."""
+def test_figures_agree_with_slow_reference(seed, dt_s):
+    """Error, variability and shares of time equal those of a simple sum over the good samples in automatic."""
     r = night(seed, dt_s)
     found = assess_span(r, FIGURES).as_row()
     for name, expected in slow_figures(r).items():
@@ -119,8 +119,8 @@ def test_figures_agree_with_slow_twin(seed, dt_s):
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.floats(0, 100), min_size=2, max_size=80), st.floats(0.01, 5))
 @example([1.0, 0.0, 0.11365059655144008], 0.11365059655144008)
-def test_travel_agrees_with_slow_twin(signal, deadband):
-    """Travel and reversals beyond a deadband are those of a pointer pushed along in a slot."""
+def test_travel_agrees_with_slow_reference(signal, deadband):
+    """Travel and reversals beyond a deadband equal those of a pointer that the signal pushes."""
     x = np.array(signal)
     path, turns = travel_of(x, np.ones(x.size, dtype=bool), 1, deadband)
     slow_path, slow_turns = slow_travel(signal, deadband)
@@ -130,13 +130,13 @@ def test_travel_agrees_with_slow_twin(signal, deadband):
 
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.floats(-5, 5), min_size=1, max_size=80), st.floats(0, 3))
-def test_crossings_agree_with_slow_twin(error, band):
+def test_crossings_agree_with_slow_reference(error, band):
     """Crossings are changes of side beyond the band."""
     assert crossings_of(np.array(error), np.ones(len(error), dtype=bool), band) == slow_crossings(error, band)
 
 
 def test_travel_of_a_night_is_on_its_grid():
-    """Travel per hour is that of every tenth second's OP beyond the deadband, over the hours."""
+    """Travel per hour equals the travel of each tenth second's OP beyond the deadband, divided by the hours."""
     r = record(50 + noise(3), op=50 + 5 * np.sin(T / 90) + 0.3 * noise(4))
     path, turns = slow_travel(list(r.op[:: int(FIGURES.travel_grid_s)]), FIGURES.travel_deadband_pct)
     found = assess_span(r, FIGURES)
@@ -157,7 +157,7 @@ def test_figures_of_a_sine_have_closed_forms():
 
 
 def test_travel_of_a_sine_has_a_closed_form():
-    """OP A sin travels 4A less two deadbands a period, but for the grid."""
+    """OP of amplitude A travels 4A minus two deadbands a period, within the error of the grid."""
     period = 900.0
     found = assess_span(record(50 + noise(5), op=50 + 10 * np.sin(2 * np.pi * T / period)), FIGURES)
     expected = (40 - 2 * FIGURES.travel_deadband_pct) * 3600 / period
@@ -166,20 +166,20 @@ def test_travel_of_a_sine_has_a_closed_form():
 
 
 def test_noise_band_is_the_deviation_of_white_noise():
-    """The noise band of white noise is its standard deviation, whatever slow motion lies under it."""
+    """The noise band of white noise is its standard deviation, with any slow motion below it."""
     slow = 20 * np.sin(T / 900)
     assert noise_band(slow + 0.7 * noise(6)) == pytest.approx(0.7, rel=0.03)
 
 
 def test_travel_of_the_position_where_it_is_recorded():
-    """Where the stem's position is recorded travel is the stem's and not OP's."""
+    """If the position of the stem is recorded, the travel is that of the stem and not of OP."""
     r = record(50 + noise(7), op=50 + 5 * np.sin(T / 90))
     assert assess_span(replace(r, position=np.full(N, 50.0)), FIGURES).valve_travel_pct_per_h == 0.0
     assert assess_span(r, FIGURES).valve_travel_pct_per_h > 50
 
 
-def test_set_point_moves_count_whatever_the_minute_they_fall_on():
-    """A set point that moves by 2 % on every hour, or in the middle of each, travels as far: 2 %/h."""
+def test_set_point_moves_count_at_any_minute():
+    """A set point that moves by 2 % on each hour, or in the middle of each hour, has the same travel of 2 %/h."""
     t = np.arange(0, 6 * 3600, 10)
     for minute in (0, 30):
         sp = 50 + 2.0 * (((t + 60 * minute) // 3600) % 2)
@@ -188,11 +188,11 @@ def test_set_point_moves_count_whatever_the_minute_they_fall_on():
         assert [h.figures.sp_travel_pct for h in found][1:] == [2.0] * 5
 
 
-# Gaps, constants and nothing at all
+# Gaps, constants and missing samples
 
 
-def test_time_without_samples_weighs_nothing():
-    """Whatever is held over a gap changes no mean, no share and no spread."""
+def test_time_without_samples_has_no_weight():
+    """The value that is held over a gap changes no mean, no share and no spread."""
     pv = 50 + 2 * np.sin(T / 70) + noise(8)
     bad = (T >= 3000) & (T < 5000)
     rows = [
@@ -204,7 +204,7 @@ def test_time_without_samples_weighs_nothing():
 
 
 def test_a_constant_loop_has_figures_and_no_nan():
-    """A loop that stands still off its set point: its error, and zero of all that moves."""
+    """A loop that is constant away from its set point has its error, zero for all figures of movement, and no NaN."""
     found = assess_span(record(np.full(N, 47.0)), FIGURES).as_row()
     assert found["average_absolute_error_pct"] == pytest.approx(3.0)
     names = (
@@ -219,22 +219,22 @@ def test_a_constant_loop_has_figures_and_no_nan():
 
 
 @pytest.mark.parametrize("good", [0, 1, 5])
-def test_next_to_nothing_gives_none_and_no_good_score(good):
-    """With no sample, or hardly any, that is usable every figure is None, not zero."""
+def test_almost_no_samples_give_none_and_no_good_score(good):
+    """With at most five usable samples each figure is None, not zero."""
     bad = np.ones(N, dtype=bool)
     bad[:good] = False
     found = assess_span(replace(record(50 + noise(9)), bad=bad), FIGURES).as_row()
     assert all(value is None for name, value in found.items() if name != "usable_h")
 
 
-def test_relative_variability_is_not_told_about_zero():
-    """Two sigma of PV over its mean is not told where the mean lies within the spread."""
+def test_relative_variability_is_not_reported_around_zero():
+    """Two sigma of PV over its mean is not reported if the mean lies within the spread."""
     assert assess_span(record(noise(10), 0.0), FIGURES).pv_variability_pct is None
     assert assess_span(record(50 + noise(10)), FIGURES).pv_variability_pct == pytest.approx(4.0, rel=0.05)
 
 
 def test_hours_add_up():
-    """Usable hours, and error weighted by them, of the clock hours give the night's."""
+    """The usable hours of the clock hours, and their weighted error, add up to those of the night."""
     r = replace(night(31), start_s=START_S + 1500.0)
     hours = hourly(r, detect(r, CONFIG.oscillation), FIGURES)
     whole = assess_span(r, FIGURES)
@@ -247,7 +247,7 @@ def test_hours_add_up():
 @settings(max_examples=40, deadline=None)
 @given(st.floats(0, 7200), st.sampled_from([0.5, 1.0, 7.0, 60.0]), st.integers(1, 3000))
 def test_every_sample_lies_in_one_hour(begin_s, dt_s, n):
-    """The hours' edges share out all samples, each in the clock hour of its stamp."""
+    """The edges of the hours assign each sample to the clock hour of its stamp."""
     r = replace(record(np.zeros(n), 0.0, dt_s=dt_s), start_s=START_S + begin_s)
     edges = hour_edges(r)
     assert [k for a, b, _ in edges for k in range(a, b)] == list(range(n))
@@ -258,13 +258,13 @@ def test_every_sample_lies_in_one_hour(begin_s, dt_s, n):
 
 
 def test_usable_is_good_and_automatic():
-    """A sample is usable where it is neither bad nor in manual."""
+    """A sample is usable if it is neither bad nor in manual."""
     r = night(41)
     assert np.array_equal(r.usable, [not b and not m for b, m in zip(r.bad, r.mask("manual"), strict=True)])
 
 
-def test_what_cannot_be_assessed_says_what_it_needs_and_has():
-    """A record mostly in manual is refused with the share that it needs and has."""
+def test_a_record_without_assessment_states_what_it_needs_and_has():
+    """A record that is mostly in manual is refused with the share that is needed and the share that is present."""
     r = replace(record(50 + noise(12)), masks={"manual": T < 0.8 * N})
     found = unassessable(r, CONFIG)
     assert found is not None
@@ -273,7 +273,7 @@ def test_what_cannot_be_assessed_says_what_it_needs_and_has():
 
 
 def test_a_constant_loop_is_assessed_without_cause():
-    """A loop that stands still is assessed: no oscillation, no cause, and no number that is none."""
+    """A constant loop is assessed without oscillation and without cause, and each hour has significance zero."""
     r = record(np.full(N, 47.0), op=50 + 0.1 * np.sin(T / 900))
     found = assess(Prepared(r, Scale(0, 100, 0, 100, False), 0, 0, ()), None, CONFIG)
     assert found.verdict.cause == "none"

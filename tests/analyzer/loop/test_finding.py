@@ -1,4 +1,4 @@
-"""What contradicts itself is not made."""
+"""A contradictory finding raises an error."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ NOW = Finding(
 )
 
 
-def test_what_contradicts_itself_is_not_made() -> None:
-    """No settings without a retune, no time for a repair that is none, no follower that is to do something of its
-    own."""
+def test_a_contradictory_finding_is_refused() -> None:
+    """Settings without a retune, a time for an action other than a repair, and a follower with an own action are
+    refused.
+    """
     with pytest.raises(ValueError, match="new settings"):
         Remedy(Action.NONE, kp_new=1.0)
     with pytest.raises(ValueError, match="repair"):

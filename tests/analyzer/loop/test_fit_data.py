@@ -1,4 +1,4 @@
-"""Which stretch of a night is fitted."""
+"""The stretch of a night that is fitted."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def _record(pv: Floats, sp: Floats | None = None, op: Floats | None = None, dt_s
 
 
 @pytest.mark.parametrize("from_end", [0, 30_000, 60_000])
-def test_a_burst_is_within_the_stretch_that_is_fitted(from_end):
-    """A sine that lasts one hour of a day of noise lies within the stretch, wherever it is."""
+def test_a_burst_is_within_the_fitted_stretch(from_end):
+    """A sine of one hour in a day of noise lies within the fitted stretch, at any time of the day."""
     rng, n = np.random.default_rng(5), DAY_S
     pv = 50.0 + 0.1 * rng.standard_normal(n)
     first = n - from_end - 3600
@@ -39,14 +39,16 @@ def test_a_burst_is_within_the_stretch_that_is_fitted(from_end):
 
 
 def test_a_cycle_of_constant_size_is_fitted_in_its_latest_stretch():
-    """Of a sine in noise that lasts all day the latest stretch is fitted."""
+    """For a sine in noise that lasts all day, the latest stretch is fitted."""
     rng = np.random.default_rng(6)
     pv = 50.0 + np.sin(2 * np.pi * np.arange(DAY_S) / PERIOD_S) + 0.1 * rng.standard_normal(DAY_S)
     assert fit_stretch(_record(pv), 9000, PERIOD_S) == DAY_S - 9000
 
 
-def test_the_whole_window_has_the_whole_record_in_few_blocks():
-    """The whole record in at most 1,000 blocks: block means by numpy alone, none shorter than the stretch's."""
+def test_the_whole_window_has_the_complete_record_in_few_blocks():
+    """The complete record in at most 1,000 blocks has the block means that numpy computes; no block is shorter than
+    in the stretch.
+    """
     pv = 50.0 + np.random.default_rng(7).standard_normal(DAY_S)
     record = _record(pv)
     window = window_of(record, PERIOD_S, CONFIG.cause)
@@ -58,8 +60,10 @@ def test_the_whole_window_has_the_whole_record_in_few_blocks():
 
 @pytest.mark.parametrize("every", [1, 10])
 def test_a_loop_that_rings_after_two_moves_of_its_set_point_is_tuned_too_tight(every):
-    """A loop of Ms 9 rings for an hour after each of two moves in a day; recorded every 1 and 10 s its tuning is the
-    cause, and its time constant is found within a quarter."""
+    """A loop of Ms 9 that rings for an hour after each of two set point moves in a day is tuned too tight.
+
+    With rows of 1 and 10 s, the tuning is the cause, and the time constant is within 25 %.
+    """
     process, law = Process(2.2, 257.0, 0.0, 35.0), Controller(4.15, 257.0)
     rng = np.random.default_rng(8)
     sp = np.full(DAY_S, 50.0)

@@ -1,4 +1,4 @@
-"""Cycles that the sampling may have folded: nothing is told of them, and nothing is drawn."""
+"""Cycles that may be aliased by the sampling, and their figures and pictures."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from proofs.plant import CONFIG, START_S, series, spec
 
 
 def night_row(ti_s: float) -> dict[str, object]:
-    """A loop in a plain swing of 100 s, logged every 10 s, whose controller has this integral time."""
+    """A loop with a sine of 100 s, logged every 10 s, whose controller has this integral time."""
     stamp = START_S + 10.0 * np.arange(2160)
     swing = np.sin(2 * np.pi * stamp / 100.0) + 0.05 * np.random.default_rng(1).normal(size=stamp.size)
     trend = {"L.SP": np.full(stamp.size, 50.0), "L.PV": 50.0 + swing, "L.OP": 50.0 - swing}
@@ -25,10 +25,12 @@ def night_row(ti_s: float) -> dict[str, object]:
     return rows.night_row(found)
 
 
-@pytest.mark.parametrize(("ti_s", "told"), [(1.0, True), (60.0, True)])
-def test_a_folded_cycle_has_no_figures_and_no_picture(ti_s: float, told: bool) -> None:
-    """A stated Ti decides nothing alone: with 1 s, which OP does not follow, a cycle keeps figures and picture."""
+@pytest.mark.parametrize(("ti_s", "has_figures"), [(1.0, True), (60.0, True)])
+def test_a_stated_integral_time_alone_removes_no_figures(ti_s: float, has_figures: bool) -> None:
+    """A stated Ti alone decides nothing: with 1 s, which OP does not follow, a cycle keeps its figures and its
+    picture.
+    """
     row = night_row(ti_s)
     figures = ("period_s", "oscillating_pct", "close_first_s", "close_last_s", "turns")
-    assert [row[name] is not None for name in figures] == [told] * len(figures)
-    assert (row["lack"] == MissingData.FASTER) is not told
+    assert [row[name] is not None for name in figures] == [has_figures] * len(figures)
+    assert (row["lack"] == MissingData.FASTER) is not has_figures

@@ -1,4 +1,4 @@
-"""The load of a whole night, on which the effect of new settings is forecast."""
+"""The load of a complete night, on which the effect of new settings is forecast."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ PERIOD_S = 300.0
 
 
 def by_minute(x: np.ndarray) -> np.ndarray:
-    """Means over minutes, less their mean."""
+    """Means over minutes, minus their mean."""
     x = x[: x.size // 60 * 60].reshape(-1, 60).mean(axis=1)
     return x - x.mean()
 
@@ -52,7 +52,7 @@ def night() -> tuple[LoopRecord, np.ndarray, Fitted]:
 
 
 def test_the_load_of_a_night_is_that_of_the_plant(night: tuple[LoopRecord, np.ndarray, Fitted]) -> None:
-    """Nine tenths of the true load's variance over minutes are reconstructed, over the whole record."""
+    """At least 90 % of the variance of the true load over minutes is reconstructed, over the complete record."""
     record, truth, fit = night
     load = load_of_night(fit, PID, record, PERIOD_S)
     assert load.size == pytest.approx(len(record), rel=0.01)
@@ -60,8 +60,8 @@ def test_the_load_of_a_night_is_that_of_the_plant(night: tuple[LoopRecord, np.nd
     assert np.var(by_minute(load) - true) < 0.1 * np.var(true)
 
 
-def test_hours_that_must_not_be_used_leave_no_trace(night: tuple[LoopRecord, np.ndarray, Fitted]) -> None:
-    """With two hours of a dead transmitter the load is that of the other hours, without a step between them."""
+def test_hours_that_must_not_be_used_have_no_effect(night: tuple[LoopRecord, np.ndarray, Fitted]) -> None:
+    """With two hours of a failed transmitter, the load is that of the other hours, without a step between them."""
     record, _, fit = night
     hours = slice(7200, 14_400)
     pv, bad = record.pv.copy(), record.bad.copy()
@@ -73,15 +73,16 @@ def test_hours_that_must_not_be_used_leave_no_trace(night: tuple[LoopRecord, np.
 
 
 def test_parts_are_joined_without_a_step() -> None:
-    """The part behind a hole begins where the one before it ends."""
+    """The part after a hole begins at the end value of the part before it."""
     usable = np.array([True, True, False, False, True, True])
     np.testing.assert_allclose(joined(np.array([1.0, 2.0, 9.0, 9.0, 7.0, 8.0]), usable), [1.0, 2.0, 2.0, 3.0])
 
 
 @pytest.mark.parametrize("period", [40.0, 900.0])
-def test_noise_is_read_where_op_is_free(period: float) -> None:
-    """White noise of PV is read from OP within a tenth though OP rests at a limit most of the time, and moves there
-    and back within a few samples."""
+def test_noise_is_estimated_while_op_is_free(period: float) -> None:
+    """White noise of PV is estimated from OP within 10 %, although OP is at a limit for more than 60 % of the
+    time.
+    """
     rng, n, size = np.random.default_rng(1), 20_000, 0.1
     noise = size * rng.standard_normal(n)
     op = np.clip(50.0 + 120.0 * np.sin(2 * np.pi * np.arange(n) / period) - 3.0 * noise, 0.0, 100.0)
@@ -91,9 +92,12 @@ def test_noise_is_read_where_op_is_free(period: float) -> None:
 
 
 @pytest.mark.parametrize("way", ["plain", "every 10 s"])
-def test_a_forecast_for_a_sluggish_loop_comes_true(way: str) -> None:
-    """The error and travel of the true plant are those of the forecast, by the process on which the settings rest:
-    the fit of its slow response alone has an unstable loop with them."""
+def test_a_forecast_for_a_sluggish_loop_is_right(way: str) -> None:
+    """The forecast intervals contain the error and the travel of the true plant with the new settings.
+
+    The forecast uses the process on which the settings are based; with the fit of the slow response alone the loop
+    would be unstable.
+    """
     d = drawn(592, 3, ("sluggish",))[2]
     record = recorded(run(d), way, d.seed)
     dt_s = float(np.diff(record["stamp_s"][:2])[0])

@@ -1,4 +1,6 @@
-"""A level under gain alone, whose set point moves: its valve is not blamed, and its lasting error is none."""
+"""A level under gain alone with a moving set point: its valve gets no fault, and its lasting error is not
+reported.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,7 @@ N, EVERY = 43_200, 10
 
 
 def level(seed: int, kp: float, slope: float) -> pd.DataFrame:
-    """Twelve hours of a vessel under a gain alone, a load that wanders, and a set point that moves every hour."""
+    """Twelve hours of a vessel under a gain alone, with a drifting load and a set point that moves every hour."""
     rng, pole = np.random.default_rng(seed), math.exp(-1.0 / 1800.0)
     sp = 50.0 + np.repeat(rng.uniform(-5.0, 5.0, N // 3600), 3600)
     drive, noise = rng.standard_normal(N) * 8.0 * math.sqrt(1.0 - pole**2), 0.03 * rng.standard_normal(N)
@@ -36,8 +38,8 @@ def level(seed: int, kp: float, slope: float) -> pd.DataFrame:
 
 
 @pytest.mark.parametrize(("seed", "kp", "slope"), [(1, -2.4, -7e-4), (2, -3.5, -1.5e-3)])
-def test_no_sound_valve_is_blamed_for_a_gain_alone(tmp_path, seed, kp, slope):
-    """Nothing is wrong with a healthy level of gain alone: no valve, no settings, no action."""
+def test_a_gain_alone_gives_no_valve_fault(tmp_path, seed, kp, slope):
+    """A level without fault under gain alone has no valve fault, no settings and no action."""
     (tmp_path / "trends").mkdir()
     level(seed, kp, slope).to_parquet(tmp_path / "trends" / "trends.parquet")
     export, config = open_export([tmp_path / "trends"]), Config()

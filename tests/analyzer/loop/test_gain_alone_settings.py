@@ -1,4 +1,4 @@
-"""Loops with a gain alone: new settings have no integral action either, and no search fails on it."""
+"""Loops with a gain alone: new settings also have no integral action, and no search fails."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def advised(d: Drawn, hours: float = 8.0) -> tuple[Assessment, Advice, Pid]:
 
 @pytest.mark.parametrize(("process", "kp"), [(LAG, 13.5), (LEVEL, 48.0)], ids=["lag", "level"])
 def test_a_loop_that_rings_gets_a_gain_alone(process: Process, kp: float) -> None:
-    """The new gain takes 30 % of the stem's travel off the true plant, and the error rises by less than 15 %."""
+    """On the true plant the new gain reduces the stem's travel by 30 %, and the error rises by less than 15 %."""
     d = drawn(process, kp, Valve())
     _, advice, _ = advised(d, 24.0)
     assert advice.action == "retune"
@@ -54,8 +54,11 @@ def test_a_loop_that_rings_gets_a_gain_alone(process: Process, kp: float) -> Non
     ("valve", "fault"), [(Valve(BACKLASH, 4.0), "backlash"), (Valve(KANO, 4.0, 2.0), "stiction")]
 )
 def test_a_worn_valve_is_searched_with_its_gain_alone(valve: Valve, fault: str) -> None:
-    """The simulated present agrees with the record, so the valve is blamed and not the stated settings; a pair with
-    integral action is not proposed."""
+    """The simulation with the present settings agrees with the record, so the valve is at fault and not the stated
+    settings.
+
+    A pair with integral action is not proposed.
+    """
     found, advice, pid = advised(drawn(LEVEL, 25.0, valve), 24.0)
     assert (found.verdict.fault, advice.action) == (fault, "repair valve")
     assert "check kp and ti" not in advice.reason
@@ -65,8 +68,10 @@ def test_a_worn_valve_is_searched_with_its_gain_alone(valve: Valve, fault: str) 
 
 
 def test_the_bias_compensates_a_constant_load() -> None:
-    """Without integral action a load of 5 % with noise leaves no offset in simulation, and a step of the load leaves
-    1 / (1 + K Kp) of it."""
+    """Without integral action, a constant load of 5 % with noise leaves no offset in simulation.
+
+    A step of the load leaves 1 / (1 + K Kp) of it.
+    """
     loop = Loop(Fopdt(0.5, 100.0, 10.0), Pid(4.0, math.inf, scan_s=1.0))
     noise = 0.01 * np.random.default_rng(3).standard_normal(8000)
     assert abs(simulated(loop, 5.0 + noise).pv.mean()) < 0.01

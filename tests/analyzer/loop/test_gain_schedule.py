@@ -1,4 +1,4 @@
-"""A gain scheduled over OP, PV or SP: stated, checked against the record, and left in place by new settings."""
+"""A gain scheduled over OP, PV or SP is stated, checked against the record, and unchanged by new settings."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ UPPER = 0.4
 
 
 def test_each_piece_has_its_factor():
-    """Below all edges the factor is 1; at and above an edge it is that of the edge."""
+    """Below all edges the factor is 1; at and above an edge it is the factor of that edge."""
     stated = gain_schedule("PV 50:0.4; 75,5:0,2", "here")
     share = stated.share(np.array([0.0, 49.9, 50.0, 75.4, 75.5, 200.0]))
     assert (stated.over, share.tolist()) == ("pv", [1.0, 1.0, 0.4, 0.4, 0.2, 0.2])
@@ -33,15 +33,15 @@ def test_each_piece_has_its_factor():
     "cell",
     ["op", "50:0.4", "mv 50:0.4", "op 75:0.2 50:0.4", "op 50:0", "op 50:nan", "op 1:1 2:1 3:1 4:1", "op 50"],
 )
-def test_another_text_is_one_line(tmp_path, cell):
-    """A cell that states no schedule is refused with row, column and an example."""
+def test_an_invalid_schedule_is_one_line(tmp_path, cell):
+    """A cell that is not a schedule is refused with row, column and an example."""
     (tmp_path / "loops.csv").write_text(f"loop,gain_schedule\nL,{cell}\n")
     with pytest.raises(InputError, match=r"row 2, column 'gain_schedule'.*'op 50:0.4 75:0.2'"):
         read_loops(tmp_path / "loops.csv")
 
 
 def test_the_factor_in_force_is_that_of_most_good_samples():
-    """Bad samples have no vote."""
+    """Bad samples do not count for the factor in force."""
     share = np.array([1.0, 1.0, 1.0, 0.4, 0.4])
     assert in_force(share, np.ones(5, bool)) == 1.0
     assert in_force(share, np.array([1, 0, 0, 1, 1], bool)) == 0.4
@@ -69,8 +69,10 @@ def test_settings_are_stated_back_without_the_factor(stated):
 
 @pytest.fixture(scope="module")
 def scheduled(tmp_path_factory):
-    """A loop whose gain is smaller from an OP of 50 % on, simulated with no code of the package: its row as stated
-    truly, and its record under a row."""
+    """A loop with a smaller gain from an OP of 50 % on, simulated without code of the package.
+
+    Returns its true row and a function for its record under a row.
+    """
     folder = tmp_path_factory.mktemp("scheduled")
     c = controlled("gain schedule", "set point moves", 7, 1.0)
     c.trends("L", 1).to_parquet(folder / "trends.parquet")
@@ -86,8 +88,8 @@ def scheduled(tmp_path_factory):
     return c, seen
 
 
-def test_a_schedule_stated_truly_is_accepted(scheduled):
-    """Nothing is said of settings and schedule stated as they are."""
+def test_a_correctly_stated_schedule_is_accepted(scheduled):
+    """Correctly stated settings and a correctly stated schedule give no finding."""
     _, seen = scheduled
     p, spec, stated, found = seen()
     assert p.record.gain_share is not None
@@ -98,8 +100,10 @@ def test_a_schedule_stated_truly_is_accepted(scheduled):
 
 @pytest.mark.parametrize("wrong", [{"kp": 3.0}, {"kp": 1 / 3}, {"ti": 1 / 60}])
 def test_a_wrong_setting_under_a_schedule_is_found(scheduled, wrong):
-    """A gain three times too high or too low, or minutes for seconds, is reported. The recorded settings are stated
-    as those below the first edge."""
+    """A gain three times too high or too low, or minutes instead of seconds, is reported.
+
+    The recorded settings are given as those below the first edge.
+    """
     c, seen = scheduled
     p, spec, _, found = seen(**{name: factor * c.row[name] for name, factor in wrong.items()})
     assert found.other is not None
@@ -116,9 +120,11 @@ def test_a_record_in_one_piece_has_one_gain(scheduled):
 
 @pytest.mark.parametrize("seed", [5, 6, 7, 8])
 @pytest.mark.parametrize("upper", [False, True])
-def test_an_unstated_schedule_is_shown_with_its_edge(seed, upper):
-    """Of a law whose gain is scheduled over PV, with only the gain of one side stated, edge and factor are found. The
-    law is made from its definition, with no code of the package."""
+def test_an_unstated_schedule_is_found_with_its_edge(seed, upper):
+    """If a gain is scheduled over PV and only the gain of one side is stated, edge and factor are found.
+
+    The control law is made from its definition, without code of the package.
+    """
     rng = np.random.default_rng(seed)
     n, edge, factor = 20_000, 52.0, 0.5
     pv = 50.0 + np.cumsum(rng.normal(0.0, 0.05, n)) % 8.0 + rng.normal(0.0, 0.2, n)
@@ -135,7 +141,7 @@ def test_an_unstated_schedule_is_shown_with_its_edge(seed, upper):
 
 @pytest.mark.parametrize("wrong", [1.0, 0.3, 3.0])
 def test_one_gain_has_no_edge(wrong):
-    """A law with one gain, stated rightly or wrongly, is no schedule, and noise is none."""
+    """A control law with one gain, stated correctly or not, is no schedule, and noise is no schedule."""
     rng = np.random.default_rng(3)
     pv = 50.0 + np.cumsum(rng.normal(0.0, 0.05, 20_000)) % 8.0
     error = 51.0 - pv
@@ -147,8 +153,10 @@ def test_one_gain_has_no_edge(wrong):
 
 
 def test_new_settings_under_a_schedule_are_those_of_its_gain(tmp_path):
-    """A loop that always works in a piece of 0.4 times Kp gets the same new settings as one stated with that gain;
-    the new Kp is stated as the old one is: over 0.4."""
+    """A loop that always works at 0.4 times Kp gets the same new settings as a loop with that gain.
+
+    The new Kp is stated in the same way as the old one, divided by 0.4.
+    """
     c = controlled("PI", "healthy", 17, 0.5, 5.0)
     c.trends("L", 1).to_parquet(tmp_path / "trends.parquet")
     export, config = open_export([tmp_path / "trends.parquet"]), Config()

@@ -1,4 +1,4 @@
-"""A verdict rests on one stretch: in automatic, and under one pair of settings."""
+"""A verdict is based on one stretch, in automatic and with one pair of settings."""
 
 from __future__ import annotations
 
@@ -26,32 +26,32 @@ DAY_S = 86400.0
 PI = Pid(0.65, 30.0, scan_s=1.0)
 
 
-def half_in_manual(play: float) -> tuple[Trends, np.ndarray]:
-    """Three hours of a flow in automatic, then three in manual, and where it is in manual."""
+def half_in_manual(backlash: float) -> tuple[Trends, np.ndarray]:
+    """Three hours of a flow in automatic, then three in manual, and the mask of the time in manual."""
     n = 6 * HOUR
     rng = np.random.default_rng(5)
     manual = np.arange(n) >= n // 2
     load, noise = wander(rng, n, 0.3, 1800.0), 0.05 * rng.standard_normal(n)
     own = (np.full(n, PI.kp), np.full(n, PI.ti_s), np.zeros(n), manual)
-    pv, op, stem = run(np.full(n, 50.0), load, noise, *own, 50.0, (play, 0.0, 0.0), (12.0, 150.0, 6.0))
+    pv, op, stem = run(np.full(n, 50.0), load, noise, *own, 50.0, (backlash, 0.0, 0.0), (12.0, 150.0, 6.0))
     return Trends(np.full(n, 50.0), pv, op, stem), manual
 
 
-@pytest.mark.parametrize(("play", "cause"), [(2.7, "valve"), (0.0, "none")])
-def test_a_half_in_manual_hides_nothing_of_the_other(play, cause):
-    """A play that a night in automatic shows is told from its half in automatic, and a sound valve is not blamed."""
-    trends, manual = half_in_manual(play)
+@pytest.mark.parametrize(("backlash", "cause"), [(2.7, "valve"), (0.0, "none")])
+def test_a_half_in_manual_does_not_change_the_verdict(backlash, cause):
+    """A backlash is found in the half of the night in automatic, and a valve without fault has no cause."""
+    trends, manual = half_in_manual(backlash)
     whole = prepared(trends)
     masks = {**whole.record.masks, "manual": manual}
     found = assess(replace(whole, record=replace(whole.record, masks=masks)), PI, CONFIG)
     assert found.verdict.cause == cause
     assert found.judged_h == pytest.approx(3.0, abs=0.01)
-    if play:
-        assert found.verdict.measured.play.valve.stickband == pytest.approx(play, rel=0.15)
+    if backlash:
+        assert found.verdict.measured.play.valve.stickband == pytest.approx(backlash, rel=0.15)
 
 
 def still(hours: float, manual: slice = slice(0)) -> LoopRecord:
-    """A record of so many hours of which a part is in manual; its trends do not matter."""
+    """A record of that many hours with a part in manual; its trends do not matter."""
     n = int(hours * HOUR)
     out = np.zeros(n, dtype=bool)
     out[manual] = True
@@ -73,15 +73,17 @@ OLD = Pid(1.0, 10.0)
     ],
 )
 def test_the_stretch_since_the_last_change_counts(changed_h, expected):
-    """What came before a change tells nothing of the settings in force; where too little came since, the longest part
-    is judged by its own settings, which are outdated."""
+    """Data before a change are not used for the settings in force.
+
+    If the time since the change is too short, the longest part is assessed with its own settings, which are outdated.
+    """
     earlier = [Earlier(START_S + h * HOUR, spec("L"), OLD) for h in changed_h]
     found = judged_stretch(still(24.0), PI, earlier, CONFIG)
     assert (found.first / HOUR, found.last / HOUR, found.controller, found.outdated) == expected
 
 
-def test_pieces_too_short_to_stand_for_the_record_are_not_picked():
-    """Six automatic hours between spans in manual of half an hour are judged together, as before."""
+def test_pieces_too_short_for_the_record_are_not_chosen():
+    """Six automatic hours, separated by half hours in manual, are assessed together."""
     record = still(6.0)
     for hour in range(6):
         record.mask("manual")[hour * HOUR : hour * HOUR + HOUR // 2] = True
@@ -91,8 +93,10 @@ def test_pieces_too_short_to_stand_for_the_record_are_not_picked():
 
 @pytest.fixture(scope="module")
 def retuned(tmp_path_factory):
-    """Rows by loop of the night in which seven loops of the sample mill were retuned, as changes.csv tells, beside
-    three that nobody touched."""
+    """Rows by loop of the night in which seven loops of the sample mill were retuned according to changes.csv.
+
+    Three loops without a change are included.
+    """
     export = open_export([SAMPLE_DATA / "mill.parquet"])
     changes = read_changes(SAMPLE_DATA / "changes.csv")
     wanted = {"FIC2110", "FIC2113", "PIC2116", *(c.loop for c in changes)}
@@ -106,7 +110,9 @@ def retuned(tmp_path_factory):
 
 
 def test_no_false_alarm_of_settings_on_the_day_of_a_change(retuned):
-    """The night of seven recorded changes asks nobody to check settings, and names each change with its time."""
+    """On the night of seven recorded changes no loop gets 'check settings', and each change is named with its
+    time.
+    """
     rows, changed = retuned
     assert not [loop for loop, r in rows.items() if r["action"] == "check settings"]
     named = {loop for loop, r in rows.items() if r["settings_changed"]}
@@ -116,16 +122,18 @@ def test_no_false_alarm_of_settings_on_the_day_of_a_change(retuned):
     assert "; Ti 70 \u2192 520 s at 09:10" in rows["TIC2106"]["reason"]
 
 
-def test_a_list_tells_every_loop_in_twenty_words(retuned):
-    """Of the mill's loops on the day of seven changes none takes over 20 words in a list, and loses nothing."""
+def test_a_list_describes_each_loop_in_twenty_words(retuned):
+    """On the day of seven changes, no loop of the mill needs more than 20 words in a list, and no text is lost."""
     for row in retuned[0].values():
         head, rest = in_short(row["reason"])
         assert len(brief(row, ("reason",))["reason"].split()) <= 20
         assert "; ".join(filter(None, (head, rest))) == row["reason"]
 
 
-def test_a_follower_is_told_as_one_on_the_day_of_its_change(retuned):
-    """LIC2103, fed by FIC2110, follows it, whose own row names it; its valve is left in peace."""
+def test_a_follower_is_reported_as_one_on_the_day_of_its_change(retuned):
+    """LIC2103, which FIC2110 feeds, follows it, and the row of FIC2110 names it; the valve of LIC2103 gets no
+    fault.
+    """
     rows, _ = retuned
     assert (rows["LIC2103"]["source_loop"], rows["LIC2103"]["valve_fault"]) == ("FIC2110", "none")
     assert "LIC2103" in rows["FIC2110"]["reason"]

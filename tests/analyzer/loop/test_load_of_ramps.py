@@ -1,4 +1,4 @@
-"""Changes of throughput: the load that remains to a model is what OP compensates, however its noise model is."""
+"""Changes of throughput: the residual load of a model is the load that OP compensates, for any noise model."""
 
 from __future__ import annotations
 
@@ -22,9 +22,11 @@ from benchmarks.world.pairs import varied
 
 @pytest.mark.parametrize("at", [0, 3])
 def test_the_simulated_present_agrees_under_ramps_of_the_load(at: int) -> None:
-    """A level and a lag with worn valves, whose throughput changes three times: simulated with their present
-    settings their error and OP's travel are the recorded ones. The offset of a noise model that is nearly an
-    integrator was taken for a load of 27 and 65 % of PV's span, and OP stayed at its limit."""
+    """A level and a lag with worn valves and three changes of throughput are simulated with their present settings.
+
+    Their error and OP's travel are the recorded ones. An earlier version took the offset of a nearly integrating
+    noise model for a load of 27 and 65 % of PV's span, and OP stayed at its limit.
+    """
     config, d = Config(), drawn(662, at + 1, ("backlash",))[at]
     spec = spec_of(d)
     with tempfile.TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""Loops of a batch: a set point that follows a programme, in manual between batches or not."""
+"""Loops of a batch with a set point that follows a programme, in manual between batches or not."""
 
 from __future__ import annotations
 
@@ -18,25 +18,29 @@ KEPT = slice(None, None, EVERY_S)
 
 @dataclass(frozen=True)
 class Batch:
-    """A loop's process (K, T [s], L [s]), Kp, Ti [s] and play [% OP]; whether it is in manual between batches."""
+    """Process of a loop (K, T [s], L [s]), Kp, Ti [s] and backlash [% OP]; whether it is in manual between
+    batches.
+    """
 
     process: tuple[float, float, float]
     kp: float
     ti: float
-    play: float = 0.0
+    backlash: float = 0.0
     manual: bool = False
 
 
 def drawn(seed: int, manual: bool) -> Batch:
-    """A healthy loop: SIMC settings at a closed-loop time constant of one and a half dead times."""
+    """A loop without fault: SIMC settings with a closed-loop time constant of one and a half dead times."""
     rng = np.random.default_rng(seed)
     late, lag, gain = rng.uniform(5, 40), rng.uniform(60, 400), rng.uniform(0.8, 2.5)
     return Batch((gain, lag, late), lag / (gain * 2.5 * (late + 1)), min(lag, 10 * late), manual=manual)
 
 
 def prepared(loop: Batch, seed: int) -> Prepared:
-    """Twenty batches of an hour: SP goes up a ramp, holds and comes down at once; between them the controller goes
-    on, or is put in manual with OP at its lower limit."""
+    """Twenty batches of an hour: SP rises on a ramp, is constant and falls at once.
+
+    Between batches the controller stays active, or is in manual with OP at its lower limit.
+    """
     rng = np.random.default_rng(seed + 100)
     n = HOURS * 3600
     phase = (np.arange(n) + int(rng.integers(PERIOD_S))) % PERIOD_S
@@ -46,7 +50,7 @@ def prepared(loop: Batch, seed: int) -> Prepared:
     push = np.where(manual & ~np.concatenate(([False], manual[:-1])), -60.0, 0.0)
     load, noise = wander(rng, n, 0.3, 1800.0), 0.1 * rng.standard_normal(n)
     own = (np.full(n, loop.kp), np.full(n, loop.ti), push, manual)
-    pv, op, _ = run(sp, load, noise, *own, 30.0, (loop.play, 0.0, 0.0), loop.process)
+    pv, op, _ = run(sp, load, noise, *own, 30.0, (loop.backlash, 0.0, 0.0), loop.process)
     stamp = START_S + np.arange(n, dtype=float)[KEPT]
     mode = np.where(manual, 0.0, 1.0)
     trends = {"SP": sp, "PV": pv, "OP": op, "MODE": mode}
@@ -57,7 +61,7 @@ def prepared(loop: Batch, seed: int) -> Prepared:
 @pytest.mark.parametrize("manual", [False, True])
 @pytest.mark.parametrize("seed", range(8))
 def test_the_corners_of_a_programme_are_no_oscillation(seed, manual):
-    """Of healthy loops whose set point follows an hour's programme none oscillates, and none is too tight."""
+    """A loop without fault whose set point follows a programme of an hour does not oscillate and is not too tight."""
     loop = drawn(seed, manual)
     found = assess(prepared(loop, seed), Pid(loop.kp, loop.ti, scan_s=1.0), CONFIG)
     first = found.oscillations.first
@@ -66,15 +70,15 @@ def test_the_corners_of_a_programme_are_no_oscillation(seed, manual):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_limit_cycle_under_a_programme_is_told(seed):
-    """A valve with play that cycles by itself between the corners of the programme is found and blamed."""
-    loop = Batch((12.0, 150.0, 6.0), 0.65, 30.0, play=2.5)
+def test_a_limit_cycle_under_a_programme_is_reported(seed):
+    """A valve whose backlash causes a cycle between the corners of the programme is found as the cause."""
+    loop = Batch((12.0, 150.0, 6.0), 0.65, 30.0, backlash=2.5)
     found = assess(prepared(loop, seed), Pid(loop.kp, loop.ti, scan_s=1.0), CONFIG)
     assert found.oscillations.first.oscillating_pct > 50.0
     assert found.verdict.cause == "valve"
 
 
-def test_a_limit_in_manual_limits_nothing():
+def test_a_limit_in_manual_is_no_time_at_a_limit():
     """OP at its limit in manual between batches is no time at a limit of the controller."""
     found = assess(prepared(drawn(0, True), 0), None, CONFIG)
     assert found.night.at_limits_pct < 5.0

@@ -1,4 +1,4 @@
-"""`run` and `explain` name one fault of a valve that slips a few times and never cycles."""
+"""`run` and `explain` name the same fault of a valve that slips a few times without a cycle."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ N, STEP_S = 700, 10.0
 
 
 def recorded(folder: Path, valve: Stiction | None) -> PlantLoop:
-    """Two hours of a flow under a slow controller, a wandering load and one step of its set point."""
+    """Two hours of a flow under a slow controller, with a drifting load and one step of its set point."""
     rng = np.random.default_rng(1)
     loop = Loop(Fopdt(1.5, 8.0, 3.0), Pid(0.2, 80.0, scan_s=STEP_S), valve)
     load = 0.05 * np.cumsum(rng.standard_normal(N)) / 3 + 0.15 * rng.standard_normal(N)
@@ -30,25 +30,27 @@ def recorded(folder: Path, valve: Stiction | None) -> PlantLoop:
 
 
 def test_a_valve_that_slips_without_a_cycle_is_named_by_both(tmp_path: Path) -> None:
-    """A stem with a stickband of 3 % and jumps of 2 % that slips four times is stiction for both commands."""
+    """A stem with a stickband of 3 % and jumps of 2 % that slips four times is reported as stiction by both
+    commands.
+    """
     loop = recorded(tmp_path, Stiction(3.0, 2.0, Motion.HALTS))
     found = api.assess(loop)
     assert counting(found.oscillations) is None
     assert (found.verdict.cause, found.verdict.fault) == ("valve", "stiction")
-    said = api.explain(loop).said
-    assert said.verdict == "stiction"
-    assert "between moves of the stem" in said.shown
+    answer = api.explain(loop).said
+    assert answer.verdict == "stiction"
+    assert "between moves of the stem" in answer.shown
 
 
 def test_the_same_loop_with_a_free_valve_names_no_friction(tmp_path: Path) -> None:
-    """Under the same load and noise a free valve is blamed by neither."""
+    """Under the same load and noise neither command reports a fault of a free valve."""
     loop = recorded(tmp_path, None)
     assert api.assess(loop).verdict.cause == "none"
     assert api.explain(loop).said.verdict not in ("stiction", "backlash")
 
 
 def worn(folder: Path) -> PlantLoop:
-    """Eleven hours, of which a stretch alone is simulated, of a level that a play of 2 % makes cycle."""
+    """Eleven hours of a level that a backlash of 2 % makes oscillate; only a stretch of them is simulated."""
     n = 41_000
     rng = np.random.default_rng(4)
     r = closed_loop(
@@ -63,12 +65,15 @@ def worn(folder: Path) -> PlantLoop:
     return api.read(folder / "export.parquet", loops=folder / "loops.csv").loop("LIC1")
 
 
-def test_a_play_has_one_size_and_one_interval(tmp_path: Path) -> None:
-    """What `explain` tells of a play is what `fit` tells, though it simulates a stretch alone; it holds the truth."""
+def test_a_backlash_has_one_width_and_one_interval(tmp_path: Path) -> None:
+    """`explain` and `fit` report the same width and interval of a backlash, and the interval contains the truth.
+
+    This holds although `explain` simulates only a stretch.
+    """
     loop = worn(tmp_path)
-    told = api.fit(loop).estimates["backlash_pct"]
+    fitted = api.fit(loop).estimates["backlash_pct"]
     found = api.explain(loop)
-    said = found.said.effects[0].parameters["backlash_pct"]
+    answer = found.said.effects[0].parameters["backlash_pct"]
     assert found.case.shortened
-    assert (said.value, said.low, said.high) == (told.value, told.low, told.high)
-    assert told.low <= 2.0 <= told.high
+    assert (answer.value, answer.low, answer.high) == (fitted.value, fitted.low, fitted.high)
+    assert fitted.low <= 2.0 <= fitted.high

@@ -1,4 +1,4 @@
-"""An OP that cannot be in percent of its range is suspected, and nothing is told in percent of it."""
+"""An OP that cannot be in percent of its range is detected, and no figure is reported in percent of it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ IN_PERCENT = (
 
 
 def row_of(trends: Trends, op_hi: float | None) -> dict[str, object]:
-    """The night's row of a loop whose OP is exported from 0 to 1."""
+    """The row of a night for a loop whose OP is exported from 0 to 1."""
     stated = {} if op_hi is None else {"op_lo": 0.0, "op_hi": op_hi}
     stamp = START_S + np.arange(trends.pv.size, dtype=float)
     trends = replace(trends, op=0.01 * trends.op)
@@ -39,13 +39,15 @@ def row_of(trends: Trends, op_hi: float | None) -> dict[str, object]:
 
 @pytest.fixture(scope="module")
 def worn():
-    """Six hours of a flow with play."""
+    """Six hours of a flow with backlash."""
     return simulate(PIPE, 6.0)
 
 
-def test_an_op_from_0_to_1_tells_nothing_in_percent(worn):
-    """Exported from 0 to 1 and not said so, a worn valve is told and stroked, every figure in percent of OP is left
-    out, and the reason says what to state."""
+def test_an_op_from_0_to_1_gives_no_figure_in_percent(worn):
+    """With OP from 0 to 1 and no stated range, a worn valve is reported for repair, without figures in percent of OP.
+
+    The reason says what to state.
+    """
     row = row_of(worn, None)
     assert (row["cause"], row["action"], row["lack"]) == ("valve", "repair valve", "OP's range")
     assert [row[name] for name in IN_PERCENT] == [None] * len(IN_PERCENT)
@@ -54,15 +56,15 @@ def test_an_op_from_0_to_1_tells_nothing_in_percent(worn):
 
 
 def test_a_stated_range_gives_the_same_answer_as_percent(worn):
-    """With op_hi 1 stated, width, gain and settings are those of the same trends in percent."""
+    """With op_hi 1 stated, the width is right within 15 % and the loop gets settings, as in percent."""
     row = row_of(worn, 1.0)
     assert row["action"] == "retune"
     assert row["backlash_pct"] == pytest.approx(2.5, rel=0.15)
     assert row["lack"] is None
 
 
-def test_a_sound_loop_is_asked_for_its_range_too():
-    """A calm loop whose OP runs from 0 to 1 is asked for the range, not given a clean bill."""
+def test_a_loop_without_fault_needs_its_range_too():
+    """A loop without fault whose OP is from 0 to 1 needs the stated range, and is not reported as free of faults."""
     row = row_of(simulate(replace(PIPE, backlash=0.0), 3.0), None)
     assert (row["cause"], row["action"], row["lack"]) == ("none", "needs data", "OP's range")
 
@@ -80,9 +82,12 @@ def test_a_sound_loop_is_asked_for_its_range_too():
         (1.0, 1.0, 1.0, True),
     ],
 )
-def test_what_fits_a_range_of_0_to_100(low, high, resting, fits):
-    """A valve that rests on its limit is believed, one that moves freely beside it is not, nor one beyond it; at 1.0
-    for a third of the time an OP from 0 to 1 rests on its own limit, which is none of 0 to 100."""
+def test_which_op_fits_a_range_of_0_to_100(low, high, resting, fits):
+    """A valve that is constant at its limit fits the range; one that moves freely only near the limit, or beyond it,
+    does not.
+
+    At 1.0 for a third of the time, an OP from 0 to 1 is at its own limit, which is no limit of 0 to 100.
+    """
     op = np.linspace(low, high, 1000)
     at = low if low == 0.0 else high
     op[: int(1000 * resting)] = at
@@ -90,19 +95,24 @@ def test_what_fits_a_range_of_0_to_100(low, high, resting, fits):
 
 
 @pytest.mark.parametrize(
-    ("other", "stated", "told"), [(12.0, "", True), (60.0, "", False), (12.0, "4,20", False)]
+    ("other", "stated", "is_reported"), [(12.0, "", True), (60.0, "", False), (12.0, "4,20", False)]
 )
-def test_a_current_is_no_percent(tmp_path, other, stated, told):
-    """Where the OPs of all loops lie between 4 and 20 they look like mA: that is said, and nothing told in % of OP;
-    not where one is a percent, nor where the range is stated."""
+def test_a_current_is_no_percent(tmp_path, other, stated, is_reported):
+    """If the OPs of all loops lie between 4 and 20, they look like mA: this is reported, and no figure is given in %
+    of OP.
+
+    This does not hold if one OP is in percent, or if the range is stated.
+    """
     k = np.arange(2000)
-    wave = np.sin(2 * np.pi * k / 50)
+    oscillation = np.sin(2 * np.pi * k / 50)
     table = pd.DataFrame({"time": pd.date_range("2026-03-02", periods=2000, freq="10s")})
     for loop, middle in (("A", 12.0), ("B", other)):
-        table[[f"{loop}.SP", f"{loop}.PV", f"{loop}.OP"]] = np.column_stack([0 * k, wave, middle - 3 * wave])
+        table[[f"{loop}.SP", f"{loop}.PV", f"{loop}.OP"]] = np.column_stack(
+            [0 * k, oscillation, middle - 3 * oscillation]
+        )
     table.to_csv(tmp_path / "x.csv", index=False, float_format="%.3f")
     (tmp_path / "loops.csv").write_text(f"loop,op_lo,op_hi\nA,{stated or ','}\nB,{stated or ','}\n")
-    asked = ["check", str(tmp_path / "x.csv"), "--loops", str(tmp_path / "loops.csv")]
-    said = CliRunner().invoke(main, asked, catch_exceptions=False).output
-    assert ("like mA" in said) == told
-    assert ("without them nothing is reported in % of OP" in said) == told
+    arguments = ["check", str(tmp_path / "x.csv"), "--loops", str(tmp_path / "loops.csv")]
+    output = CliRunner().invoke(main, arguments, catch_exceptions=False).output
+    assert ("like mA" in output) == is_reported
+    assert ("without them nothing is reported in % of OP" in output) == is_reported

@@ -1,4 +1,4 @@
-"""What is an oscillation of the loop, and what is not."""
+"""Signals that are an oscillation of the loop, and signals that are not."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ def coloured(seed: int, n: int = N) -> np.ndarray:
 
 
 def found_in(found: LoopRecord) -> Oscillations:
-    """What the batch's limits find."""
+    """Oscillations that are found with the limits of the batch."""
     return detect(found, CONFIG.oscillation)
 
 
 def first_of(found: LoopRecord) -> Oscillation:
-    """The oscillation that must be there."""
+    """The first oscillation, which must exist."""
     first = found_in(found).first
     assert first is not None
     return first
 
 
-# What is not oscillation
+# Signals without oscillation
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -71,8 +71,8 @@ def test_noise_does_not_oscillate(make, seed):
     ],
     ids=["constant", "ramp", "noisy ramp", "load step", "random walk", "decay"],
 )
-def test_what_comes_once_does_not_oscillate(pv):
-    """A constant, a ramp, a step, a random walk and a decay are not oscillation."""
+def test_a_signal_without_repetition_does_not_oscillate(pv):
+    """A constant, a ramp, a step, a random walk and a decay are no oscillation."""
     assert found_in(record(pv)).first is None
 
 
@@ -98,33 +98,34 @@ def test_following_the_set_point_is_not_oscillation(sp):
     assert found_in(record(follower(sp), sp)).first is None
 
 
-def test_a_loop_that_oscillates_beside_its_set_point_still_does():
-    """A cycle of the loop's own is found although the set point moves at another period."""
+def test_a_loop_that_oscillates_at_another_period_than_its_set_point_is_found():
+    """An oscillation of the loop itself is found although the set point moves with another period."""
     sp = 50 + 2 * np.sin(2 * np.pi * T / 700)
     pv = follower(sp) + np.sin(2 * np.pi * T / 90)
     assert first_of(record(pv, sp)).period_s == pytest.approx(90, rel=0.01)
 
 
 def test_a_set_point_that_steps_by_little_hides_no_cycle():
-    """A cycle of a percent is the loop's own though the set point steps by hundredths in every period; what steps of
-    its own size make is the set point's (test_batches.py)."""
+    """A cycle of 1 % is the loop's own although the set point steps by hundredths of a percent in each period."""
     sp = 50 + 0.02 * np.random.default_rng(4).random(N // 60)[T // 60]
     pv = sp + np.sin(2 * np.pi * T / 90) + 0.05 * noise(5)
     assert first_of(record(pv, sp)).period_s == pytest.approx(90, rel=0.01)
 
 
 def test_too_few_periods_are_not_called_oscillation():
-    """Two and a half periods of a sine in noise are not enough to tell it from drift."""
+    """Two and a half periods of a sine in noise are too few to distinguish it from drift."""
     assert found_in(record(50 + 3 * np.sin(2 * np.pi * T / (N / 2.5)) + 0.3 * noise(7))).first is None
 
 
-# What is
+# Signals with oscillation
 
 
 @pytest.mark.parametrize("period_s", [23.0, 97.0, 310.0, 900.0])
 @pytest.mark.parametrize("ratio", [1.5, 4.0])
 def test_a_sine_in_noise_is_found(period_s, ratio):
-    """A sine 1.5 times the noise's deviation or larger: period within 1 %, amplitude within 10 %, all the time."""
+    """For a sine of 1.5 times the noise deviation or more, the period is within 1 % and the amplitude within 10 %,
+    all the time.
+    """
     for seed in range(3):
         found = first_of(record(50 + 2 * np.sin(2 * np.pi * T / period_s + seed) + 2 / ratio * noise(seed)))
         assert found.period_s == pytest.approx(period_s, rel=0.01)
@@ -134,7 +135,7 @@ def test_a_sine_in_noise_is_found(period_s, ratio):
 
 
 def test_share_of_time():
-    """A loop that oscillates in one stretch of 40 % of the time oscillates about 40 % of the time."""
+    """A loop that oscillates in one stretch of 40 % of the time is reported with 40 ± 3 % of the time."""
     n = 40_000
     t = np.arange(n)
     on = (t >= 9000) & (t < 9000 + 0.4 * n)
@@ -144,15 +145,17 @@ def test_share_of_time():
 
 
 def test_two_periods_at_once_are_both_reported():
-    """Two cycles that are no harmonics of each other are reported, the larger first."""
+    """Two cycles that are no harmonics of each other are reported, the larger one first."""
     pv = 50 + 2 * np.sin(2 * np.pi * T / 410) + np.sin(2 * np.pi * T / 57) + 0.3 * noise(9)
     found = found_in(record(pv)).found
     assert [o.period_s for o in found] == pytest.approx([410, 57], rel=0.01)
     assert [o.amplitude_pct for o in found] == pytest.approx([2, 1], rel=0.1)
 
 
-def test_amplitude_holds_the_noise_of_its_band():
-    """Amplitude is that of the band from f/1.6 to 1.6 f: white noise adds its share of power there to the sine's."""
+def test_amplitude_includes_the_noise_of_its_band():
+    """The amplitude is that of the band from f/1.6 to 1.6 f: white noise adds its power in that band to the power of
+    the sine.
+    """
     period, sigma = 23.0, 2.0
     width = (1.6 - 1 / 1.6) / period  # in cycles a sample, of 0.5
     expected = np.sqrt(2.0**2 + 2 * sigma**2 * width / 0.5)
@@ -164,14 +167,16 @@ def test_amplitude_holds_the_noise_of_its_band():
 
 
 def test_a_harmonic_is_not_another_oscillation():
-    """The odd harmonics of a square wave are not reported beside it."""
+    """The odd harmonics of a square oscillation are not reported as separate oscillations."""
     assert len(found_in(record(50 + 2 * square(2 * np.pi * T / 300) + 0.1 * noise(10))).found) == 1
 
 
 @settings(max_examples=20, deadline=None)
 @given(st.floats(0.01, 15.0), st.floats(-1e8, 1e8), st.floats(-20, 20))
 def test_scaling_pv_scales_amplitude_and_significance_alone(factor, shift_s, level):
-    """A deviation `factor` as large has that amplitude and significance; nothing else moves, whenever, wherever."""
+    """A deviation `factor` times as large has `factor` times the amplitude and significance; all else is equal at any
+    time and level.
+    """
     deviation = np.sin(2 * np.pi * T / 130) + 0.5 * noise(11)
     one = first_of(record(50 + deviation))
     moved = replace(record(50 + level + factor * deviation, 50.0 + level), start_s=START_S + shift_s)
@@ -184,7 +189,7 @@ def test_scaling_pv_scales_amplitude_and_significance_alone(factor, shift_s, lev
 
 
 def test_sampling_interval_is_a_unit_of_time():
-    """The same samples at another interval have the same picture at another period."""
+    """The same samples at another interval have the same results with another period."""
     pv = 50 + np.sin(2 * np.pi * T / 130) + 0.5 * noise(12)
     one, ten = first_of(record(pv)), first_of(record(pv, dt_s=10.0))
     assert ten.period_s == pytest.approx(10 * one.period_s)
@@ -195,7 +200,7 @@ def test_sampling_interval_is_a_unit_of_time():
 @pytest.mark.parametrize("begin_s", [0.0, 1234.0, 3599.0])
 @pytest.mark.parametrize("n", [28_800, 29_989])
 def test_significance_adds_up_over_the_hours(begin_s, n):
-    """The significance of a night is the sum over its clock hours, wherever they begin, within 0.5 %."""
+    """The significance of a night is the sum over its clock hours within 0.5 %, for any start time."""
     t = np.arange(n)
     on = (t // 5000) % 2 == 0
     night = record(50 + 2 * np.sin(2 * np.pi * t / 150) * on + 0.3 * noise(13, n))
@@ -210,7 +215,7 @@ def test_significance_adds_up_over_the_hours(begin_s, n):
 
 
 def test_significance_grows_with_regularity():
-    """A cycle whose phase wanders has less significance than one of the same amplitude that keeps it."""
+    """A cycle with a drifting phase has less significance than one of the same amplitude with a constant phase."""
     phase = 2 * np.pi * T / 100
     wandering = phase + np.cumsum(0.12 * noise(14))
     steady, loose = (first_of(record(50 + 2 * np.sin(p) + 0.2 * noise(15))) for p in (phase, wandering))
@@ -218,7 +223,9 @@ def test_significance_grows_with_regularity():
 
 
 def test_a_gap_does_not_move_the_period():
-    """A tenth of the record missing in one piece, its last value held, leaves period, amplitude and share."""
+    """A tenth of the record missing in one piece, with its last value held, leaves period, amplitude and share
+    unchanged.
+    """
     pv = 50 + 2 * np.sin(2 * np.pi * T / 97) + 0.4 * noise(16)
     bad = (T >= 3000) & (T < 3720)
     held = np.where(bad, pv[2999], pv)
@@ -228,8 +235,8 @@ def test_a_gap_does_not_move_the_period():
     assert found.oscillating_pct > 90
 
 
-def test_what_is_marked_bad_does_not_count():
-    """Whatever stands at bad samples, the oscillation found is the same."""
+def test_bad_samples_do_not_count():
+    """The values at bad samples do not change the oscillation that is found."""
     pv = 50 + 2 * np.sin(2 * np.pi * T / 97) + 0.4 * noise(17)
     bad = np.random.default_rng(18).random(N) < 0.02
     wild = np.where(bad, 1e4 * noise(19), pv)
@@ -239,11 +246,13 @@ def test_what_is_marked_bad_does_not_count():
     assert one.amplitude_pct == pytest.approx(other.amplitude_pct, rel=1e-6)
 
 
-# What is regular only in shape
+# Oscillations that are regular only in shape
 
 
 def slips(seed: int, halves: int, per_half: int) -> np.ndarray:
-    """A square whose halves last from half to twice their median and whose size changes from slip to slip [%]."""
+    """A square signal whose half periods last from half to twice their median and whose size changes at each slip
+    [%].
+    """
     rng = np.random.default_rng(seed)
     lengths = np.maximum((per_half * 2 ** rng.uniform(-1, 1, halves)).astype(int), 1)
     sizes = rng.uniform(0.6, 1.4, halves) * np.where(np.arange(halves) % 2, 1.0, -1.0)
@@ -252,15 +261,15 @@ def slips(seed: int, halves: int, per_half: int) -> np.ndarray:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_a_cycle_whose_halves_last_from_half_to_twice_is_found(seed):
-    """Sixty slips with halves of half to twice their median length, under half as much noise, are an oscillation."""
+    """Sixty slips with half periods of half to twice the median, with half as much noise, are an oscillation."""
     x = slips(seed, 60, 25)
     found = first_of(record(50 + x + 0.5 * noise(seed, x.size)))
     assert found.period_s == pytest.approx(2 * x.size / 60, rel=0.5)
     assert found.oscillating_pct > 50
 
 
-def test_three_samples_a_cycle_are_enough_where_the_cycle_is_plain():
-    """A sine of 3.6 samples with a deviation 1.4 times the noise's is found, white noise there is not."""
+def test_three_samples_a_cycle_are_enough_for_a_clear_cycle():
+    """A sine with 3.6 samples a cycle and 1.4 times the noise deviation is found, and white noise is not."""
     t = np.arange(600)
     assert first_of(record(50 + 2 * np.sin(2 * np.pi * t / 3.6) + noise(21, 600))).period_s == pytest.approx(
         3.6, rel=0.03
@@ -268,20 +277,20 @@ def test_three_samples_a_cycle_are_enough_where_the_cycle_is_plain():
     assert all(found_in(record(50 + noise(s, 600))).first is None for s in range(22, 40))
 
 
-def test_healthy_untidy_loops_do_not_oscillate():
-    """Of 60 healthy loops under steps, ramps, masters and coloured noise at most one is called oscillating."""
+def test_irregular_loops_without_fault_do_not_oscillate():
+    """Of 60 loops without fault under steps, ramps, masters and coloured noise, at most one is called oscillating."""
     drawn = (draw(seed, "healthy") for seed in range(60))
     claimed = [counting(found_in(record(d.pv, d.sp, dt_s=d.step_s))) is not None for d in drawn]
     assert sum(claimed) <= 1
 
 
-# What sampling has to do with it
+# Effects of sampling
 
 
 def cycling_after_a_start(dt_s: float, n: int, seed: int = 7) -> LoopRecord:
-    """A cycle of 600 s about the set point, after a start from far below it, as a recorder at an interval sees it.
+    """A cycle of 600 s around the set point, after a start from far below it, as a recorder stores it at an interval.
 
-    The same noise of the process underneath, and a recorder's own, fresh at each sample.
+    The noise of the process is the same for all intervals; the noise of the recorder is new at each sample.
     """
     fine = np.arange(36_000) * 1.0
     slow = lfilter([0.02], [1, -0.98], np.random.default_rng(seed).standard_normal(fine.size))
@@ -292,7 +301,7 @@ def cycling_after_a_start(dt_s: float, n: int, seed: int = 7) -> LoopRecord:
 
 @pytest.mark.parametrize("dt_s", [2.0, 2.7, 7.0, 13.0, 23.0, 61.0, 73.0])
 def test_sampling_changes_no_answer(dt_s):
-    """From 8 to 300 samples a cycle, period, share of time and significance are those of the process."""
+    """From 8 to 300 samples a cycle, period, share of time and significance agree with those at 5 s."""
     usual = first_of(cycling_after_a_start(5.0, 7200))
     found = first_of(cycling_after_a_start(dt_s, int(36_000 / dt_s)))
     assert found.period_s == pytest.approx(usual.period_s, rel=0.01)
@@ -301,8 +310,8 @@ def test_sampling_changes_no_answer(dt_s):
 
 
 @pytest.mark.parametrize("dt_s", [2.0, 5.0, 7.0, 23.0, 61.0])
-def test_noise_after_a_start_is_none_at_any_sampling(dt_s):
-    """A start from far below the set point makes no cycle of the noise behind it."""
+def test_noise_after_a_start_is_no_cycle_at_any_sampling(dt_s):
+    """Noise after a start from far below the set point is no cycle."""
     fine = np.arange(36_000) * 1.0
     slow = lfilter([0.02], [1, -0.98], np.random.default_rng(3).standard_normal(fine.size))
     at = np.interp(np.arange(int(36_000 / dt_s)) * dt_s, fine, 50 - 40 * np.exp(-fine / 700) + 3 * slow)

@@ -1,4 +1,4 @@
-"""Masks on raw stamps, before anything is analysed."""
+"""Masks on raw stamps, before the analysis."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SP = np.full(N, 50.0)
 
 
 def ready(**changed: Series | None) -> Prepared:
-    """A healthy loop with some of its tags (sp, pv, op, mode) replaced, or left out where None."""
+    """A loop without fault; the given tags (sp, pv, op, mode) are replaced, or left out if None."""
     tags = {"sp": series(STAMP, SP), "pv": series(STAMP, PV), "op": series(STAMP, OP), **changed}
     found = {f"L.{role.upper()}": s for role, s in tags.items() if s is not None}
     missing = {role: None for role, s in tags.items() if s is None}
@@ -39,12 +39,12 @@ def ready(**changed: Series | None) -> Prepared:
 
 
 def where(prepared: Prepared, name: str) -> np.ndarray:
-    """Indices at which the named thing happens."""
+    """Indices at which the named mask is True."""
     return np.flatnonzero(prepared.record.mask(name))
 
 
-def test_good_trends_are_left_as_they_are():
-    """Uniform good samples come out as they went in, with no mask set (but for chance) and nothing to say."""
+def test_good_trends_are_unchanged():
+    """Uniform good samples are unchanged, with no mask set except random short straight lines, and without a note."""
     found = ready()
     assert np.array_equal(found.record.pv, PV)
     assert np.array_equal(found.record.op, OP)
@@ -64,7 +64,7 @@ def test_gap_begins_five_intervals_after_the_last_sample():
 
 
 def test_bad_quality_is_a_gap_sample_by_sample():
-    """What the historian marks as bad is a gap there and nowhere else, and its value never appears."""
+    """A bad sample of the historian is a gap at this sample only, and its value is never used."""
     bad = np.zeros(N, dtype=bool)
     bad[[100, 101, 5000]] = True
     found = ready(pv=series(STAMP, np.where(bad, np.nan, PV), bad))
@@ -73,7 +73,7 @@ def test_bad_quality_is_a_gap_sample_by_sample():
 
 
 def test_gap_of_op_is_a_gap_of_the_loop():
-    """Where OP is missing the loop cannot be judged either."""
+    """If OP is missing, the loop cannot be assessed at these samples either."""
     kept = (T < 3000) | (T >= 3400)
     assert np.array_equal(where(ready(op=series(STAMP[kept], OP[kept])), "gap"), np.arange(3005, 3400))
 
@@ -86,15 +86,15 @@ def test_stale_pv_is_marked_where_op_moves():
     assert "stale 50 % of the time" in found.notes
 
 
-def test_frozen_pv_is_not_stale_where_nothing_moves():
-    """PV that stands still while OP stands still is a plant at rest."""
+def test_constant_pv_is_not_stale_while_op_is_constant():
+    """A constant PV with a constant OP is a plant at rest."""
     frozen = np.where((T >= 2000) & (T < 6000), PV[2000], PV)
     still = np.where((T >= 1900) & (T < 6100), 40.0, OP)
     assert not where(ready(pv=series(STAMP, frozen), op=series(STAMP, still)), "stale").size
 
 
 def test_short_standstill_is_not_stale():
-    """Twenty minutes of an unchanged PV are not yet stale."""
+    """A PV that is constant for twenty minutes is not yet stale."""
     assert not where(ready(pv=series(STAMP, np.where((T > 2000) & (T < 3200), 50.0, PV))), "stale").size
 
 
@@ -110,7 +110,7 @@ def test_straight_segments_are_compressed():
 
 @pytest.mark.parametrize("step", [0.25, 1.0])
 def test_resolution_is_found(step):
-    """A trend on a grid is quantized and its step is known; one that is not has none."""
+    """A trend on a grid is quantized with a known step; a trend without a grid has no step."""
     found = ready(pv=series(STAMP, step * np.round(PV / step)))
     assert found.pv_step == pytest.approx(step)
     assert found.record.mask("quantized").all()
@@ -118,18 +118,18 @@ def test_resolution_is_found(step):
 
 
 def test_coarse_steps_are_not_taken_for_compression():
-    """Level steps of a coarse grid are straight and level, not compressed."""
+    """Level steps of a coarse grid are not taken for compression."""
     assert ready(pv=series(STAMP, np.round(PV))).compressed_share < 0.05
 
 
 def test_saturated_within_two_percent_of_a_limit():
-    """OP within 2 % of 0 or 100 is saturated there and nowhere else."""
+    """OP within 2 % of 0 or 100 is saturated at these samples and at no others."""
     op = np.clip(50 + 60 * np.sin(T / 300), 0, 100)
     assert np.array_equal(ready(op=series(STAMP, op)).record.mask("saturated"), (op <= 2) | (op >= 98))
 
 
 def test_limits_follow_the_stated_range():
-    """With OP from 4 to 20 mA the limits are those of that range."""
+    """With OP from 4 to 20 mA the limits are those of this range."""
     op = np.clip(12 + 9 * np.sin(T / 300), 4, 20)
     tags = {"L.SP": series(STAMP, SP), "L.PV": series(STAMP, PV), "L.OP": series(STAMP, op)}
     found = prepare(spec(op_lo=4.0, op_hi=20.0), tags, LIMITS)
@@ -143,7 +143,7 @@ def test_limits_follow_the_stated_range():
     ids=["fractions", "deviations", "beyond"],
 )
 def test_op_outside_its_range_is_not_saturated(op):
-    """OP recorded from 0 to 1, as a deviation or beyond 100 has limits that are not known, and that is said."""
+    """An OP recorded from 0 to 1, as a deviation, or beyond 100 has unknown limits, and a note says so."""
     found = ready(op=series(STAMP, op))
     assert not where(found, "saturated").size
     assert any("state op_lo and op_hi" in note for note in found.notes)
@@ -153,7 +153,7 @@ def test_op_outside_its_range_is_not_saturated(op):
     ("by_hand", "automatic"), [("MAN", "AUTO"), ("Manual", "Cas"), ("man", "aut"), ("IMAN", "RCAS")]
 )
 def test_mode_texts(by_hand, automatic):
-    """Manual by the mode's text, from the stamp of its change to that of the next."""
+    """A mode text for manual applies from the stamp of its change to the stamp of the next one."""
     stamp = START_S + np.array([0.0, 1000.5, 2500.0])
     texts = np.array([automatic, by_hand, automatic], dtype=object)
     mode = Series(stamp, np.full(3, np.nan), np.zeros(3, dtype=bool), texts)
@@ -166,8 +166,8 @@ def test_mode_numbers():
     assert np.array_equal(where(ready(mode=series(STAMP, value)), "manual"), np.arange(1000, 2000))
 
 
-def test_mode_texts_that_say_nothing_are_not_used():
-    """With words that mean nothing here the loop is in manual only where OP shows it."""
+def test_unknown_mode_texts_are_not_used():
+    """With unknown mode texts the loop is in manual only if OP shows it."""
     mode = Series(STAMP[:1], np.full(1, np.nan), np.zeros(1, dtype=bool), np.array(["SHUT"], dtype=object))
     frozen = np.where((T >= 2000) & (T < 5000), 40.0, OP)
     assert not where(ready(mode=mode), "manual").size
@@ -175,54 +175,54 @@ def test_mode_texts_that_say_nothing_are_not_used():
 
 
 def test_frozen_op_is_manual_where_the_error_moves():
-    """OP that stands for half an hour while the error moves is manual; a shorter stand is not."""
+    """OP that is constant for half an hour while the error moves is manual; a shorter constant span is not."""
     half = np.where((T >= 2000) & (T < 4000), 40.0, OP)
     short = np.where((T >= 2000) & (T < 3000), 40.0, OP)
     assert np.array_equal(where(ready(op=series(STAMP, half)), "manual"), np.arange(2000, 4000))
     assert not where(ready(op=series(STAMP, short)), "manual").size
 
 
-def test_op_that_rests_on_a_limit_is_saturated_and_not_manual():
-    """A controller wound up at its limit does not move OP, and is not in manual."""
+def test_op_that_is_constant_at_a_limit_is_saturated_and_not_manual():
+    """A controller that is wound up at its limit does not move OP, and is not in manual."""
     found = ready(op=series(STAMP, np.where((T >= 2000) & (T < 6000), 100.0, OP)))
     assert np.array_equal(where(found, "saturated"), np.arange(2000, 6000))
     assert not where(found, "manual").size
 
 
-def test_missing_set_point_is_estimated_and_said():
-    """Without SP the median of PV stands for it, and the notes say so."""
+def test_missing_set_point_is_estimated_and_reported():
+    """Without SP the median of PV replaces it, and the notes say so."""
     found = ready(sp=None)
     assert found.record.sp_estimated
     assert found.record.sp == pytest.approx(np.full(N, np.median(PV)))
     assert "no SP recorded: estimated as the median of PV" in found.notes
 
 
-def test_missing_op_is_said():
-    """Without OP the record says that no cause can be told."""
+def test_missing_op_is_reported():
+    """Without OP the notes say that no cause can be identified."""
     assert "no OP recorded: no cause can be identified" in ready(op=None).notes
 
 
-def test_range_not_stated_is_the_recorded_one_and_said():
-    """Without a PV range percent means the 0.5 to 99.5 % quantiles of PV, and the notes say so."""
+def test_unstated_range_is_the_recorded_one_and_reported():
+    """Without a PV range, percent refers to the 0.5 to 99.5 % quantiles of PV, and the notes say so."""
     tags = {"L.SP": series(STAMP, SP), "L.PV": series(STAMP, PV), "L.OP": series(STAMP, OP)}
     found = prepare(replace(spec(), pv_lo=None, pv_hi=None), tags, LIMITS)
     assert np.quantile(found.record.pv, [0.005, 0.995]) == pytest.approx([0, 100])
     assert "no PV range stated: percent of the recorded range" in found.notes
 
 
-def test_irregular_stamps_come_onto_a_clock():
-    """Stamps that jitter by a fifth of a second come onto a clock of one second with the values last logged."""
+def test_irregular_stamps_are_placed_on_a_grid():
+    """Stamps with a jitter of 0.2 s are placed on a grid of one second with the values that were logged last."""
     jitter = np.random.default_rng(3).uniform(-0.2, 0.2, N)
     found = ready(pv=series(STAMP + jitter, PV)).record
     assert found.dt_s == pytest.approx(1.0, abs=0.01)
-    assert not found.bad[1:].any()  # the first tick may lie before OP's first sample
+    assert not found.bad[1:].any()  # the first tick may lie before the first sample of OP
     clock = found.start_s + found.dt_s * np.arange(len(found))
     last = [PV[np.flatnonzero(STAMP + jitter <= c + 0.01 * found.dt_s)[-1]] for c in clock[::97]]
     assert found.pv[::97] == pytest.approx(last)
 
 
-def test_tags_of_different_intervals_share_pvs_clock():
-    """A set point logged on change and OP logged every ten seconds are held onto the clock of PV."""
+def test_tags_of_different_intervals_use_the_grid_of_pv():
+    """A set point logged on change and an OP logged every ten seconds are held on the grid of PV."""
     sp = series(START_S + np.array([0.0, 4000.0]), np.array([50.0, 55.0]))
     op = series(STAMP[::10], OP[::10])
     found = ready(sp=sp, op=op).record
@@ -251,17 +251,19 @@ def test_empty_ends_are_cut():
     ],
     ids=["no tag", "empty", "all NaN", "one sample", "short"],
 )
-def test_too_little_is_told_with_what_it_needs_and_has(pv, text):
-    """A record that cannot be assessed says what it needs and what it has."""
+def test_too_little_data_is_reported_with_need_and_present_count(pv, text):
+    """A record that cannot be assessed states what it needs and what it has."""
     tags = {} if pv is None else {"L.PV": pv}
     with pytest.raises(NotAssessedError) as error:
         prepare(spec(), tags, LIMITS)
     assert str(error.value) == text
 
 
-def test_a_frozen_pv_stays_frozen_when_op_has_run_to_its_limit():
-    """A PV that stands to the last digit for a quarter of a day, off its set point, with OP at its limit is frozen;
-    one that stands at the end of its own range, or has noise, is not."""
+def test_a_frozen_pv_stays_frozen_when_op_is_at_its_limit():
+    """A PV that is exactly constant for a quarter of a day, away from its set point, with OP at its limit, is frozen.
+
+    A PV that is constant at the end of its own range, or that has noise, is not frozen.
+    """
     stamp = np.arange(0.0, 30_000.0, 5.0)
     op, sp = series(stamp, np.full(stamp.size, 100.0)), series(stamp, np.full(stamp.size, 50.0))
 

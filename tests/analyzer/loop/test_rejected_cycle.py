@@ -1,5 +1,6 @@
-"""External cycles: settings that reject them better where the process is known, and a calmer step where an undecided
-cycle rings through the loop."""
+"""External cycles: settings that reject them better if the process is known, and a first step with less travel if an
+undecided cycle rings through the loop.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +28,7 @@ CONFIG = Config()
 
 
 def made(d: Drawn, way: str, folder: Path) -> Prepared:
-    """A day of a drawn loop, recorded in a way."""
+    """A day of a drawn loop, recorded in the given way."""
     spec = spec_of(d)
     return prepare(
         spec,
@@ -42,7 +43,7 @@ def advised(d: Drawn, way: str, folder: Path) -> tuple[Assessment, Advice]:
 
 
 def typed(d: Drawn, kp: float | None, ti: float | None) -> tuple[float, float]:
-    """Error and travel on the true plant with new settings, over those before."""
+    """Error and travel on the true plant with new settings, divided by those with the old settings."""
     assert kp is not None
     assert ti is not None
     return outcome(d, replace(d.controller, kp=kp, ti_s=ti))[:2]
@@ -54,31 +55,33 @@ def typed(d: Drawn, kp: float | None, ti: float | None) -> tuple[float, float]:
 def test_a_loop_that_can_reject_its_cycle_better_gets_settings(
     seed: int, at: int, way: str, tmp_path: Path
 ) -> None:
-    """Two to eight set point moves show a process that allows twice the gain: on the true plant the error falls by
-    three tenths and more, as forecast, and the source remains the cause."""
+    """Two to eight set point moves identify a process that allows twice the gain.
+
+    On the true plant the error falls by at least 30 %, as forecast, and the source stays the cause.
+    """
     d = drawn(seed, at + 1, ("load",))[at]
     found, advice = advised(d, way, tmp_path)
     assert (found.verdict.cause, advice.action) == (Cause.LOAD, Action.RETUNE)
     error, travel = typed(d, advice.kp_new, advice.ti_new)
     spec, one = spec_of(d), made(d, way, tmp_path)
-    told = rejecting_settings(one.record, controller_of(spec, one), spec.type, CONFIG)
-    assert told is not None
-    assert told.change is not None
-    assert told.travel is not None
+    found_settings = rejecting_settings(one.record, controller_of(spec, one), spec.type, CONFIG)
+    assert found_settings is not None
+    assert found_settings.change is not None
+    assert found_settings.travel is not None
     assert error < 0.7
-    assert 1.0 + told.change == pytest.approx(error, abs=0.06)
-    assert 1.0 + told.travel == pytest.approx(travel, rel=0.06)
+    assert 1.0 + found_settings.change == pytest.approx(error, abs=0.06)
+    assert 1.0 + found_settings.travel == pytest.approx(travel, rel=0.06)
     assert "the source of the cycle remains" in advice.reason
 
 
 @pytest.mark.parametrize(
     ("seed", "at", "way"), [(635, 5, "plain"), (632, 1, "every 10 s"), (631, 0, "plain")]
 )
-def test_no_calmer_settings_follow_from_an_external_cycle(
-    seed: int, at: int, way: str, tmp_path: Path
-) -> None:
-    """A cycle that looks like the process's own response biases it: what follows would raise the error, or leave it
-    at .95 where .4 is forecast; such a loop gets no settings."""
+def test_an_external_cycle_gives_no_slower_settings(seed: int, at: int, way: str, tmp_path: Path) -> None:
+    """A cycle that looks like the response of the process biases the model, so the loop gets no settings.
+
+    Settings from this model would raise the error, or give a ratio of 0.95 where 0.4 is forecast.
+    """
     found, advice = advised(drawn(seed, at + 1, ("load",))[at], way, tmp_path)
     assert (found.verdict.cause, advice.action) == (Cause.LOAD, Action.FIND_DISTURBANCE)
 
@@ -93,10 +96,10 @@ def test_without_moves_of_the_set_point_nothing_is_advised(tmp_path: Path) -> No
     ("kind", "seed", "at", "way"),
     [("load", 631, 5, "plain"), ("worn-tight", 643, 4, "every 10 s"), ("backlash", 642, 2, "every 10 s")],
 )
-def test_an_undecided_cycle_that_the_loop_amplifies_is_calmed(
+def test_an_undecided_cycle_that_the_loop_amplifies_is_reduced(
     kind: str, seed: int, at: int, way: str, tmp_path: Path
 ) -> None:
-    """Cycles that are not distinguished from ringing: a first step lowers error and travel of each."""
+    """For cycles that cannot be distinguished from ringing, a first step lowers error and travel."""
     d = drawn(seed, at + 1, (kind,))[at]
     found, advice = advised(d, way, tmp_path)
     assert (found.verdict.cause, advice.action) == (Cause.UNDECIDED, Action.RETUNE)
@@ -108,13 +111,18 @@ def test_an_undecided_cycle_that_the_loop_amplifies_is_calmed(
 
 @pytest.mark.parametrize(("kind", "at"), [("stiction", 3), ("backlash", 3)])
 def test_a_cycle_whose_waveform_is_not_recorded_is_left_alone(kind: str, at: int, tmp_path: Path) -> None:
-    """With three to seven rows a cycle a sticking valve looks like ringing; a calmer loop has 60 % more error."""
+    """With three to seven rows a cycle, a sticking valve looks like ringing, and the loop gets no settings.
+
+    Slower settings would give 60 % more error.
+    """
     found, advice = advised(drawn(661, at + 1, (kind,))[at], "every 30 s", tmp_path)
     assert (found.verdict.cause, advice.kp_new) == (Cause.UNDECIDED, None)
 
 
 def test_nights_keep_the_step_of_an_undecided_cycle() -> None:
-    """If the nights name no cause either, the step that they advised stays; one night's alone does not."""
+    """If the nights together name no cause, the step that they advised is kept; a step that one night advised is
+    not.
+    """
     own = Cause.UNDECIDED, Action.RETUNE, None
     assert of_nights(Cause.UNDECIDED, False, own, Action.RETUNE, Action.UNDECIDED) == (Action.RETUNE, None)
     assert of_nights(Cause.UNDECIDED, False, own, None, Action.UNDECIDED) == (Action.UNDECIDED, None)

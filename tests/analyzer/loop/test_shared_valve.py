@@ -1,4 +1,6 @@
-"""Who has a valve that two controllers share, and which half of a split range works: by hand-made trends."""
+"""Which of two controllers has a shared valve, and which half of a split range is active, with trends made by
+hand.
+"""
 
 from __future__ import annotations
 
@@ -33,9 +35,10 @@ def record(pv: np.ndarray, op: np.ndarray, sp: float = 50.0) -> LoopRecord:
 
 
 def pair(low: bool, follows: bool) -> tuple[LoopRecord, np.ndarray, np.ndarray]:
-    """A loop that has the valve for two of every three quarters of an hour, the other's output, and when it has not.
+    """A loop that has the valve for two thirds of the time, the output of the other loop, and the mask without the
+    valve.
 
-    Without the valve its PV is 8 % off, and its own output rests at the far end or a little beyond the other's.
+    Without the valve its PV is 8 % off, and its output is at the far limit or slightly beyond the other output.
     """
     idle = T % 2700 >= 1800
     way = 1.0 if low else -1.0
@@ -47,8 +50,8 @@ def pair(low: bool, follows: bool) -> tuple[LoopRecord, np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("low", [True, False])
 @pytest.mark.parametrize("follows", [True, False])
-def test_the_one_that_holds_its_set_point_has_the_valve(low: bool, follows: bool) -> None:
-    """Of a low and of a high select the samples without the valve are told, and whether OP winds up meanwhile."""
+def test_the_loop_at_its_set_point_has_the_valve(low: bool, follows: bool) -> None:
+    """For a low and a high select, the samples without the valve are found, and whether OP winds up during them."""
     loop, other, idle = pair(low, follows)
     found = selected(loop, other, GOOD, LIMITS)
     assert found is not None
@@ -58,19 +61,19 @@ def test_the_one_that_holds_its_set_point_has_the_valve(low: bool, follows: bool
     assert found.changeovers_per_h == pytest.approx(2.5, abs=0.01)
 
 
-def test_the_wait_for_the_valve_is_from_the_error_s_turn() -> None:
-    """An error that asks for the valve 60 s before it is had is told as that."""
+def test_the_wait_for_the_valve_begins_with_the_change_of_the_error() -> None:
+    """If the error needs the valve 60 s before the loop gets it, this time is reported."""
     loop, other, idle = pair(True, False)
-    asks = np.zeros(N, dtype=bool)
+    needs_valve = np.zeros(N, dtype=bool)
     for end in np.flatnonzero(idle[:-1] & ~idle[1:]) + 1:
-        asks[end - 60 : end] = True
-    found = selected(replace(loop, pv=np.where(asks, 52.0, loop.pv)), other, GOOD, LIMITS)
+        needs_valve[end - 60 : end] = True
+    found = selected(replace(loop, pv=np.where(needs_valve, 52.0, loop.pv)), other, GOOD, LIMITS)
     assert found is not None
     assert found.takeover_s == 60.0
 
 
-def test_outputs_of_loops_without_a_select_share_nothing() -> None:
-    """Two outputs that wander on their own, and one beside itself, are no select."""
+def test_outputs_of_loops_without_a_select_share_no_valve() -> None:
+    """Two outputs that drift independently are no select, and neither is an output with itself."""
     rng = np.random.default_rng(3)
     pv, op, other = (50.0 + np.cumsum(rng.normal(0.0, 0.1, N)) for _ in range(3))
     assert selected(record(pv, op), op, GOOD, LIMITS) is None
@@ -80,7 +83,9 @@ def test_outputs_of_loops_without_a_select_share_nothing() -> None:
 
 @pytest.mark.parametrize(("at", "opens"), [(40.0, True), (62.0, False)])
 def test_a_half_begins_where_the_output_s_range_is_split(at: float, opens: bool) -> None:
-    """A half that opens above, or as the output falls below, the change-over is told with it and its slope."""
+    """For a half that opens above the split, or as the output falls below it, the split point and the slope are
+    found.
+    """
     whole = at + 25.0 * np.sin(T / 500.0)
     part = 100.0 * (whole - at) / (100.0 - at) if opens else 100.0 * (at - whole) / at
     found = half(record(np.full(N, 50.0), np.clip(part, 0.0, 100.0)), whole, GOOD, LIMITS)
@@ -90,8 +95,8 @@ def test_a_half_begins_where_the_output_s_range_is_split(at: float, opens: bool)
     assert found.valve_pct == pytest.approx(100.0 * np.mean((part > 2.0) & (part < 98.0)), abs=0.1)
 
 
-def test_hand_overs_are_no_cycle() -> None:
-    """A valve that is handed over every half hour makes a loop's error no oscillation."""
+def test_change_overs_are_no_cycle() -> None:
+    """Without the change-overs of a shared valve every 45 minutes, the error of the loop is no oscillation."""
     loop, other, _ = pair(True, False)
     assert counting(detect(loop, Config().oscillation)) is not None
     found = selected(loop, other, GOOD, LIMITS)
@@ -102,8 +107,8 @@ def test_hand_overs_are_no_cycle() -> None:
     assert counting(detect(quiet, Config().oscillation)) is None
 
 
-def test_what_moves_pv_is_explained_by_what_the_valve_was_given() -> None:
-    """An explanation is asked with the output that had the valve; of half a split range only while it works."""
+def test_an_explanation_uses_the_output_that_had_the_valve() -> None:
+    """An explanation uses the output that had the valve; for half of a split range it uses only its active time."""
     loop, other, idle = pair(True, False)
     shared = selected(loop, other, GOOD, LIMITS)
     assert shared is not None
@@ -116,23 +121,24 @@ def test_what_moves_pv_is_explained_by_what_the_valve_was_given() -> None:
     assert (part.op == loop.op).all()
 
 
-def test_a_loop_that_winds_up_is_to_be_set_right() -> None:
-    """A loop whose output rests at its end without the valve stands in the lane and is to be looked at."""
+def test_a_loop_that_winds_up_is_to_be_checked() -> None:
+    """A loop whose output winds up at its limit without the valve is in the lane and is to be checked."""
     known = {"winds_up_pct": 96.0, "takeover_s": 75.0, "override_with": "PIC1"}
     found = Finding(
         "FIC1", "n", Status.OK, cause=Cause.NONE, confidence=dict.fromkeys(CAUSES, 0.0), known=known
     )
-    told = in_lanes(replace(found, remedy=Remedy(Action.NONE)), Config().lanes)
-    assert told.lanes == (Lane.WINDUP,)
+    reported = in_lanes(replace(found, remedy=Remedy(Action.NONE)), Config().lanes)
+    assert reported.lanes == (Lane.WINDUP,)
     from analyzer.words.reason import reason
 
-    assert told.remedy.action is Action.CHECK_LIMIT
-    assert "winds up while PIC1 has the valve, takes it back 75 s late" in reason(told)
+    assert reported.remedy.action is Action.CHECK_LIMIT
+    assert "winds up while PIC1 has the valve, takes it back 75 s late" in reason(reported)
 
 
 def test_partners_are_found_among_loops_and_tags() -> None:
-    """The other's output comes with its range, what is fed forward is a loop's PV or a tag, and what is missing is
-    said."""
+    """The output of the partner loop has its range, a feedforward is a loop's PV or a tag, and missing ones are
+    reported.
+    """
     specs = [
         LoopSpec("FIC1", override_with="PIC1", feedforward="FIC9"),
         LoopSpec("PIC1", op_lo=4.0, op_hi=20.0, override_with="FIC1", feedforward="weather"),
@@ -148,7 +154,7 @@ def test_partners_are_found_among_loops_and_tags() -> None:
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "told"),
+    ("low", "high", "reported"),
     [
         (0.8, 1.2, True),
         (-1.2, -0.8, True),
@@ -158,14 +164,16 @@ def test_partners_are_found_among_loops_and_tags() -> None:
         (0.0, 1.0, False),
     ],
 )
-def test_an_answer_to_a_half_is_told_where_it_is_known(
-    low: float, high: float, told: bool, monkeypatch: pytest.MonkeyPatch
+def test_a_response_to_a_half_is_reported_if_it_is_known(
+    low: float, high: float, reported: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of either sign it is told within a narrow interval, and not in a wide one or one that reaches to nothing."""
+    """With either sign, the response to a half is reported if its interval is narrow, and not if it is wide or
+    includes zero.
+    """
     value = 0.5 * (low + high)
     monkeypatch.setattr(
         conclusion, "intervals", lambda *_: {"slope_pct_per_s": Estimate(value, low, high, "%/(% s)")}
     )
     seen = SimpleNamespace(excited=True, linear=None)
     verdict = SimpleNamespace(measured=seen, cause=Cause.NONE)
-    assert bool(conclusion._of_half(verdict, AdviceLimits())) is told
+    assert bool(conclusion._of_half(verdict, AdviceLimits())) is reported

@@ -1,4 +1,4 @@
-"""Valves of simulated dry friction and of play, made by physics that shares no code: how each fails is named."""
+"""The faults of valves with simulated dry friction and with backlash are named; the simulation shares no code."""
 
 from __future__ import annotations
 
@@ -14,19 +14,21 @@ from identification.models import Pid
 from proofs.coverage import FAMILIES, Made, assessed, made
 from proofs.plant import CONFIG
 
-PLAY, STICKS = FAMILIES[:2]
+BACKLASH, STICKS = FAMILIES[:2]
 
 
 @cache
 def seen(family: str, seed: int) -> tuple[Made, Verdict]:
-    """A loop and what is said of it."""
+    """A loop and its verdict."""
     loop = made(family, seed)
     return loop, assessed(loop).verdict
 
 
 @pytest.mark.parametrize("seed", [60_700_009, 60_700_011, 60_700_013])
-def test_dry_friction_sticks(seed):
-    """A stem with mass and dry friction is stiction, its stickband within a tenth, slips scattering or not."""
+def test_dry_friction_is_stiction(seed):
+    """A stem with mass and dry friction is stiction with a stickband within 10 %, for constant and for scattering
+    slips.
+    """
     loop, verdict = seen(STICKS, seed)
     assert (verdict.cause, verdict.fault) == ("valve", "stiction")
     assert verdict.measured is not None
@@ -35,17 +37,19 @@ def test_dry_friction_sticks(seed):
 
 
 @pytest.mark.parametrize("seed", [60_800_000, 60_800_001, 60_800_002, 60_800_004])
-def test_play_does_not(seed):
-    """A stem with play is backlash, and no stem is decoded for it."""
-    _, verdict = seen(PLAY, seed)
+def test_backlash_is_no_stiction(seed):
+    """A stem with backlash is reported as backlash, and no stem movement is decoded for it."""
+    _, verdict = seen(BACKLASH, seed)
     assert (verdict.cause, verdict.fault) == ("valve", "backlash")
     assert verdict.measured is not None
     assert not verdict.measured.window.blocks.decoded
 
 
-def test_advice_says_on_which_friction_it_rests():
-    """Settings are sought on the verdict of one friction, and their reason says so; that of a play says nothing."""
-    for (loop, verdict), says in ((seen(STICKS, 60_700_009), True), (seen(PLAY, 60_800_004), False)):
+def test_advice_states_the_friction_that_it_is_based_on():
+    """Settings are based on the verdict of one friction, and their reason says so; the reason for backlash does
+    not.
+    """
+    for (loop, verdict), says in ((seen(STICKS, 60_700_009), True), (seen(BACKLASH, 60_800_004), False)):
         pid = Pid(loop.pi.kp, loop.pi.ti, scan_s=loop.scan_s)
         found = propose(verdict, pid, 200.0, CONFIG).proposal
         assert found.reason.startswith(sentences("settings")["one_friction"]) == says

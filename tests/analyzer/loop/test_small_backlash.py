@@ -1,6 +1,6 @@
-"""A play too small to drive a cycle by its describing function alone is told where every turn of OP shows it.
+"""A backlash that is too small to drive a cycle by its describing function is reported if each OP reversal shows it.
 
-Loops are stepped by hand here: an integrating process, a play and a PI law, sharing no code with the estimators.
+The loops are simulated here with an integrating process, a backlash and a PI law, without code of the estimators.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ HOURS = 5
 
 
 def tank(rate: float, kp: float, ti: float, half: float, load: np.ndarray, seed: int) -> Assessment:
-    """A tank of that rate [% PV a second per % OP] with a play of twice `half`, assessed with its settings known."""
+    """A tank of that rate [% PV a second per % OP] with a backlash of twice `half`, assessed with known settings."""
     n = HOURS * 3600
     rng = np.random.default_rng(seed)
     noise = 0.05 * rng.normal(size=n)
@@ -42,7 +42,7 @@ def tank(rate: float, kp: float, ti: float, half: float, load: np.ndarray, seed:
 
 
 def wandering(seed: int) -> np.ndarray:
-    """A load that wanders over five minutes [% OP]."""
+    """A load that drifts over five minutes [% OP]."""
     x = np.random.default_rng(100 + seed).normal(size=HOURS * 3600 + 299)
     return 0.3 * np.convolve(x, np.ones(300) / 40.0, "valid")
 
@@ -50,8 +50,10 @@ def wandering(seed: int) -> np.ndarray:
 @pytest.mark.parametrize(
     ("rate", "kp", "ti", "half"), [(0.01, 0.8, 25.0, 2.0), (0.005, 1.0, 40.0, 2.0), (0.02, 0.3, 40.0, 3.0)]
 )
-def test_little_damping_cycles_with_a_small_play(rate: float, kp: float, ti: float, half: float) -> None:
-    """Under PI with Kp k Ti of a fifth a play of a quarter of OP's range drives the cycle, and is blamed."""
+def test_little_damping_gives_a_cycle_with_a_small_backlash(
+    rate: float, kp: float, ti: float, half: float
+) -> None:
+    """Under PI with Kp k Ti of 0.2, a backlash of a quarter of the range of OP drives the cycle and is the cause."""
     found = tank(rate, kp, ti, half, wandering(0), 0)
     assert found.verdict.measured is not None
     assert found.verdict.measured.size < CONFIG.cause.size
@@ -59,8 +61,8 @@ def test_little_damping_cycles_with_a_small_play(rate: float, kp: float, ti: flo
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_load_that_swings_a_worn_valve_is_not_the_valve(seed: int) -> None:
-    """A sine from outside through a calm loop whose valve has a play of its own does not blame the valve."""
+def test_a_load_on_a_worn_valve_does_not_give_the_valve_as_cause(seed: int) -> None:
+    """An external sine in a loop whose valve has backlash does not give the valve as the cause."""
     rng = np.random.default_rng(seed)
     half = rng.uniform(0.5, 1.5)
     period = rng.uniform(200, 600)
@@ -74,8 +76,8 @@ LEVEL = Path(__file__).parents[3].parent / "shared" / "inputs" / "p-only-level-r
 
 
 @pytest.mark.skipif(not LEVEL.is_dir(), reason="needs the recorded inputs beside the repository")
-def test_a_play_wider_than_op_of_a_calm_loop_is_none() -> None:
-    """A sound P-only level whose set point kicks OP is blamed for no play that is wider than OP's usual range."""
+def test_a_backlash_wider_than_op_of_a_steady_loop_is_not_reported() -> None:
+    """A P-only level without fault whose set point kicks OP gets no backlash wider than the usual range of OP."""
     record = api.read(LEVEL / "export.parquet", loops=LEVEL / "loops.csv").loop("TIC25")
     found = api.assess(record).verdict
     assert found.require_measured.size > 1.0

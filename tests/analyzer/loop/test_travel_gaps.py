@@ -1,4 +1,4 @@
-"""Travel and clock on trends that are not whole."""
+"""Travel and sampling interval of incomplete trends."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from identification.record import LoopRecord
 
 
 def test_moves_during_a_gap_are_no_travel():
-    """OP that rests at 20, is lost, and rests at 80 has no travel that is known."""
+    """OP that is constant at 20, lost, and then constant at 80 has no known travel."""
     op = np.repeat([20.0, 50.0, 80.0], 2000)
     bad = np.repeat([False, True, False], 2000)
     pv = np.full(6000, 50.0)
@@ -21,7 +21,7 @@ def test_moves_during_a_gap_are_no_travel():
     assert night.usable_h == pytest.approx(4000 / 3600)
 
 
-def test_jitter_leaves_the_clock_alone():
-    """Stamps that jitter by a fifth of a second about every second have an interval of one second."""
+def test_jitter_does_not_change_the_interval():
+    """Stamps with a jitter of 0.2 s around each second have an interval of one second."""
     stamps = np.arange(8000) + np.random.default_rng(0).uniform(-0.2, 0.2, 8000)
     assert interval(np.sort(stamps)) == 1.0

@@ -1,4 +1,4 @@
-"""`triage tune` on small exports: the proposal, its pictures, and what it says where it abstains."""
+"""`triage tune` on small exports: the proposal, its pictures, and the reason if there is no proposal."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ STATED = "0.9,40,0,100"
 
 @pytest.fixture(scope="module")
 def tank() -> Trends:
-    """Two and a half hours of a tank with a play of 2.5 %."""
+    """Two and a half hours of a tank with a backlash of 2.5 %."""
     return simulate(TANK, 2.5)
 
 
-def asked(folder: Path, trends: Trends, stated: str = STATED, *more: str) -> Result:
-    """Answer of `triage tune` on an export of one loop with kp, ti, pv_lo and pv_hi as stated."""
+def tune_result(folder: Path, trends: Trends, stated: str = STATED, *more: str) -> Result:
+    """Result of `triage tune` on an export of one loop with kp, ti, pv_lo and pv_hi as stated."""
     stamp = pd.to_datetime(START_S + np.arange(trends.pv.size), unit="s")
     columns = {"timestamp": stamp, "L.SP": trends.sp, "L.PV": trends.pv, "L.OP": trends.op}
     pd.DataFrame(columns).to_parquet(folder / "export.parquet")
@@ -35,7 +35,7 @@ def asked(folder: Path, trends: Trends, stated: str = STATED, *more: str) -> Res
 
 
 def clean(result: Result, status: int) -> str:
-    """What was printed, of a command that ended as it should."""
+    """The output of a command that ended with the given exit status."""
     assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
     assert result.exit_code == status, result.output
     assert "Traceback" not in result.output
@@ -43,7 +43,7 @@ def clean(result: Result, status: int) -> str:
 
 
 def refused(result: Result) -> str:
-    """The one line of a command that could do nothing."""
+    """The one line of a command that had nothing to process."""
     clean(result, 2)
     assert result.stdout == ""
     assert len(result.stderr.splitlines()) == 1
@@ -52,37 +52,39 @@ def refused(result: Result) -> str:
 
 @pytest.fixture(scope="module")
 def tuned(tank, tmp_path_factory) -> tuple[str, Path]:
-    """What is said of the tank with its settings as they are, and the folder of its pictures."""
+    """The output for the tank with its true settings, and the folder of its pictures."""
     folder = tmp_path_factory.mktemp("tuned")
-    return clean(asked(folder, tank, STATED, "--out", str(folder / "pictures")), 0), folder / "pictures"
+    return clean(tune_result(folder, tank, STATED, "--out", str(folder / "pictures")), 0), folder / "pictures"
 
 
-def test_play_gets_settings_and_three_pictures(tuned):
-    """A tank with play gets a longer Ti at about its gain, its play within 10 %, a forecast and three pictures."""
+def test_backlash_gets_settings_and_three_pictures(tuned):
+    """A tank with backlash gets a longer Ti at about its gain, its backlash within 10 %, a forecast and three
+    pictures.
+    """
     out, pictures = tuned
     assert "action: retune" in out
     kp, ti = map(float, re.search(r"new settings: kp ([\d.e+]+), ti ([\d.e+]+) s", out).groups())
     assert 0.7 < kp / TANK.kp < 1.4
     assert ti > 5 * TANK.ti
-    play = float(re.search(r"backlash_pct: ([\d.]+)", out)[1])
-    assert play == pytest.approx(TANK.backlash, rel=0.1)
+    width = float(re.search(r"backlash_pct: ([\d.]+)", out)[1])
+    assert width == pytest.approx(TANK.backlash, rel=0.1)
     assert re.search(r"stem travel: .* -\d\d %", out)
     made = {p.name: p.read_bytes() for p in pictures.iterdir()}
     page = made.pop("settings.html").decode()
     assert set(made) == {"limit-cycle.svg", "travel-map.svg", "forecast.svg"}
     assert all(picture.startswith(b"<svg ") for picture in made.values())
-    for name, said in (
+    for name, label in (
         ("limit-cycle", "valve N(A)"),
         ("travel-map", "proposed"),
         ("forecast", "stem, proposed"),
     ):
-        assert f">{said}<" in made[f"{name}.svg"].decode()
+        assert f">{label}<" in made[f"{name}.svg"].decode()
     assert "Try settings" in page
     assert "SIMC" in page
 
 
-def test_settings_typed_in_calm_the_tank(tuned):
-    """On the true tank, under the same load and noise, the proposal takes four fifths of the stem's travel."""
+def test_settings_typed_in_reduce_the_travel_of_the_tank(tuned):
+    """On the true tank, under the same load and noise, the proposal reduces the stem's travel by more than 80 %."""
     kp, ti = map(float, re.search(r"new settings: kp ([\d.e+]+), ti ([\d.e+]+) s", tuned[0]).groups())
     after = simulate(replace(TANK, kp=kp, ti=ti), 4.0)
     before = simulate(TANK, 4.0)
@@ -92,7 +94,7 @@ def test_settings_typed_in_calm_the_tank(tuned):
 
 
 def test_settings_come_in_the_units_stated(tmp_path, tuned):
-    """StatedSettings in minutes, Ti comes in minutes: the same settings as in seconds over sixty."""
+    """If settings are stated in minutes, Ti is given in minutes: the value in seconds over sixty."""
     (tmp_path / "loops.csv").write_text(f"loop,kp,ti,pv_lo,pv_hi,ti_unit\nL,0.9,{40 / 60},0,100,min\n")
     files = [str(tuned[1].parent / "export.parquet"), "--loops", str(tmp_path / "loops.csv")]
     minutes = clean(CliRunner().invoke(main, ["tune", *files, "--loop", "L"]), 0)
@@ -101,32 +103,34 @@ def test_settings_come_in_the_units_stated(tmp_path, tuned):
 
 
 def test_missing_values_change_little(tmp_path, tank):
-    """A minute of NaN inside PV leaves the action and the play's size as they are."""
+    """A minute of NaN in PV changes neither the action nor the width of the backlash."""
     holed = tank.pv.copy()
     holed[100:160] = np.nan
-    out = clean(asked(tmp_path, replace(tank, pv=holed)), 0)
+    out = clean(tune_result(tmp_path, replace(tank, pv=holed)), 0)
     assert "action: retune" in out
     assert float(re.search(r"backlash_pct: ([\d.]+)", out)[1]) == pytest.approx(TANK.backlash, rel=0.1)
 
 
 def test_integral_off_is_an_abstention(tmp_path, tank):
-    """A stated Ti of 0 on a loop that cycles by integral action is told, with the settings OP follows."""
-    out = clean(asked(tmp_path, tank, "0.9,0,0,100", "--out", str(tmp_path / "pictures")), 0)
+    """A stated Ti of 0 for a loop that oscillates by integral action is reported, with the settings that OP
+    follows.
+    """
+    out = clean(tune_result(tmp_path, tank, "0.9,0,0,100", "--out", str(tmp_path / "pictures")), 0)
     assert "action: check settings" in out
     assert "no integral action" in out
     assert re.search(r"recorded about Kp 0\.(89|9|90|91)\d* %/%, Ti (39|40|41)", out)
 
 
 def test_wrong_sign_is_an_abstention(tmp_path, tank):
-    """A gain stated with the wrong sign gets no settings, and its sign is named."""
-    out = clean(asked(tmp_path, tank, "-0.9,40,0,100"), 0)
+    """A gain with the wrong sign gets no settings, and its sign is reported."""
+    out = clean(tune_result(tmp_path, tank, "-0.9,40,0,100"), 0)
     assert "new settings:" not in out
     assert re.search(r"stated Kp -0\.9 %/%, Ti 40 s; recorded about Kp 0\.(89|9|90|91)", out)
 
 
 def test_stale_settings_get_no_advice(tmp_path, tank):
-    """Where loops.csv is stale, no settings, no forecast, and both pairs with their units."""
-    out = clean(asked(tmp_path, tank, "0.45,120,0,100"), 0)
+    """If loops.csv is outdated, there are no settings and no forecast, and both pairs are given with their units."""
+    out = clean(tune_result(tmp_path, tank, "0.45,120,0,100"), 0)
     assert "action: check settings" in out
     assert "stated Kp 0.45 %/%, Ti 120 s" in out
     assert "new settings:" not in out
@@ -134,24 +138,24 @@ def test_stale_settings_get_no_advice(tmp_path, tank):
 
 
 def test_load_is_left_alone(tmp_path):
-    """A loop that a machine swings gets no settings: the load oscillates."""
+    """A loop that a load oscillates gets no settings: the load oscillates."""
     swung = Sketch("load", (1.4, 90.0, 10.0), 0.8, 120.0, load_std=0.3, sine=3.0, sine_s=300.0)
-    out = clean(asked(tmp_path, simulate(swung, 2.0), "0.8,120,0,100"), 0)
+    out = clean(tune_result(tmp_path, simulate(swung, 2.0), "0.8,120,0,100"), 0)
     assert "action: find disturbance" in out
     assert "The load oscillates" in out
     assert "new settings:" not in out
 
 
-def test_healthy_loop_is_left_alone(tmp_path):
-    """A loop without fault and hardly any load gets no settings."""
-    sound = Sketch("none", (1.4, 90.0, 10.0), 0.8, 120.0, load_std=0.02, noise=0.02)
-    out = clean(asked(tmp_path, simulate(sound, 1.0), "0.8,120,0,100"), 0)
+def test_loop_without_fault_gets_no_settings(tmp_path):
+    """A loop without fault and with hardly any load gets no settings."""
+    no_fault = Sketch("none", (1.4, 90.0, 10.0), 0.8, 120.0, load_std=0.02, noise=0.02)
+    out = clean(tune_result(tmp_path, simulate(no_fault, 1.0), "0.8,120,0,100"), 0)
     assert "action: none" in out
     assert "No fault found" in out
 
 
 def flat(n: int, **trends: np.ndarray) -> Trends:
-    """An hour of a loop at 50 %, PV with a little noise, but for the trends given."""
+    """A loop at 50 %, PV with a little noise, with the given trends replaced."""
     rest = np.full(n, 50.0)
     noisy = 50 + 0.05 * np.random.default_rng(0).standard_normal(n)
     return Trends(**{"sp": rest, "pv": noisy, "op": rest, "stem": rest, **trends})
@@ -167,49 +171,48 @@ UNFIT = {
 
 @pytest.mark.parametrize("name", UNFIT)
 def test_unfit_records_are_refused_in_one_line(tmp_path, name):
-    """A record without excitation, at a limit, in manual, empty or too short is refused with what it lacks."""
+    """A record in manual, without PV, or too short is refused with what it lacks."""
     trends, wanted = UNFIT[name]
-    assert wanted in refused(asked(tmp_path, trends))
+    assert wanted in refused(tune_result(tmp_path, trends))
 
 
 def test_op_at_its_limit_is_an_action(tmp_path):
-    """Of a loop whose OP rests at its limit the limit is to be checked; there is no model, and it is said why."""
-    out = clean(asked(tmp_path, flat(N, pv=flat(N).pv - 10, op=np.full(N, 100.0))), 0)
+    """If OP is at its limit, the limit is to be checked; there is no model, and the reason is given."""
+    out = clean(tune_result(tmp_path, flat(N, pv=flat(N).pv - 10, op=np.full(N, 100.0))), 0)
     assert "action: check limit" in out
     assert "needs OP within its limits" in out
     assert "new settings:" not in out
 
 
 def test_compressed_trends_give_no_settings(tmp_path, tank):
-    """Trends on straight segments give no settings, and are asked for uncompressed: a play leaves no recorder in
-    them."""
+    """Trends of straight segments give no settings, and trends without compression are required."""
     at = np.arange(tank.pv.size)
     kept = at[::100]
     thinned = replace(tank, pv=np.interp(at, kept, tank.pv[kept]), op=np.interp(at, kept, tank.op[kept]))
-    out = clean(asked(tmp_path, thinned), 0)
+    out = clean(tune_result(tmp_path, thinned), 0)
     assert "without compression" in out
     assert "action: needs data" in out
     assert "new settings:" not in out
 
 
 def test_dead_time_beyond_the_record_gives_no_settings(tmp_path):
-    """Where PV has not answered OP by the end of the record, no settings are proposed."""
+    """If PV has not responded to OP by the end of the record, no settings are proposed."""
     rng = np.random.default_rng(2)
     op = 50 + np.cumsum(0.05 * rng.standard_normal(1200))
     pv = 50 + 0.05 * rng.standard_normal(1200)
-    result = asked(tmp_path, Trends(np.full(1200, 50.0), pv, op, op))
+    result = tune_result(tmp_path, Trends(np.full(1200, 50.0), pv, op, op))
     assert "new settings:" not in clean(result, result.exit_code)
     assert result.exit_code in (0, 2)
 
 
-def test_unstated_settings_are_asked_for(tmp_path, tank):
-    """Without kp and ti in loops.csv the line asks for both."""
-    assert "no kp and ti in loops.csv" in refused(asked(tmp_path, tank, ",,0,100"))
+def test_unstated_settings_are_requested(tmp_path, tank):
+    """Without kp and ti in loops.csv the line names both."""
+    assert "no kp and ti in loops.csv" in refused(tune_result(tmp_path, tank, ",,0,100"))
 
 
 def test_unknown_loop_names_the_nearest(tmp_path, tank):
-    """A loop that is not there is told with the nearest names."""
-    asked(tmp_path, tank)
+    """A loop that does not exist is reported with the loops that do."""
+    tune_result(tmp_path, tank)
     files = [str(tmp_path / "export.parquet"), "--loops", str(tmp_path / "loops.csv")]
     line = refused(CliRunner().invoke(main, ["tune", *files, "--loop", "LL"]))
     assert "loop LL is not among the 1 loops" in line

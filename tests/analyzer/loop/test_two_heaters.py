@@ -1,5 +1,7 @@
-"""Two heaters side by side, each moved by hand in a random binary sequence while the room drifts: the neighbour is
-named, not the room."""
+"""Two neighbouring heaters, each moved by hand in a random binary sequence while the room temperature drifts.
+
+The neighbour is named, not the room.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,8 @@ from analyzer import api
 STEP_S, HOURS = 4.0, 3.0
 MASS, HEAT, AREA, BETWEEN = 0.004, 500.0, 1e-3, 2e-4
 """Mass [kg], heat capacity [J/(kg K)], surface to the room and between the heaters [m2]."""
-ROOM, BESIDE = 10.0, 24.0
-"""Coefficients of heat transfer to the room and between the heaters [W/(m2 K)], radiation included."""
+ROOM, EXCHANGE = 10.0, 24.0
+"""Coefficients of heat transfer to the room and between the heaters [W/(m2 K)], including radiation."""
 POWER = np.array([0.01, 0.0075])
 """Power of each heater [W/%]."""
 
@@ -27,14 +29,14 @@ def binary(rng: np.random.Generator, n: int, low: float, high: float) -> np.ndar
 
 
 def two_heaters(seed: int, drift: float) -> pd.DataFrame:
-    """Trends of both heaters: lumped energy balances behind a sensor of 18 s, the room drifting [K]."""
+    """Trends of both heaters: lumped energy balances with a sensor lag of 18 s; the room drifts [K]."""
     rng, n = np.random.default_rng(seed), int(HOURS * 3600 / STEP_S)
     op = np.array([binary(rng, n, 20.0, 60.0), binary(rng, n, 10.0, 50.0)])
     room = 23.0 + drift * np.sin(2 * np.pi * 0.8 * np.arange(n) / n + rng.uniform(0, 6))
     hot, seen, pv = np.array([37.0, 32.0]), np.array([37.0, 32.0]), np.empty((2, n))
     for k in range(n):
         for _ in range(4):
-            flow = ROOM * AREA * (room[k] - hot) + BESIDE * BETWEEN * (hot[::-1] - hot) + POWER * op[:, k]
+            flow = ROOM * AREA * (room[k] - hot) + EXCHANGE * BETWEEN * (hot[::-1] - hot) + POWER * op[:, k]
             hot = hot + STEP_S / 4 * flow / (MASS * HEAT)
             seen = seen + STEP_S / 4 * (hot - seen) / 18.0
         pv[:, k] = seen + rng.normal(0.0, 0.12, 2)
@@ -45,8 +47,10 @@ def two_heaters(seed: int, drift: float) -> pd.DataFrame:
 
 @pytest.mark.parametrize("drift", [pytest.param(0.0, marks=pytest.mark.slow), 0.4])
 def test_the_recorded_neighbour_is_named_and_not_the_room(drift: float, tmp_path: Path) -> None:
-    """PV of the first heater follows the second one's OP too: that coupling is named, with its gain, and explains
-    most of what the baseline model leaves."""
+    """PV of the first heater also follows the OP of the second: that coupling is named with its gain.
+
+    It explains most of the residual of the baseline model.
+    """
     two_heaters(5, drift).to_csv(tmp_path / "export.csv", index=False)
     (tmp_path / "loops.csv").write_text(
         "loop,type,pv_lo,pv_hi\nH1,temperature,0,100\nH2,temperature,0,100\n", "utf-8"
@@ -55,6 +59,6 @@ def test_the_recorded_neighbour_is_named_and_not_the_room(drift: float, tmp_path
     first = found["effects"][0]
     assert found["verdict"] == "coupling"
     assert first["held_out_share"] > 0.8
-    own, across = ROOM * AREA, BESIDE * BETWEEN
-    ratio = POWER[1] / POWER[0] * across / (own + across)  # of both steady gains, from the energy balances
+    own, across = ROOM * AREA, EXCHANGE * BETWEEN
+    ratio = POWER[1] / POWER[0] * across / (own + across)  # of both static gains, from the energy balances
     assert first["parameters"]["coupling_gain"]["value"] == pytest.approx(ratio, rel=0.15)

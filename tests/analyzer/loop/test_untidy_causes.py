@@ -1,4 +1,4 @@
-"""Causes of untidy loops, drawn by a generator that shares no code with the analysis."""
+"""Causes of irregular loops, drawn by a generator that shares no code with the analysis."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from proofs.untidy_loops import recorded
 
 
 def verdict_of(sp: np.ndarray, pv: np.ndarray, op: np.ndarray, step_s: float, kind: str) -> str:
-    """The cause named."""
+    """The cause that is named."""
     stamp = START_S + step_s * np.arange(pv.size)
     trends = {f"L.{name}": series(stamp, x) for name, x in (("SP", sp), ("PV", pv), ("OP", op))}
     ready = prepare(spec("L"), trends, CONFIG.quality)
@@ -29,8 +29,10 @@ def verdict_of(sp: np.ndarray, pv: np.ndarray, op: np.ndarray, step_s: float, ki
 
 
 @cache
-def said(cause: str, loops: int = 12) -> Counter[str]:
-    """Causes named of so many loops of that cause whose error plainly swings with it, trends not compressed."""
+def causes_of(cause: str, loops: int = 12) -> Counter[str]:
+    """Causes named for `loops` loops of that cause whose error clearly oscillates because of it, without
+    compression.
+    """
     found: Counter[str] = Counter()
     seed = 0
     while found.total() < loops:
@@ -46,38 +48,40 @@ def said(cause: str, loops: int = 12) -> Counter[str]:
 
 
 @pytest.mark.parametrize("cause", ["healthy", "tuning"])
-def test_no_valve_is_blamed_where_valves_move_freely(cause):
-    """Of twelve healthy loops, and twelve that their tuning swings, no valve is blamed."""
-    assert said(cause)["valve"] == 0
+def test_no_valve_is_the_cause_if_valves_move_freely(cause):
+    """Of twelve loops without fault, and twelve that their tuning oscillates, no valve is the cause."""
+    assert causes_of(cause)["valve"] == 0
 
 
-def test_periodic_loads_that_wander_are_seldom_called_tuning():
-    """Of twelve loops with periodic loads, square and wandering ones too, half are told, at most two wrongly."""
-    found = said("load")
+def test_periodic_loads_that_drift_are_rarely_called_tuning():
+    """Of twelve loops with periodic loads, including square and drifting ones, at least half are found, at most two
+    wrongly.
+    """
+    found = causes_of("load")
     assert found["load"] >= 6
     assert found["tuning"] + found["valve"] <= 2
 
 
-def test_loops_that_their_tuning_swings_are_told():
-    """Of twelve loops that their own tuning swings at least eight are told so."""
-    assert said("tuning")["tuning"] >= 8
+def test_loops_that_their_tuning_oscillates_are_found():
+    """Of twelve loops that their own tuning oscillates, at least eight are found."""
+    assert causes_of("tuning")["tuning"] >= 8
 
 
 @pytest.mark.slow
 @pytest.mark.chaotic
-def test_sticking_valves_are_told():
-    """Of twelve loops with valves of LuGre friction at least five are told so."""
-    assert said("stiction")["valve"] >= 5
+def test_sticking_valves_are_found():
+    """Of twelve loops with valves of LuGre friction, at least five are found."""
+    assert causes_of("stiction")["valve"] >= 5
 
 
-def test_what_a_coarse_grid_does_is_not_blamed_on_the_valve():
-    """A sound loop whose PV stands on a grid as it would behind a play is not blamed."""
+def test_the_effect_of_a_coarse_grid_is_no_valve_fault():
+    """A loop without fault whose PV is constant on a coarse grid, as after backlash, has no cause."""
     drawn = draw(400_263)
     assert verdict_of(drawn.sp, drawn.pv, drawn.op, drawn.step_s, drawn.kind) == "none"
 
 
-def test_a_play_of_many_steps_of_the_grid_is_still_found():
-    """A play that holds PV still for sixty steps of its grid is blamed as without one."""
+def test_a_backlash_of_many_steps_of_the_grid_is_still_found():
+    """A backlash that keeps PV constant for sixty steps of its grid is found as the cause."""
     rng = np.random.default_rng(1)
     n, plant = 1200, Plant(1.5, 20.0, 0.0, 3.0, False, 1.2, 20.0, 1.0)
     sp = 50 + 9.2 * ((np.arange(n) // 150) % 2)
@@ -86,21 +90,28 @@ def test_a_play_of_many_steps_of_the_grid_is_still_found():
     assert verdict_of(sp, rounded(pv, 0.3), op, 1.0, "") == "valve"
 
 
-@pytest.mark.parametrize(("seed", "told"), [(1503739, "tuning"), (1503856, "tuning"), (1503904, "undecided")])
-def test_a_tuning_is_told_on_a_grid_of_two_steps_an_amplitude(seed, told):
-    """Of loops that their tuning swings by 1.5 steps of PV's grid and more the tuning is told where settings
-    are known and eight rows a cycle show the ringing; nothing else is told of the others."""
+@pytest.mark.parametrize(
+    ("seed", "expected"), [(1503739, "tuning"), (1503856, "tuning"), (1503904, "undecided")]
+)
+def test_a_tuning_is_found_on_a_grid_of_two_steps_an_amplitude(seed, expected):
+    """For loops that their tuning oscillates by at least 1.5 steps of PV's grid, the tuning is found if settings are
+    known and eight rows a cycle show the ringing.
+
+    Otherwise the cause is undecided.
+    """
     drawn = draw(seed)
     ready, stated = recorded(drawn, CONFIG)
     found = detect(ready.record, CONFIG.oscillation)
     assert counting(found).amplitude_pct < 3.0 * ready.pv_step
     assert drawn.truth["cause"] == "tuning"
-    assert cause_of(ready, found, stated, CONFIG, drawn.kind).cause == told
+    assert cause_of(ready, found, stated, CONFIG, drawn.kind).cause == expected
 
 
-def test_a_cycle_short_of_regular_counts_where_its_valve_is_convicted():
-    """A sticking valve's irregular cycle, which noise of its spectrum would show too, is found by what OP tells: in
-    three of six draws at least, whose friction carries rounding on, and for another cause in one at most."""
+def test_an_irregular_cycle_counts_if_its_valve_is_faulty():
+    """The irregular cycle of a sticking valve, which noise of the same spectrum would also show, is found by OP.
+
+    It is found in at least three of six draws, and another cause is named in at most one.
+    """
     causes = []
     for seed in (1504021, 1504052, 1504055, 1504060, 1504084, 1504119):
         drawn = draw(seed, "stiction")
@@ -113,8 +124,10 @@ def test_a_cycle_short_of_regular_counts_where_its_valve_is_convicted():
     assert len(causes) - causes.count("valve") <= 1
 
 
-def test_a_healthy_loop_s_near_cycle_counts_for_nothing():
-    """Of healthy loops, their limits of shape lowered by two doublings, none oscillates for its valve."""
+def test_a_nearly_regular_cycle_without_fault_does_not_count():
+    """With limits of shape lowered by a factor of four, no loop without fault is found to oscillate because of its
+    valve.
+    """
     eager = replace(CONFIG, oscillation=replace(CONFIG.oscillation, near=2.0))
     looked = 0
     for seed in range(80_000, 80_040):
@@ -128,13 +141,15 @@ def test_a_healthy_loop_s_near_cycle_counts_for_nothing():
 
 
 @pytest.mark.parametrize("seed", [1508212, 1509512, 1600279, 1800233])
-def test_no_valve_is_blamed_for_a_coarse_grid_in_a_calm_loop(seed):
-    """In calm healthy loops whose PV covers one to five steps of its grid, no valve is told."""
+def test_a_coarse_grid_in_a_steady_loop_is_no_valve_fault(seed):
+    """In loops without fault and without oscillation whose PV covers one to five steps of its grid, no valve fault is
+    reported.
+    """
     drawn = draw(seed)
     ready, stated = recorded(drawn, CONFIG)
-    found, said = with_valve_oscillation(
+    found, verdict = with_valve_oscillation(
         ready, detect(ready.record, CONFIG.oscillation), stated, CONFIG, drawn.kind
     )
     assert drawn.truth["cause"] == "healthy"
     assert counting(found) is None
-    assert said.cause == "none"
+    assert verdict.cause == "none"
