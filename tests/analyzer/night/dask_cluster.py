@@ -1,4 +1,4 @@
-"""A Dask scheduler and workers of one thread each, processes over TCP on loopback."""
+"""A Dask scheduler and workers of one thread each, as processes over TCP on loopback."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 
 Process = subprocess.Popen[bytes]
 TRIES, PAUSE_S = 400, 0.05
-"""How often the scheduler is looked for, and how long after each look [s]."""
+"""Number of attempts to find the scheduler, and the pause after each one [s]."""
 
 
 def _process(*arguments: str) -> Process:
@@ -23,14 +23,16 @@ def _process(*arguments: str) -> Process:
 
 @contextmanager
 def dask_cluster(folder: Path, workers: int = 2) -> Iterator[tuple[str, list[Process]]]:
-    """The address of a scheduler and its workers, which end with the block; `folder` holds what they write."""
+    """The address of a scheduler and its workers, which end with the block; `folder` contains the files that they
+    write.
+    """
     with whole_cluster(folder, workers) as (address, parts):
         yield address, parts[1:]
 
 
 @contextmanager
 def whole_cluster(folder: Path, workers: int = 2) -> Iterator[tuple[str, list[Process]]]:
-    """The same with the scheduler before its workers."""
+    """The same, with the scheduler before its workers in the list."""
     written, local = folder / "scheduler.json", ("--host", "127.0.0.1")
     quiet = ("--no-dashboard", "--scheduler-file", str(written))
     parts = [_process("dask_scheduler", *local, "--port", "0", *quiet)]

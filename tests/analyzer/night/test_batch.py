@@ -1,4 +1,4 @@
-"""A night over many loops: whole, in pieces, stopped and gone on with."""
+"""A night over many loops: in one run, in pieces, and stopped and resumed."""
 
 from __future__ import annotations
 
@@ -27,32 +27,32 @@ from identification.errors import InputError
 from proofs.plant import CONFIG, START_S, Sketch, Trends, simulate, write_export
 
 LOOPS, CYCLING = 24, (0, 16)
-"""Loops, and which of them cycle."""
+"""Number of loops, and the loops that oscillate."""
 BROKEN = "L17"
 DAY = 86400.0
 
 
 def quiet(seed: int, n: int) -> Trends:
-    """A loop in noise whose controller moves OP a little, shape (n,) each."""
+    """A loop with noise whose controller moves OP a little, shape (n,) each."""
     rng = np.random.default_rng(seed)
     pv = 50 + np.convolve(rng.standard_normal(n + 9), np.ones(10) / 10, mode="valid")
     return Trends(np.full(n, 50.0), pv, 50 - 0.5 * (pv - 50), np.full(n, 50.0))
 
 
 def at_rest(seed: int, n: int) -> Trends:
-    """A loop in noise whose OP is at rest, which costs no fit, shape (n,) each."""
+    """A loop with noise whose OP is constant, which needs no fit, shape (n,) each."""
     made = quiet(seed, n)
     return Trends(made.sp, made.pv, np.full(n, 50.0), made.stem)
 
 
 def cycling(seed: int) -> Trends:
-    """A quarter of an hour of a fast level loop with play."""
+    """A quarter of an hour of a fast level loop with backlash."""
     return simulate(Sketch("valve", (80.0, 200.0, 1.0), 1.0, 10.0, backlash=1.0, load_std=0.1), 0.25, seed)
 
 
 @pytest.fixture(scope="module")
 def night(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An export of 24 loops, two of them cycling, one without a single good PV."""
+    """An export of 24 loops: two oscillate, and one has no good PV."""
     made = {k: cycling(k) if k in CYCLING else (at_rest if k % 4 else quiet)(k, 900) for k in range(LOOPS)}
     loops = {f"L{k:02d}": trends for k, trends in made.items()}
     broken = loops[BROKEN]
@@ -85,13 +85,13 @@ def whole(night: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return store
 
 
-def test_one_broken_loop_costs_one_loop(night, tmp_path):
+def test_one_broken_loop_loses_one_loop_only(night, tmp_path):
     """A night with one loop without data among 24 gives 23 results and one reason, on stderr and in the store."""
     store = tmp_path / "store"
     result = CliRunner().invoke(main, ["run", str(night), "--store", str(store), "--jobs", "2"])
     assert result.exit_code == 0
-    told = [line for line in result.stderr.splitlines() if line.startswith(BROKEN)]
-    assert told == [f"{BROKEN}: needs PV samples, has none that is good"]
+    lines = [line for line in result.stderr.splitlines() if line.startswith(BROKEN)]
+    assert lines == [f"{BROKEN}: needs PV samples, has none that is good"]
     assert "23 of 24 loops assessed" in result.stderr
     rows = Store(store).read("nights", Store(store).require()).to_pylist()
     assert [r["loop"] for r in rows] == [f"L{k:02d}" for k in range(LOOPS)]
@@ -102,7 +102,7 @@ def test_one_broken_loop_costs_one_loop(night, tmp_path):
 
 
 def test_an_error_of_one_loop_is_its_result(night, tmp_path, monkeypatch):
-    """Whatever goes wrong inside one loop's assessment is that loop's reason and nobody else's."""
+    """An error in the assessment of one loop is the reason of that loop only."""
 
     def fails(prepared, *rest):
         if prepared.record.tag == "L03":
@@ -118,7 +118,7 @@ def test_an_error_of_one_loop_is_its_result(night, tmp_path, monkeypatch):
 
 
 def test_every_cell_is_a_number_or_empty(whole):
-    """No NaN reaches a store: what is not known is empty."""
+    """No NaN is written into a store: unknown values are empty."""
     for name, rows in tables(whole).items():
         for row in rows:
             for column, value in row.items():
@@ -126,7 +126,7 @@ def test_every_cell_is_a_number_or_empty(whole):
 
 
 def test_a_row_has_all_columns_and_the_cycling_loops_are_found(whole):
-    """The loops with play are found with their cause; those in noise have none."""
+    """The loops with backlash are found with their cause; the loops with noise have none."""
     rows = Store(whole).read("nights", Store(whole).require()).to_pylist()
     assert tuple(rows[0]) == names(NIGHTS)
     causes = {r["loop"]: r["cause"] for r in rows if r["status"] == "ok"}
@@ -135,7 +135,7 @@ def test_a_row_has_all_columns_and_the_cycling_loops_are_found(whole):
 
 
 def stopped(night: Path, store: Path, chunks: int) -> None:
-    """A run that is killed when it begins with the next chunk after so many."""
+    """A run that is killed at the start of the chunk after `chunks` chunks."""
     done: list[str] = []
     work = chunk.work
 
@@ -152,8 +152,8 @@ def stopped(night: Path, store: Path, chunks: int) -> None:
             batch.run(Plant(export, specs, CONFIG), Store(store))
 
 
-def test_a_stopped_run_goes_on_where_it_stood(night, whole, tmp_path, monkeypatch):
-    """Half the chunks, then --resume: the loops left are worked on, and the store is that of one whole run."""
+def test_a_stopped_run_continues_at_the_same_place(night, whole, tmp_path, monkeypatch):
+    """After half the chunks, --resume assesses the other loops, and the store is that of one complete run."""
     store = tmp_path / "store"
     stopped(night, store, 2)
     assert Store(store).nights() == []
@@ -167,8 +167,8 @@ def test_a_stopped_run_goes_on_where_it_stood(night, whole, tmp_path, monkeypatc
     assert Store(store).begun() == []
 
 
-def test_a_chunk_stopped_half_written_is_not_kept_twice(night, whole, tmp_path):
-    """A run killed between the pieces of one chunk goes on with that chunk and keeps its hours once."""
+def test_a_chunk_stopped_half_written_is_not_stored_twice(night, whole, tmp_path):
+    """A run killed between the pieces of one chunk continues with that chunk and stores its hours once."""
     store = tmp_path / "store"
     export, specs = opened(night)
     write, written = chunk.write_table, []
@@ -188,8 +188,8 @@ def test_a_chunk_stopped_half_written_is_not_kept_twice(night, whole, tmp_path):
     assert tables(store) == tables(whole)
 
 
-def test_a_run_that_other_code_began_is_not_gone_on_with(night, tmp_path, monkeypatch):
-    """Pieces of a run stopped before an update are refused in one line, and a run without --resume begins."""
+def test_a_run_of_other_code_is_not_continued(night, tmp_path, monkeypatch):
+    """Pieces of a run that was stopped before an update are refused in one line; a run without --resume starts."""
     export, specs = opened(night)
     mine, kept = Plant(export, specs[:4], CONFIG), Store(tmp_path / "store")
     kept.run_file.parent.mkdir(parents=True, exist_ok=True)
@@ -202,16 +202,16 @@ def test_a_run_that_other_code_began_is_not_gone_on_with(night, tmp_path, monkey
     assert kept.nights() == ["2026-03-02"]
 
 
-def test_without_resume_a_run_starts_anew(night, whole, tmp_path):
-    """Pieces of an older run are forgotten where --resume is not given."""
+def test_without_resume_a_run_starts_again(night, whole, tmp_path):
+    """Pieces of an older run are deleted without --resume."""
     store = tmp_path / "store"
     stopped(night, store, 1)
     CliRunner().invoke(main, ["run", str(night), "--store", str(store), "--jobs", "2"])
     assert tables(store) == tables(whole)
 
 
-def test_two_processes_give_what_one_gives(night, whole, tmp_path):
-    """A pool of two workers writes the same store as one process."""
+def test_two_processes_give_the_result_of_one(night, whole, tmp_path):
+    """Two workers write the same store as one process."""
     export, specs = opened(night)
     store = tmp_path / "store"
     batch.run(Plant(export, specs, CONFIG), Store(store), jobs=2)
@@ -219,8 +219,10 @@ def test_two_processes_give_what_one_gives(night, whole, tmp_path):
 
 
 def test_a_night_put_together_in_small_parts_is_the_same(night, whole, tmp_path, monkeypatch):
-    """Tables that are read and written three loops at a time have the rows of tables in one part, and of some loops
-    the same are read."""
+    """Tables that are read and written three loops at a time have the rows of tables in one part.
+
+    Reading some loops gives the same rows.
+    """
     monkeypatch.setattr(finish, "CHUNKS_AT_ONCE", 1)
     monkeypatch.setattr(finish, "LOOPS_AT_ONCE", 3)
     monkeypatch.setattr(believed, "LOOPS_AT_ONCE", 7)
@@ -239,49 +241,51 @@ def test_a_night_put_together_in_small_parts_is_the_same(night, whole, tmp_path,
 
 
 def test_progress_counts_all_loops(night, tmp_path):
-    """Progress runs from nothing to all loops."""
+    """Progress goes from zero to all loops."""
     export, specs = opened(night)
-    said: list[tuple[int, int]] = []
+    reported: list[tuple[int, int]] = []
     batch.run(
         Plant(export, specs[:20], CONFIG),
         Store(tmp_path / "s"),
-        progress=lambda d, t: said.append((d, t)),
+        progress=lambda d, t: reported.append((d, t)),
     )
-    assert said == [(k, 20) for k in range(0, 21, 4)]
+    assert reported == [(k, 20) for k in range(0, 21, 4)]
 
 
-def test_progress_counts_loops_of_chunks_in_hand(night, tmp_path):
-    """With worker processes progress never falls, ends with all loops, and tells of loops within a chunk."""
+def test_progress_counts_loops_of_chunks_in_progress(night, tmp_path):
+    """With worker processes progress never decreases, ends with all loops, and counts loops within a chunk."""
     export, specs = opened(night)
-    said = []
+    reported = []
     plant = Plant(export, specs, CONFIG)
-    batch.run(plant, Store(tmp_path / "s"), 1, progress=lambda done, of: said.append((done, of)))
-    counts = [done for done, _ in said]
+    batch.run(plant, Store(tmp_path / "s"), 1, progress=lambda done, of: reported.append((done, of)))
+    counts = [done for done, _ in reported]
     assert counts == sorted(counts)
-    assert said[0] == (0, LOOPS)
-    assert said[-1] == (LOOPS, LOOPS)
+    assert reported[0] == (0, LOOPS)
+    assert reported[-1] == (LOOPS, LOOPS)
     assert any(done % batch.chunk_size(LOOPS) for done in counts)
 
 
-def test_a_run_says_at_once_that_it_has_begun_and_what_takes_long(capsys, monkeypatch):
-    """A list of tenths begins with none, says once that a first run compiles where nothing is done for long, and how
-    far it is where nothing new is done for a minute."""
-    told = options._tenths("loops")
-    told(0, 40)
+def test_a_run_reports_its_start_and_long_steps(capsys, monkeypatch):
+    """The progress lines begin with zero, and say once that a first run compiles if nothing is done for long.
+
+    If nothing new is done for a minute, the progress is repeated.
+    """
+    progress = options._tenths("loops")
+    progress(0, 40)
     monkeypatch.setattr(options, "COMPILING_S", -1.0)
     for done in (0, 0, 3, 4, 4, 40):
-        told(done, 40)
+        progress(done, 40)
     lines = capsys.readouterr().err.splitlines()
     assert lines[0] == "loops: 0 of 40"
     assert "compiles" in lines[1]
     assert lines[2:] == ["loops: 4 of 40", "loops: 40 of 40"]
     monkeypatch.setattr(options, "STILL_S", -1.0)
-    told(40, 40)
+    progress(40, 40)
     assert capsys.readouterr().err.startswith("loops: 40 of 40 after ")
 
 
 def test_a_run_begins_with_a_line_before_it_reads(tmp_path):
-    """What is read stands on stderr before anything that takes long is imported, without a numerical package."""
+    """The first line on stderr names the input before any numerical package is imported."""
     export, seen = tmp_path / "day.csv", tmp_path / "seen"
     export.write_text("timestamp,FIC1.PV\n")
     show = f"""
@@ -296,8 +300,8 @@ def watched(what):
 run.watched = watched
 analyzer.cli.main()
 """
-    told = [sys.executable, "-c", show, "run", str(export), "--store", str(tmp_path / "store")]
-    subprocess.run(told, capture_output=True, check=False)
+    arguments = [sys.executable, "-c", show, "run", str(export), "--store", str(tmp_path / "store")]
+    subprocess.run(arguments, capture_output=True, check=False)
     what, heavy = seen.read_text().split("|")
     assert what == f"reading {export}"
     assert heavy == "[]"
@@ -305,7 +309,7 @@ analyzer.cli.main()
 
 @pytest.mark.slow
 def test_two_weeks_are_fourteen_nights(tmp_path):
-    """An export of two weeks is cut at midnights into 14 nights, each with all loops and 24 hours."""
+    """An export of two weeks is divided at midnight into 14 nights, each with all loops and 24 hours."""
     n = 14 * 1440
     loops = {f"L{k}": quiet(k, n) for k in range(2)}
     path = write_export(tmp_path / "weeks.parquet", loops, dt_s=60.0)
@@ -321,7 +325,7 @@ def test_two_weeks_are_fourteen_nights(tmp_path):
 
 
 def test_since_and_until_choose_days(tmp_path):
-    """With --since and --until only the days between are assessed."""
+    """With --since and --until only the days between them are assessed."""
     path = write_export(tmp_path / "weeks.parquet", {"L0": quiet(0, 14 * 1440)}, dt_s=60.0)
     arguments = ["--since", "2026-03-05", "--until", "2026-03-08"]
     CliRunner().invoke(main, ["run", str(path), "--store", str(tmp_path / "store"), *arguments])
@@ -329,7 +333,7 @@ def test_since_and_until_choose_days(tmp_path):
 
 
 def test_recordings_of_different_days_are_one_night(tmp_path):
-    """A folder of short recordings of different days is ranked as one night, each assessed whole."""
+    """Short recordings of different days in a folder are one night, and each one is assessed completely."""
     for k in range(3):
         write_export(tmp_path / f"{k}.parquet", {f"L{k}": quiet(k, 7200)}, START_S + 9 * DAY * k)
     result = CliRunner().invoke(main, ["run", str(tmp_path), "--store", str(tmp_path / "store")])
@@ -341,8 +345,8 @@ def test_recordings_of_different_days_are_one_night(tmp_path):
     assert [r["start_s"] for r in rows] == [START_S + 9 * DAY * k for k in range(3)]
 
 
-def test_the_last_night_is_read_while_another_is_worked_on(night, whole, tmp_path):
-    """Pieces of a night that is being worked on are no night yet."""
+def test_a_night_in_progress_is_not_read(night, whole, tmp_path):
+    """Pieces of a night in progress are not yet a night."""
     store = Store(tmp_path / "store")
     stopped(night, store.path, 1)
     assert store.nights() == []
@@ -371,7 +375,7 @@ print(json.dumps(peak))
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no resource module")
 def test_memory_does_not_grow_with_the_number_of_loops(tmp_path):
-    """Sixty loops of 24 h, 140 MB of samples, take no more than 1.3 times the memory of the first fifteen."""
+    """Sixty loops of 24 h, 140 MB of samples, need at most 1.3 times the memory of the first fifteen."""
     n = 86_400
     stamp = np.round((START_S + np.arange(n)) * 1e6).astype("datetime64[us]")
     columns: dict[str, object] = {"timestamp": pa.array(stamp)}

@@ -1,4 +1,4 @@
-"""What `check` says a record is fit for is what `run` makes of it."""
+"""The questions that a record is fit for according to `check` are those that `run` answers."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ FLOW = Sketch("none", (1.1, 12.0, 4.0), 0.3, 20.0, kind="flow")
 
 
 @pytest.mark.parametrize(
-    ("columns", "every", "lack", "said"),
+    ("columns", "every", "lack", "text"),
     [
         ("L,0.3,20,0,100", 1, None, "fit for all questions"),
         ("L,0.3,20,0,10000", 1, "OP's range", "fit for all but new settings: OP runs from"),
     ],
 )
-def test_check_and_run_judge_alike(tmp_path, columns, every, lack, said):
-    """A record that a run lacks something of is not fit for all questions, and in the same words."""
+def test_check_and_run_agree(tmp_path, columns, every, lack, text):
+    """A record that lacks something for `run` is not fit for all questions in `check`, with the same words."""
     trends = simulate(FLOW, 8.0)
     thin = type(trends)(*(getattr(trends, n)[::every] for n in ("sp", "pv", "op", "stem")))
     export = write_export(tmp_path / "x.parquet", {"L": thin}, dt_s=every)
@@ -29,12 +29,12 @@ def test_check_and_run_judge_alike(tmp_path, columns, every, lack, said):
     loops.write_text(f"loop,kp,ti,op_lo,op_hi\n{columns}\n")
     arguments = [str(export), "--loops", str(loops)]
     checked = CliRunner().invoke(main, ["check", *arguments], catch_exceptions=False).output
-    assert said in checked
+    assert text in checked
     done = CliRunner().invoke(
         main, ["run", *arguments, "--store", store, "--jobs", "1"], catch_exceptions=False
     )
     assert done.exit_code == 0, done.output
     (row,) = json.loads(CliRunner().invoke(main, ["rank", store, "--format", "json"]).output)
-    needs = said.split(": ")[-1]
+    needs = text.split(": ")[-1]
     assert (needs in row["reason"]) == (lack is not None)
     assert (row["action"] == "needs data") == (lack is not None)

@@ -1,4 +1,4 @@
-"""The batch on a Dask cluster, a scheduler and workers as processes over TCP: the same store to the cell."""
+"""The batch on a Dask cluster, with a scheduler and workers as processes over TCP, gives exactly the same store."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ LOOPS = 24
 
 @pytest.fixture(scope="module")
 def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """24 quiet loops of an hour."""
+    """24 loops of an hour that do not oscillate."""
     loops = {f"L{k:02d}": quiet(k, 3600) for k in range(LOOPS)}
     return write_export(tmp_path_factory.mktemp("cluster") / "night.parquet", loops)
 
 
 @pytest.fixture(scope="module")
 def whole(export: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[dict[str, object]]]:
-    """What a run of this machine alone keeps."""
+    """The tables of a run on this machine only."""
     store = tmp_path_factory.mktemp("whole") / "store"
     assert ran(export, store).exit_code == 0
     return tables(store)
@@ -51,15 +51,17 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[Process]]]:
 
 
 def test_a_cluster_makes_the_same_store(export, whole, cluster, tmp_path):
-    """Two workers over TCP keep what one process keeps, cell by cell."""
+    """Two workers over TCP store the same tables as one process, cell by cell."""
     address, _ = cluster
     result = ran(export, tmp_path / "store", "--scheduler", address)
     assert result.exit_code == 0, result.output
     assert tables(tmp_path / "store") == whole
 
 
-def test_a_worker_killed_in_mid_run_costs_no_loop(export, whole, cluster, tmp_path):
-    """With kill -9 of one of two workers once a piece is written, the other does its loops: the store is the same."""
+def test_a_worker_killed_during_the_run_loses_no_loop(export, whole, cluster, tmp_path):
+    """If one of two workers is killed with kill -9 during the run, the other assesses its loops: the store is the
+    same.
+    """
     address, workers = cluster
     store = tmp_path / "store"
     command = [sys.executable, "-m", "analyzer.cli", "run", str(export), "--store", str(store)]
@@ -67,35 +69,38 @@ def test_a_worker_killed_in_mid_run_costs_no_loop(export, whole, cluster, tmp_pa
         while run.poll() is None and not list(store.glob("parts/*/nights-*.parquet")):
             time.sleep(0.005)
         os.kill(workers[0].pid, signal.SIGKILL)
-        _, said = run.communicate(timeout=120)
-    assert run.returncode == 0, said
+        _, output = run.communicate(timeout=120)
+    assert run.returncode == 0, output
     assert tables(store) == whole
 
 
 @pytest.mark.slow
 def test_a_scheduler_that_dies_is_one_line(export, whole, tmp_path):
-    """With kill -9 of the scheduler in mid-run the run ends with exit 2 and a last line that names it and --resume,
-    and so gone on with on this machine it makes the store of an undisturbed run."""
+    """If the scheduler is killed with kill -9 during the run, the run ends with exit 2 and a last line that names it
+    and --resume.
+
+    The resumed run on this machine gives the store of an undisturbed run.
+    """
     store = tmp_path / "store"
     command = [sys.executable, "-m", "analyzer.cli", "run", str(export), "--store", str(store)]
     with contextlib.ExitStack() as held:
         address, parts = held.enter_context(whole_cluster(tmp_path))
-        asked = [*command, "--scheduler", address]
-        run = held.enter_context(subprocess.Popen(asked, stderr=subprocess.PIPE, text=True))
+        arguments = [*command, "--scheduler", address]
+        run = held.enter_context(subprocess.Popen(arguments, stderr=subprocess.PIPE, text=True))
         while run.poll() is None and not list(store.glob("parts/*/nights-*.parquet")):
             time.sleep(0.005)
         os.kill(parts[0].pid, signal.SIGKILL)
-        _, said = run.communicate(timeout=120)
-    assert run.returncode == 2, said
-    assert "Traceback" not in said
-    assert address in said.splitlines()[-1]
-    assert "--resume" in said.splitlines()[-1]
+        _, output = run.communicate(timeout=120)
+    assert run.returncode == 2, output
+    assert "Traceback" not in output
+    assert address in output.splitlines()[-1]
+    assert "--resume" in output.splitlines()[-1]
     assert ran(export, store, "--resume").exit_code == 0
     assert tables(store) == whole
 
 
 def test_no_scheduler_is_one_line(export, tmp_path):
-    """An address at which nothing answers is told before anything is computed."""
+    """An address without a scheduler is reported before anything is computed."""
     result = ran(export, tmp_path / "store", "--scheduler", "tcp://127.0.0.1:9")
     assert result.exit_code == 2
     assert "no scheduler responds" in result.stderr

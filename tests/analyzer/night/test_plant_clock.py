@@ -1,4 +1,4 @@
-"""Nights are the plant's days, through both clock changes; times given without a zone are the plant's."""
+"""Nights are the days of the plant, also across both clock changes; times without a zone are those of the plant."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def at(text: str) -> float:
 
 @pytest.mark.parametrize(("first", "hours"), [("2026-03-28T22:00", [23, 24]), ("2026-10-24T21:00", [25, 24])])
 def test_a_local_day_is_one_night_through_both_clock_changes(first: str, hours: list[int]) -> None:
-    """The Sundays on which Helsinki's clock changes are one night each, of 23 and 25 hours, named by their date."""
+    """The Sundays of the clock changes in Helsinki are one night each, of 23 and 25 hours, named by their date."""
     start = at(first)
     found = in_nights([(start, start + 3600.0 * sum(hours) - 1.0)], Config().nights, HELSINKI)
     assert [round((n.last_s - n.first_s) / 3600) for n in found] == hours
@@ -50,20 +50,20 @@ def test_utc_is_the_default() -> None:
     ("text", "utc"),
     [("2026-07-01 08:00", "2026-07-01T05:00"), ("2026-01-01 08:00", "2026-01-01T06:00")],
 )
-def test_times_without_a_zone_are_the_plants(text: str, utc: str) -> None:
-    """08:00 in changes.csv is 05:00 UTC in summer and 06:00 in winter; a time with a zone is what it says."""
+def test_times_without_a_zone_are_those_of_the_plant(text: str, utc: str) -> None:
+    """08:00 in changes.csv is 05:00 UTC in summer and 06:00 in winter; a time with a zone keeps its zone."""
     assert parse_time(text, "here", HELSINKI) == at(utc)
     assert parse_time(text + "Z", "here", HELSINKI) == at(text.replace(" ", "T"))
 
 
 def test_an_unknown_zone_is_one_line() -> None:
-    """A zone that does not exist is told with an example."""
+    """A zone that does not exist is reported with an example."""
     with pytest.raises(InputError, match="Europe/Berlin"):
         plant_clock.zone_of("Europe/Nowhere")
 
 
 def test_a_notebook_has_the_plants_nights_and_times(tmp_path: Path) -> None:
-    """`read(timezone=...)` cuts at the midnights that `run --timezone` cuts at, and reads changes on that clock."""
+    """`read(timezone=...)` divides at the same midnights as `run --timezone`, and reads changes in that zone."""
     start = at("2026-07-01T00:00")
     stamp = (start + 60.0 * np.arange(2880)) * 1e6
     table = {"timestamp": pa.array(stamp.astype("int64"), pa.timestamp("us", tz="UTC"))}
@@ -77,14 +77,16 @@ def test_a_notebook_has_the_plants_nights_and_times(tmp_path: Path) -> None:
     assert [c.time_s for c in plant.changes] == [at("2026-07-02T05:00")]
 
 
-def test_a_notebook_is_refused_what_only_commands_take(tmp_path: Path) -> None:
-    """`read` takes no span of time, and says so in place of leaving it aside."""
+def test_read_refuses_options_of_commands(tmp_path: Path) -> None:
+    """`read` takes no span of time, and raises an error instead of ignoring it."""
     with pytest.raises(TypeError, match="since"):
         read(tmp_path / "export.parquet", since="2026-07-01")
 
 
 def test_the_store_and_its_pages_keep_the_zone(tmp_path: Path) -> None:
-    """`run --timezone` cuts at the plant's midnight, --since is the plant's, and the page's axis has that zone."""
+    """`run --timezone` divides at the midnight of the plant, --since is in the zone of the plant, and the page uses
+    that zone.
+    """
     start = at("2026-07-01T00:00")
     n = 86400 // 10
     stamp = (start + 10.0 * np.arange(n)) * 1e6
@@ -92,7 +94,7 @@ def test_the_store_and_its_pages_keep_the_zone(tmp_path: Path) -> None:
     table = {"timestamp": pa.array(stamp.astype("int64"), pa.timestamp("us", tz="UTC"))}
     table |= {f"FIC1.{r}": pa.array(50 + rng.normal(size=n)) for r in ("SP", "PV", "OP")}
     pq.write_table(pa.table(table), tmp_path / "export.parquet")
-    asked = [
+    arguments = [
         "run",
         str(tmp_path / "export.parquet"),
         "--store",
@@ -100,7 +102,9 @@ def test_the_store_and_its_pages_keep_the_zone(tmp_path: Path) -> None:
         "--timezone",
         HELSINKI,
     ]
-    result = CliRunner().invoke(main, [*asked, "--since", "2026-07-01T12:00", "--until", "2026-07-01T20:00"])
+    result = CliRunner().invoke(
+        main, [*arguments, "--since", "2026-07-01T12:00", "--until", "2026-07-01T20:00"]
+    )
     assert result.exit_code == 0, result.output
     store = Store(tmp_path / "store")
     row = store.read("nights", "2026-07-01").to_pylist()[0]

@@ -1,4 +1,4 @@
-"""Exports and stores on shared storage answer as directories do; an S3-compatible server on loopback is asked."""
+"""Exports and stores on shared storage behave as directories; the tests use an S3-compatible server on loopback."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ sys.stdin.read()
 
 @pytest.fixture(scope="module")
 def bucket() -> Iterator[str]:
-    """URL of an empty bucket of a server of its own."""
+    """URL of an empty bucket of a separate server."""
     import s3fs
 
-    asked = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
-    with subprocess.Popen([sys.executable, "-c", SERVER], text=True, **asked) as server:
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen([sys.executable, "-c", SERVER], text=True, **pipes) as server:
         assert server.stdout is not None
         port = next(line for line in server.stdout if line.strip().isdigit()).strip()
         with pytest.MonkeyPatch.context() as patch:
@@ -63,14 +63,14 @@ def bucket() -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Four quiet loops and two that cycle, a quarter of an hour at 1 s."""
+    """Four loops that do not oscillate and two that do, a quarter of an hour at 1 s."""
     loops = {f"L{k:02d}": at_rest(k, 900) if k < 4 else cycling(k) for k in range(6)}
     return write_export(tmp_path_factory.mktemp("shared") / "night.parquet", loops)
 
 
 @pytest.fixture(scope="module")
 def whole(export: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[dict[str, object]]]:
-    """What a run keeps in a directory."""
+    """The tables of a run in a directory."""
     store = tmp_path_factory.mktemp("whole") / "store"
     assert ran(str(export), str(store)).exit_code == 0
     return tables(store)
@@ -82,7 +82,7 @@ def ran(export: str, store: str, *more: str) -> Result:
 
 
 def kept(store: str, folder: Path) -> dict[str, list[dict[str, object]]]:
-    """The tables of a store behind a URL."""
+    """The tables of a store at a URL."""
     (copy,), _ = places.at_hand([places.place(store)], folder)
     return tables(copy)
 
@@ -96,7 +96,9 @@ def put(path: Path, url: str) -> str:
 def test_a_night_on_shared_storage_is_that_of_a_directory(
     bucket: str, export: Path, whole: Any, tmp_path: Path
 ):
-    """Export and store behind URLs give the same tables as paths, leave nothing else there, and are ranked alike."""
+    """Export and store at URLs give the same tables as paths, leave no other files, and are ranked in the same
+    way.
+    """
     url, store = put(export, f"{bucket}/in/night.parquet"), f"{bucket}/store"
     result = ran(url, store, "--jobs", "2")
     assert result.exit_code == 0, result.stderr
@@ -109,7 +111,7 @@ def test_a_night_on_shared_storage_is_that_of_a_directory(
 
 
 def test_a_folder_behind_a_url_is_read_as_one_export(bucket: str, export: Path, whole: Any, tmp_path: Path):
-    """A URL of a folder stands for the files in it; --replace forgets what the store has of the night."""
+    """A URL of a folder means the files in it; --replace removes the loops of the night from the store."""
     put(export, f"{bucket}/day/deep/night.parquet")
     store = f"{bucket}/folder-store"
     for more in ((), ("--replace",)):
@@ -118,28 +120,28 @@ def test_a_folder_behind_a_url_is_read_as_one_export(bucket: str, export: Path, 
 
 
 def test_pages_notes_and_care_read_shared_storage(bucket: str, export: Path, tmp_path: Path):
-    """Pages, notes, check, prune and summary take a URL where they take a directory."""
+    """Pages, notes, check, prune and summary accept a URL instead of a directory."""
     store = f"{bucket}/kept"
     assert ran(str(export), store).exit_code == 0
 
-    def asked(*words: str) -> Result:
+    def run_command(*words: str) -> Result:
         return CliRunner().invoke(main, list(words))
 
-    assert asked("note", store, "L04", "stroked, packing tight").exit_code == 0
-    assert asked("note", store, "L04", "ordered").exit_code == 0
-    assert "packing tight" in asked("note", store, "L04").output
-    assert "packing tight" not in asked("rank", store).output  # the newest note counts
-    assert asked("pages", store, "--out", str(tmp_path / "pages")).exit_code == 0
+    assert run_command("note", store, "L04", "stroked, packing tight").exit_code == 0
+    assert run_command("note", store, "L04", "ordered").exit_code == 0
+    assert "packing tight" in run_command("note", store, "L04").output
+    assert "packing tight" not in run_command("rank", store).output  # the newest note is shown
+    assert run_command("pages", store, "--out", str(tmp_path / "pages")).exit_code == 0
     assert (tmp_path / "pages" / "index.html").exists()
-    assert "no problem" in asked("store", "check", store).output
-    assert asked("store", "prune", store, "--keep", "400d").exit_code == 0
-    assert asked("summary", store).exit_code == 0
+    assert "no problem" in run_command("store", "check", store).output
+    assert run_command("store", "prune", store, "--keep", "400d").exit_code == 0
+    assert run_command("summary", store).exit_code == 0
 
 
-def test_a_stopped_run_is_gone_on_with(
+def test_a_stopped_run_on_shared_storage_is_continued(
     bucket: str, export: Path, whole: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """Pieces on shared storage are gone on with by --resume, as those of a directory."""
+    """--resume continues with pieces on shared storage as with those of a directory."""
     from analyzer.night import finish
 
     store = f"{bucket}/stopped"
@@ -157,7 +159,7 @@ def test_a_stopped_run_is_gone_on_with(
 
 
 def test_two_runs_on_one_store_at_once(bucket: str, monkeypatch: pytest.MonkeyPatch):
-    """A live signature refuses a second run in one line; one that was not renewed for long is a dead run's."""
+    """A current signature refuses a second run in one line; a signature that is too old belongs to a dead run."""
     store = places.place(f"{bucket}/held")
     monkeypatch.setattr(store_lock, "ALIVE_S", 0.05)
     with locked(store):
@@ -182,22 +184,22 @@ def test_two_runs_on_one_store_at_once(bucket: str, monkeypatch: pytest.MonkeyPa
         assert json.loads(places.content(store / OWNER))["process"] == os.getpid()
 
 
-def test_an_empty_place_is_no_damage(bucket: str, monkeypatch: pytest.MonkeyPatch):
-    """An empty URL is no store and nothing damaged; storage that refuses is told in its own words."""
-    told = CliRunner().invoke(main, ["rank", f"{bucket}/empty"])
-    assert (told.exit_code, "s3://mill/empty: nothing there" in told.stderr) == (2, True)
+def test_an_empty_url_is_not_damaged(bucket: str, monkeypatch: pytest.MonkeyPatch):
+    """An empty URL is no store and not damaged; an error of the storage is reported in its own words."""
+    result = CliRunner().invoke(main, ["rank", f"{bucket}/empty"])
+    assert (result.exit_code, "s3://mill/empty: nothing there" in result.stderr) == (2, True)
 
     def denied(path: Path) -> bytes:
         raise PermissionError("Access Denied")
 
     monkeypatch.setattr(store_module, "content", denied)
-    told = CliRunner().invoke(main, ["rank", f"{bucket}/empty"])
-    assert "s3://mill/empty: Access Denied" in told.stderr
-    assert "damaged" not in told.stderr
+    result = CliRunner().invoke(main, ["rank", f"{bucket}/empty"])
+    assert "s3://mill/empty: Access Denied" in result.stderr
+    assert "damaged" not in result.stderr
 
 
 @pytest.mark.parametrize(
-    ("export_url", "store", "said"),
+    ("export_url", "store", "text"),
     [
         ("s3://mill/nothing.parquet", "s3://mill/s", "s3://mill/nothing.parquet: nothing there"),
         ("s3://nowhere/x.parquet", "s3://mill/s", "s3://nowhere/x.parquet: The specified bucket"),
@@ -205,16 +207,16 @@ def test_an_empty_place_is_no_damage(bucket: str, monkeypatch: pytest.MonkeyPatc
         ("{export}", "s3://nowhere/store", "s3://nowhere/store: The specified bucket"),
     ],
 )
-def test_what_storage_refuses_is_one_line(bucket: str, export: Path, export_url: str, store: str, said: str):
-    """A missing object, bucket or kind of storage is said in one line, with status 2 and no traceback."""
+def test_an_error_of_storage_is_one_line(bucket: str, export: Path, export_url: str, store: str, text: str):
+    """A missing object, bucket or kind of storage is reported in one line, with status 2 and no traceback."""
     result = ran(export_url.format(export=export), store)
     assert result.exit_code == 2
-    assert said in result.stderr
+    assert text in result.stderr
     assert "Traceback" not in result.output
 
 
-def test_a_worker_elsewhere_copies_what_it_has_not(bucket: str, export: Path, tmp_path: Path):
-    """An export whose copy is not on this machine is fetched again when a loop is read."""
+def test_a_worker_on_another_machine_fetches_a_missing_copy(bucket: str, export: Path, tmp_path: Path):
+    """An export without a copy on this machine is fetched again when a loop is read."""
     from analyzer.history.export import ReadOptions, open_export
 
     url = places.place(put(export, f"{bucket}/again/night.parquet"))
@@ -233,7 +235,7 @@ def test_a_cluster_reads_and_writes_shared_storage(
     tmp_path: Path,
     cluster: Any,  # noqa: F811
 ):
-    """Workers over TCP read the export behind a URL and write their pieces behind another: the same store."""
+    """Workers over TCP read the export at one URL and write their pieces to another: the store is the same."""
     url, store = put(export, f"{bucket}/cluster/night.parquet"), f"{bucket}/cluster-store"
     result = ran(url, store, "--scheduler", cluster[0])
     assert result.exit_code == 0, result.output
@@ -241,7 +243,7 @@ def test_a_cluster_reads_and_writes_shared_storage(
 
 
 def test_a_name_that_leads_out_is_refused(bucket: str, export: Path, tmp_path: Path):
-    """An object whose name climbs out of its folder is refused before anything is written."""
+    """An object whose name leads out of its folder is refused before anything is written."""
     import s3fs
 
     s3fs.S3FileSystem().pipe_file("mill/climbing/../../../evil.parquet", export.read_bytes())

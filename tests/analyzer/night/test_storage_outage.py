@@ -1,4 +1,6 @@
-"""Shared storage that fails for a while: survived, or one line with a status of its own, nothing called damaged."""
+"""Shared storage that fails for a while: the run survives, or ends with one line and its own status, without
+'damaged'.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,9 @@ BUSY = b'<?xml version="1.0"?><Error><Code>SlowDown</Code><Message>Please reduce
 
 
 class Disturbing(ThreadingHTTPServer):
-    """A proxy before a storage whose `answer` (count of the request, method) may be a status, or None to hand on."""
+    """A proxy before a storage whose `answer` (count of the request, method) may be a status, or None to pass it
+    on.
+    """
 
     daemon_threads = True
 
@@ -48,7 +52,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.server.count += 1
         body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
         status = self.server.answer(self.server.count, self.command)
-        if status == 0:  # accept, and never answer
+        if status == 0:  # accept, and never respond
             time.sleep(3600.0)
         if status is not None:
             self._reply(status, BUSY, [("Content-Type", "application/xml")])
@@ -72,12 +76,12 @@ class _Handler(BaseHTTPRequestHandler):
             self.wfile.write(data)
 
     def log_message(self, *_: Any) -> None:
-        """Say nothing."""
+        """Write no log."""
 
 
 @contextmanager
 def disturbed(answer: Callable[[int, str], int | None]) -> Iterator[Disturbing]:
-    """A proxy in the place of the storage."""
+    """A proxy instead of the storage."""
     with Disturbing(os.environ["AWS_ENDPOINT_URL"], answer) as proxy, pytest.MonkeyPatch.context() as patch:
         threading.Thread(target=proxy.serve_forever, daemon=True).start()
         patch.setenv("AWS_ENDPOINT_URL", f"http://127.0.0.1:{proxy.server_address[1]}")
@@ -89,7 +93,7 @@ def disturbed(answer: Callable[[int, str], int | None]) -> Iterator[Disturbing]:
 
 @pytest.fixture(scope="module")
 def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Four quiet loops."""
+    """Four loops that do not oscillate."""
     return write_export(
         tmp_path_factory.mktemp("outage") / "night.parquet", {f"L{k}": at_rest(k, 900) for k in range(4)}
     )
@@ -97,7 +101,7 @@ def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(autouse=True)
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let chunks be worked on by the test's own process, so that its endpoint is theirs."""
+    """Let this test process assess the chunks, so that they use its endpoint."""
     from analyzer.night import batch
 
     of = batch.executor
@@ -110,64 +114,68 @@ def ran(export: Path, store: str, *more: str) -> Result:
 
 
 def kept(store: str, folder: Path) -> dict[str, list[dict[str, object]]]:
-    """The tables of a store behind a URL."""
+    """The tables of a store at a URL."""
     (copy,), _ = places.at_hand([places.place(store)], folder)
     return tables(copy)
 
 
-def test_one_busy_answer_in_five_costs_nothing(bucket: str, export: Path, tmp_path: Path) -> None:  # noqa: F811
-    """A storage that answers 503 to one request in five makes the store of one that never does."""
+def test_one_busy_response_in_five_changes_nothing(bucket: str, export: Path, tmp_path: Path) -> None:  # noqa: F811
+    """If a storage responds with 503 to one of five requests, the store is the same as without errors."""
     assert ran(export, str(tmp_path / "store")).exit_code == 0
     store = f"{bucket}/busy"
     with disturbed(lambda count, _: 503 if count % 5 == 0 else None) as proxy:
-        told = ran(export, store)
+        result = ran(export, store)
         assert proxy.count > 20
-    assert told.exit_code == 0, told.output
+    assert result.exit_code == 0, result.output
     assert kept(store, tmp_path) == tables(tmp_path / "store")
 
 
 @pytest.mark.parametrize("after", [0, 14, 30])
-def test_an_outage_is_one_line_and_may_be_gone_on_with(
+def test_an_outage_is_one_line_and_can_be_resumed(
     bucket: str,  # noqa: F811
     export: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     after: int,
 ) -> None:
-    """A storage that is down from some request on ends the run with 75 and one line with URL and --resume; nothing is
-    called damaged, and --resume right after makes the store of an undisturbed run."""
+    """A storage that fails from some request on ends the run with status 75 and one line with URL and --resume.
+
+    Nothing is called damaged, and --resume gives the store of an undisturbed run.
+    """
     monkeypatch.setattr(places, "TRIES", 2)
     store = f"{bucket}/down-{after}"
     with disturbed(lambda count, _: 503 if count > after else None):
-        told = ran(export, store)
-    assert told.exit_code == 75, told.output
-    last = told.stderr.splitlines()[-1]
+        result = ran(export, store)
+    assert result.exit_code == 75, result.output
+    last = result.stderr.splitlines()[-1]
     assert store in last
     assert "--resume" in last
-    assert "damaged" not in told.stderr
-    assert "Traceback" not in told.output
+    assert "damaged" not in result.stderr
+    assert "Traceback" not in result.output
     monkeypatch.setattr(store_lock, "_is_dead_here", lambda known: known.get("process") == os.getpid())
     assert ran(export, store, "--resume").exit_code == 0
     assert ran(export, str(tmp_path / "store")).exit_code == 0
     assert kept(store, tmp_path) == tables(tmp_path / "store")
 
 
-def test_a_storage_that_never_answers_holds_no_run_for_ever(
+def test_a_storage_that_never_responds_ends_the_run(
     bucket: str,  # noqa: F811
     export: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Where requests are accepted and not answered, the run ends with 75 after its tries."""
+    """If requests are accepted without a response, the run ends with status 75 after its tries."""
     monkeypatch.setattr(places, "TRIES", 1)
     monkeypatch.setattr(s3fs.S3FileSystem, "read_timeout", 1)
     with disturbed(lambda count, _: 0) as proxy:
-        told = ran(export, f"{bucket}/silent")
-    assert told.exit_code == 75, told.output
+        result = ran(export, f"{bucket}/silent")
+    assert result.exit_code == 75, result.output
     assert 1 <= proxy.count <= 2  # each waits for its own time limit
 
 
 def test_of_two_runs_at_one_moment_one_is_refused(bucket: str, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: F811
-    """Two runs that both find no signature: the storage makes one, the other run is told who holds the store."""
+    """If two runs both find no signature, the storage creates one, and the other run is refused with the owner of the
+    store.
+    """
     store, found = places.place(f"{bucket}/two"), threading.Barrier(2)
     look, first = store_lock._require_unsigned, threading.local()
 
@@ -199,9 +207,11 @@ def test_of_two_runs_at_one_moment_one_is_refused(bucket: str, monkeypatch: pyte
     assert not (store / OWNER).exists()
 
 
-def test_a_dead_process_of_this_machine_holds_nothing(bucket: str) -> None:  # noqa: F811
-    """A signature of a process of this machine that is gone forbids nothing, however young; that of a living one or
-    of another machine does."""
+def test_a_signature_of_a_dead_process_is_ignored(bucket: str) -> None:  # noqa: F811
+    """A signature of a process of this machine that has ended is ignored at any age.
+
+    A signature of a running process or of another machine is not.
+    """
     store = places.place(f"{bucket}/dead")
     signed = {"host": socket.gethostname(), "process": 2**22 + 12345, "alive_s": time.time(), "mark": "x"}
     (store / OWNER).write_text(json.dumps(signed))

@@ -1,4 +1,4 @@
-"""Worker processes that die, hang, take all memory or all time: each costs its own item and nothing else."""
+"""Worker processes that die, hang, or exceed memory or time lose only their own item."""
 
 from __future__ import annotations
 
@@ -18,13 +18,15 @@ from analyzer.night import own_limits
 from analyzer.night.workers import Began, WorkerDeath, Workers
 
 LIMITS = WorkerLimits(memory_mb=512.0, processor_s=600.0, wall_s=6000.0)
-"""Limits of memory that tell, and of time that no busy machine reaches; tests of time have one of their own."""
+"""A memory limit that has an effect, and time limits that no busy machine reaches; tests of time have their own
+limits.
+"""
 posix = pytest.mark.skipif(sys.platform == "win32", reason="signals and limits of a POSIX system")
 linux = pytest.mark.skipif(sys.platform != "linux", reason="the limit of memory is Linux's")
 
 
 def act(task: tuple[str, ...], began: Began) -> tuple[str, ...]:
-    """Carry out a task of words; some of them do harm."""
+    """Process a task of words; some of them cause damage."""
     done = []
     for at, word in enumerate(task):
         began(at)
@@ -47,7 +49,7 @@ def act(task: tuple[str, ...], began: Began) -> tuple[str, ...]:
         if word == "mask":
             word = oct(os.umask(0o22))
         if word == "computing":
-            sum(range(10**11))  # one call, which lets no thread of this process in
+            sum(range(10**11))  # one call, during which no other thread of this process runs
         if word == "wrong":
             raise ValueError("of all things")
         done.append(word)
@@ -57,7 +59,7 @@ def act(task: tuple[str, ...], began: Began) -> tuple[str, ...]:
 def carried_out(
     *tasks: tuple[str, ...], limits: WorkerLimits = LIMITS
 ) -> list[tuple[str, ...] | WorkerDeath[tuple[str, ...]]]:
-    """What two workers make of some tasks."""
+    """The results of two workers for some tasks."""
     with Workers(2, act, limits) as workers:
         for task in tasks:
             workers.submit(task)
@@ -71,8 +73,8 @@ def test_all_tasks_come_back_once():
 
 
 @posix
-def test_a_killed_worker_costs_its_item_and_the_others_go_on():
-    """A worker that is killed says which item it had in hand; all other tasks are done."""
+def test_a_killed_worker_loses_its_item_and_the_others_continue():
+    """A worker that is killed reports its current item; all other tasks are done."""
     found = carried_out(("a", "killed", "b"), ("c",), ("d",), ("e",))
     died = [r for r in found if isinstance(r, WorkerDeath)]
     assert [(d.task, d.at, d.again) for d in died] == [(("a", "killed", "b"), 1, True)]
@@ -82,12 +84,12 @@ def test_a_killed_worker_costs_its_item_and_the_others_go_on():
 
 @linux
 def test_a_greedy_item_gets_a_memory_error():
-    """An item that asks for 16 GB under a limit of 0.5 GB gets a MemoryError of its own, and the worker lives on."""
+    """An item that requests 16 GB under a limit of 0.5 GB gets a MemoryError, and the worker continues."""
     assert carried_out(("greedy", "a")) == [("no memory", "a")]
 
 
 @posix
-def test_an_item_that_computes_for_ever_is_ended():
+def test_an_item_that_computes_forever_is_ended():
     """An item over its processor time ends its worker, with that reason and no second try."""
     (died,) = carried_out(("a", "spinning"), limits=replace(LIMITS, processor_s=2.0))
     assert isinstance(died, WorkerDeath)
@@ -96,7 +98,7 @@ def test_an_item_that_computes_for_ever_is_ended():
 
 
 def test_an_item_that_hangs_is_ended():
-    """An item that waits for ever without computing is ended by the clock."""
+    """An item that waits forever without computing is ended after its time limit."""
     (died,) = carried_out(("hanging",), limits=replace(LIMITS, wall_s=6.0))
     assert isinstance(died, WorkerDeath)
     assert (died.at, died.again) == (0, False)
@@ -104,13 +106,13 @@ def test_an_item_that_hangs_is_ended():
 
 
 def test_an_error_of_the_function_reaches_the_caller():
-    """What the function raises is raised where the results are read."""
+    """An error of the function is raised where the results are read."""
     with pytest.raises(ValueError, match="of all things"):
         carried_out(("wrong",))
 
 
-def test_a_task_that_is_to_run_alone_waits_for_the_others():
-    """A task to be run alone begins when no other is in hand."""
+def test_a_task_that_must_run_alone_waits_for_the_others():
+    """A task that must run alone starts when no other task is in progress."""
     with Workers(2, act, LIMITS) as workers:
         workers.submit(("alone",), alone=True)
         for k in range(6):
@@ -144,7 +146,7 @@ def alive(pid: int) -> bool:
 
 @linux
 def test_workers_end_with_their_parent(tmp_path):
-    """Where the parent is killed with signal 9 its workers are gone, one within a single long call too."""
+    """If the parent is killed with signal 9, its workers end, also one within a single long call."""
     script = tmp_path / "parent.py"
     script.write_text(PARENT)
     command = [sys.executable, str(script), str(Path(__file__).parent)]
@@ -164,7 +166,7 @@ def test_workers_end_with_their_parent(tmp_path):
 
 
 def test_workers_see_the_environment_as_it_is_when_they_start(monkeypatch: pytest.MonkeyPatch):
-    """A password that is set after the first workers have run is seen by the next ones, and one taken back is not."""
+    """A password that is set after the first workers have run is visible to the next ones; a removed one is not."""
     carried_out(("a",))
     monkeypatch.setenv("TRIAGE_SECRET", "now")
     assert carried_out(("$TRIAGE_SECRET",)) == [("now",)]
@@ -173,15 +175,17 @@ def test_workers_see_the_environment_as_it_is_when_they_start(monkeypatch: pytes
 
 
 @linux
-def test_the_server_hears_no_keyboard_while_it_begins():
-    """Ctrl-C, which reaches all processes of a terminal, is held from the server from its first instruction on, and
-    so from the workers that it forks."""
+def test_the_server_blocks_keyboard_interrupts_at_its_start():
+    """Ctrl-C, which reaches all processes of a terminal, is blocked in the server from its first instruction on.
+
+    It is also blocked in the workers that the server forks.
+    """
     assert carried_out(("deaf",)) == [("True",)]
 
 
 @posix
-def test_what_workers_write_has_the_mode_of_now():
-    """The mask for files is that of the process as it starts a worker, not that of the first one ever."""
+def test_files_of_workers_have_the_current_mode():
+    """The file mode mask is that of the process when it starts a worker, not that of the first worker."""
     carried_out(("a",))
     before = os.umask(0o27)
     try:
@@ -192,8 +196,8 @@ def test_what_workers_write_has_the_mode_of_now():
 
 @linux
 @pytest.mark.parametrize("name", ["reports", "tuning"])
-def test_a_script_where_the_night_is_run_is_not_taken_for_ours(tmp_path: Path, name: str):
-    """A file of an engineer's own that is named as one of our packages is neither run nor in the way."""
+def test_a_script_in_the_working_folder_is_not_taken_for_a_package(tmp_path: Path, name: str):
+    """A user's file with the name of one of our packages is neither run nor a problem."""
     (tmp_path / f"{name}.py").write_text("raise SystemError('run')")
     script = tmp_path / "elsewhere" / "main.py"
     script.parent.mkdir()
@@ -208,8 +212,8 @@ def test_a_script_where_the_night_is_run_is_not_taken_for_ours(tmp_path: Path, n
 
 
 @linux
-def test_without_a_server_workers_start_afresh(monkeypatch: pytest.MonkeyPatch):
-    """A server that dies as it begins costs no worker."""
+def test_without_a_server_workers_start_directly(monkeypatch: pytest.MonkeyPatch):
+    """A server that dies at its start prevents no worker."""
 
     def died() -> None:
         raise EOFError("unexpected EOF")
@@ -220,12 +224,14 @@ def test_without_a_server_workers_start_afresh(monkeypatch: pytest.MonkeyPatch):
 
 @posix
 def test_workers_are_started_where_temporary_files_have_long_names(tmp_path: Path):
-    """A socket's name has some hundred letters at most; a folder of temporary files with more costs no worker."""
+    """The name of a socket has at most about a hundred letters; a longer folder of temporary files prevents no
+    worker.
+    """
     far = tmp_path / ("a" * 100)
     far.mkdir()
-    said = "from tests.analyzer.night.test_workers import carried_out; print(carried_out(('a', 'b')))"
+    code = "from tests.analyzer.night.test_workers import carried_out; print(carried_out(('a', 'b')))"
     env = os.environ | {"TMPDIR": str(far)}
-    done = subprocess.run([sys.executable, "-c", said], env=env, capture_output=True, text=True, timeout=120)
+    done = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, timeout=120)
     assert done.stdout.strip() == "[('a', 'b')]", done.stderr
 
 
@@ -242,7 +248,7 @@ def test_workers_are_started_where_temporary_files_have_long_names(tmp_path: Pat
     ],
 )
 def test_the_limit_of_memory_is_that_of_its_own_group(tmp_path, line, limits, least):
-    """Control groups of both versions, the process's own and those above it, limit what counts as the machine's."""
+    """Control groups of both versions, that of the process and those above it, limit the memory of the machine."""
     for name, text in limits.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text + "\n")

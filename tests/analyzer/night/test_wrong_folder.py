@@ -1,4 +1,6 @@
-"""A store stays whole and by itself: no other folder becomes one, one clock, all tables of a night together."""
+"""A store stays complete and separate: no other folder becomes a store, it has one clock, and all tables of a
+night.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,7 @@ LOOPS = 4
 
 @pytest.fixture(scope="module")
 def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Four loops at rest, a quarter of an hour at 1 s."""
+    """Four loops with constant OP, a quarter of an hour at 1 s."""
     return written(tmp_path_factory.mktemp("folder") / "night.parquet", 0)
 
 
@@ -37,43 +39,43 @@ def kept(export: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def written(path: Path, seed: int, start_s: float = START_S) -> Path:
-    """An export of four loops at rest."""
+    """An export of four loops with constant OP."""
     return write_export(path, {f"L{k}": at_rest(seed + k, 900) for k in range(LOOPS)}, start_s)
 
 
-def asked(*words: object) -> Result:
-    """An answer of the command line."""
+def run_command(*words: object) -> Result:
+    """Result of a command line."""
     return CliRunner().invoke(main, [str(w) for w in words])
 
 
 def ran(export: Path, store: Path, *more: str) -> Result:
     """The batch."""
-    return asked("run", export, "--store", store, *more)
+    return run_command("run", export, "--store", store, *more)
 
 
 def test_a_folder_of_other_files_is_no_store(export: Path, tmp_path: Path) -> None:
-    """A folder that holds something else is refused in one line and left as it was."""
+    """A folder with other files is refused in one line and is unchanged."""
     photos = tmp_path / "photos"
     photos.mkdir()
     for name in ("a.jpg", "b.jpg"):
         (photos / name).touch()
-    told = ran(export, photos)
-    assert (told.exit_code, told.stderr.count("\n")) == (2, 1)
-    assert f"--store {photos}: a folder that holds a.jpg, b.jpg and is no store" in told.stderr
+    result = ran(export, photos)
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    assert f"--store {photos}: a folder that holds a.jpg, b.jpg and is no store" in result.stderr
     assert sorted(os.listdir(photos)) == ["a.jpg", "b.jpg"]
 
 
 def test_a_file_is_no_store(export: Path, tmp_path: Path) -> None:
-    """Where --store names a file, a folder is asked for."""
+    """If --store names a file, a folder is required."""
     (tmp_path / "day1.csv").write_text("timestamp,L.PV\n")
-    told = ran(export, tmp_path / "day1.csv")
-    assert (told.exit_code, told.stderr.count("\n")) == (2, 1)
-    assert "a file; expected a folder" in told.stderr
+    result = ran(export, tmp_path / "day1.csv")
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    assert "a file; expected a folder" in result.stderr
 
 
 @pytest.mark.parametrize("left", [[], ["lost+found"], [".hidden"], ["notes.jsonl", "run.lock"]])
-def test_what_belongs_to_a_store_is_in_no_way(export: Path, tmp_path: Path, left: list[str]) -> None:
-    """An empty folder, the root of a disk, and what a store holds before its first night are taken."""
+def test_files_of_a_store_are_accepted(export: Path, tmp_path: Path, left: list[str]) -> None:
+    """An empty folder, the root of a disk, and the files of a store before its first night are accepted."""
     for name in left:
         (tmp_path / name).touch()
     assert ran(export, tmp_path).exit_code == 0
@@ -81,24 +83,26 @@ def test_what_belongs_to_a_store_is_in_no_way(export: Path, tmp_path: Path, left
 
 @pytest.mark.parametrize("command", ["pages", "report"])
 def test_pages_are_not_written_into_a_store(kept: Path, command: str) -> None:
-    """Pages into a store are refused, and it holds what it held."""
+    """Pages into a store are refused, and its content is unchanged."""
     before = sorted(p.name for p in kept.rglob("*"))
     more = ["--find"] if command == "report" else []
-    told = asked(command, kept, *more, "--out", kept)
-    assert (told.exit_code, told.stderr.count("\n")) == (2, 1)
-    assert f"--out {kept}: a store" in told.stderr
+    result = run_command(command, kept, *more, "--out", kept)
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    assert f"--out {kept}: a store" in result.stderr
     assert sorted(p.name for p in kept.rglob("*")) == before
 
 
 def test_a_store_has_one_clock(kept: Path, tmp_path: Path) -> None:
-    """A night cut by the midnights of another zone is refused and names the store's; where it replaces all that is
-    there it is taken."""
+    """A night divided at the midnights of another zone is refused and names the zone of the store.
+
+    It is accepted if it replaces all nights of the store.
+    """
     store = Path(shutil.copytree(kept, tmp_path / "store"))
     next_day = written(tmp_path / "next.parquet", 0, START_S + 86400.0)
     before = tables(store)
-    told = ran(next_day, store, "--timezone", "Europe/Helsinki")
-    assert told.exit_code == 2
-    assert "state --timezone UTC" in told.stderr
+    result = ran(next_day, store, "--timezone", "Europe/Helsinki")
+    assert result.exit_code == 2
+    assert "state --timezone UTC" in result.stderr
     assert tables(store) == before
     assert ran(next_day, store).exit_code == 0
     alone = Path(shutil.copytree(kept, tmp_path / "alone"))
@@ -114,11 +118,13 @@ def test_a_store_has_one_clock(kept: Path, tmp_path: Path) -> None:
         *(slow(0, []), slow(1, ["--replace"]), slow(2, [])),
     ],
 )
-def test_a_disk_that_is_full_at_the_end_leaves_the_night_as_it_was(
+def test_a_disk_that_is_full_at_the_end_does_not_change_the_night(
     kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at: int, more: list[str]
 ) -> None:
-    """Whichever table of a night finds no room, the store is that of before, with one line that names --resume; with
-    room the night is the new one."""
+    """If there is no room for one table of a night, the store is unchanged, with one line that names --resume.
+
+    With room the night is the new one.
+    """
     store = Path(shutil.copytree(kept, tmp_path / "store"))
     other = written(tmp_path / "other.parquet", 50)
     before, count = tables(store), 0
@@ -133,11 +139,11 @@ def test_a_disk_that_is_full_at_the_end_leaves_the_night_as_it_was(
 
     with monkeypatch.context() as patch:
         patch.setattr(draft, "write_table", full)
-        told = ran(other, store, *more)
+        result = ran(other, store, *more)
     if count <= at:
         pytest.skip("fewer tables than that")
-    assert told.exit_code == 2, told.output
-    assert "--resume" in told.stderr.splitlines()[-1]
+    assert result.exit_code == 2, result.output
+    assert "--resume" in result.stderr.splitlines()[-1]
     left = {name: rows for name, rows in tables(store).items() if not name.startswith("parts")}
     assert left == before
     assert ran(other, store, "--resume", *more).exit_code == 0
