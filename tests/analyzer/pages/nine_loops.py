@@ -1,6 +1,7 @@
-"""A plant of nine loops, one of each state that a night has to tell: ten hours, a sample each 5 s.
+"""A plant of nine loops with one loop for each state that a night reports: ten hours, a sample every 5 s.
 
-The simulator of benchmarks/world shares no code with the analysis, and what is wrong with each loop is known."""
+The simulator of benchmarks/world shares no code with the analysis, and the fault of each loop is known.
+"""
 
 from __future__ import annotations
 
@@ -25,13 +26,14 @@ from benchmarks.world.simulate import (
 START_US = 1_772_409_600_000_000
 HOURS, EVERY_S = 10, 5
 N = HOURS * 3600
-FROZEN, SLUGGISH, TIGHT, SINE, PLAY_ON_LEVEL = "FT101", "TC102", "PC103", "PC104", "LC105"
-LIMITED, HEALTHY, WORN, MANUAL = "TC106", "FC107", "TC108", "FC109"
+FROZEN, SLUGGISH, TIGHT, SINE, BACKLASH_ON_LEVEL = "FT101", "TC102", "PC103", "PC104", "LC105"
+LIMITED, NO_FAULT, WORN, MANUAL = "TC106", "FC107", "TC108", "FC109"
 SINE_S, FROZEN_FROM, MANUAL_FROM = 840.0, 0.6, 0.25
-"""Period of the load of PC104 [s]; share of the night after which FT101's transmitter stands, and FC109 is in
-manual."""
-PLAY = {PLAY_ON_LEVEL: 3.0, WORN: 4.0}
-"""True widths of the play [% OP]."""
+"""Period of the load of PC104 [s]; share of the night after which the PV of FT101 is constant, and after which FC109
+is in manual.
+"""
+WIDTHS = {BACKLASH_ON_LEVEL: 3.0, WORN: 4.0}
+"""True widths of the backlash [% OP]."""
 TYPES = {"F": "flow", "T": "temperature", "P": "pressure", "L": "level"}
 
 
@@ -44,7 +46,7 @@ def _noise(seed: int, size: float = 0.03) -> Floats:
 
 
 def _steps(seed: int, count: int, size: float = 4.0) -> Floats:
-    """A set point that moves so many times."""
+    """A set point with `count` moves."""
     rng, sp = np.random.default_rng(seed + 200), np.full(N, 50.0)
     for k in np.sort(rng.integers(int(0.05 * N), int(0.95 * N), count)):
         sp[k:] = 50.0 + rng.uniform(-size, size)
@@ -56,17 +58,21 @@ LOOPS: dict[str, tuple[Process, Controller, Valve]] = {
     SLUGGISH: (Process(1.2, 240.0, 0.0, 20.0), Controller(0.25, 1200.0), Valve()),
     TIGHT: (Process(1.2, 60.0, 0.0, 10.0), Controller(5.5, 40.0), Valve()),
     SINE: (Process(1.4, 90.0, 0.0, 8.0), Controller(1.5, 90.0), Valve()),
-    PLAY_ON_LEVEL: (Process(0.03, 0.0, 0.0, 8.0), Controller(1.2, 120.0), Valve(BACKLASH, PLAY["LC105"])),
+    BACKLASH_ON_LEVEL: (
+        Process(0.03, 0.0, 0.0, 8.0),
+        Controller(1.2, 120.0),
+        Valve(BACKLASH, WIDTHS["LC105"]),
+    ),
     LIMITED: (Process(1.1, 300.0, 0.0, 20.0), Controller(2.0, 250.0), Valve()),
-    HEALTHY: (Process(0.9, 15.0, 0.0, 4.0), Controller(0.9, 18.0), Valve()),
-    WORN: (Process(2.2, 400.0, 0.0, 15.0), Controller(3.0, 120.0), Valve(BACKLASH, PLAY["TC108"])),
+    NO_FAULT: (Process(0.9, 15.0, 0.0, 4.0), Controller(0.9, 18.0), Valve()),
+    WORN: (Process(2.2, 400.0, 0.0, 15.0), Controller(3.0, 120.0), Valve(BACKLASH, WIDTHS["TC108"])),
     MANUAL: (Process(0.8, 20.0, 0.0, 5.0), Controller(0.8, 25.0), Valve()),
 }
 """Process, controller and valve of each loop."""
 
 
 def _trends(loop: str, seed: int) -> tuple[Trends, np.ndarray]:
-    """What a loop does, and where it is in automatic."""
+    """The trends of a loop, and the mask of its time in automatic."""
     process, controller, valve = LOOPS[loop]
     before, behind, sp = _load(seed, 0.3, 300.0), np.zeros(N), np.full(N, 50.0)
     auto, rest = np.ones(N, dtype=bool), 50.0
@@ -83,7 +89,7 @@ def _trends(loop: str, seed: int) -> tuple[Trends, np.ndarray]:
     found = simulate(process, controller, valve, sp, before, behind, _noise(seed), auto, rest)
     if loop != FROZEN:
         return found, auto
-    # what the controller does where its PV stands: it integrates what is left of the error, and runs away
+    # with a constant PV, the controller integrates the constant error until OP reaches its limit
     at = int(FROZEN_FROM * N)
     pv, op = found.pv.copy(), found.op.copy()
     pv[at:] = pv[at] + 1.0

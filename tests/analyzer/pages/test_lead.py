@@ -1,4 +1,4 @@
-"""Three sentences that a shift leader can act on."""
+"""Three sentences for the actions of a shift leader."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ VALVE = {"action": "repair valve", "cause": "valve", "valve_fault": "stiction"}
 FOLLOWS = {"action": "see source loop", "cause": "load"}
 
 
-def test_a_source_is_named_with_whom_it_moves() -> None:
-    """The source of a group comes first, for it gains most, and its followers have no sentence of their own."""
+def test_a_source_is_named_with_the_loops_that_it_moves() -> None:
+    """The source of a group comes first, because it gains most, and its followers have no separate sentence."""
     rows = [row("FIC2110", 60.0, **VALVE), row("LIC2103", 75.0, **FOLLOWS), row("TIC2111", 20.0, **FOLLOWS)]
     rows.append(row("LIC1", 90.0, **VALVE))
     members = tuple(
@@ -39,8 +39,8 @@ def test_a_source_is_named_with_whom_it_moves() -> None:
     )
 
 
-def test_only_followers_are_said_to_be_moved() -> None:
-    """A loop that shares a group's wave and keeps a verdict of its own is not said to be moved by the source."""
+def test_only_followers_are_named_as_moved() -> None:
+    """A loop that shares the oscillation of a group and keeps its own verdict is not named as moved by the source."""
     rows = [row("FIC1", 60.0, **VALVE), row("TIC2", 20.0, **FOLLOWS), row("LIC3", 30.0, **VALVE)]
     roles = ("source", "follower", "shares")
     members = tuple({"loop": r["loop"], "role": role} for r, role in zip(rows, roles, strict=True))
@@ -51,8 +51,8 @@ def test_only_followers_are_said_to_be_moved() -> None:
     )
 
 
-def test_three_at_most_by_what_they_gain() -> None:
-    """Of five kinds of work the three that gain most are told; importance counts where it is stated."""
+def test_at_most_three_actions_by_their_gain() -> None:
+    """Of five kinds of work the three with the largest gain are named; importance counts if it is stated."""
     rows = [
         row("A", 1.0, action="retune", cause="valve", valve_fault="backlash", loss=9.0, importance=3.0),
         row("B", 50.0, action="retune", cause="tuning", loss=1.0),
@@ -68,8 +68,8 @@ def test_three_at_most_by_what_they_gain() -> None:
     ]
 
 
-def test_a_valve_that_can_wait_is_told_last():
-    """A worn valve that can wait has a sentence of its own, behind all that costs something tonight."""
+def test_a_valve_that_can_wait_is_named_last():
+    """A worn valve that can wait has its own sentence, after all work that is due tonight."""
     rows = [row("A", 0.0, **VALVE | {"due": "next shutdown"}), row("B", 0.1, **VALVE | {"due": "now"})]
     assert first_things(rows) == (
         "Stroke the valve of B: it has stiction.",
@@ -77,10 +77,10 @@ def test_a_valve_that_can_wait_is_told_last():
     )
 
 
-def test_what_is_not_stated_is_not_compared() -> None:
-    """Settings that loops.csv does not state are asked for; nothing is said of trends that show others."""
-    ask = {"action": "check settings", "cause": "tuning"}
-    rows = [row("A", 9.0, **ask), row("B", 5.0, **ask, kp=None), row("C", 4.0, **ask, ti=None)]
+def test_unstated_settings_are_not_compared() -> None:
+    """Settings that loops.csv does not state are requested, without a sentence about trends that show others."""
+    check = {"action": "check settings", "cause": "tuning"}
+    rows = [row("A", 9.0, **check), row("B", 5.0, **check, kp=None), row("C", 4.0, **check, ti=None)]
     assert first_things(rows) == (
         "Compare the settings of A with loops.csv: the trends show other settings.",
         "State Kp and Ti of B and C in loops.csv, as their controllers have them: new settings need them.",
@@ -88,7 +88,9 @@ def test_what_is_not_stated_is_not_compared() -> None:
 
 
 def test_one_figure_compares_all_loops() -> None:
-    """Where one importance is stated, loops without one count by their error too, and not by their significance."""
+    """If one importance is stated, loops without one are also ranked by their error, and not by their
+    significance.
+    """
     rows = [
         row("A", 90.0, action="retune", cause="tuning", loss=0.2),
         row("B", 1.0, action="repair valve", cause="valve", valve_fault="stiction", loss=3.0, importance=2.0),
@@ -96,8 +98,8 @@ def test_one_figure_compares_all_loops() -> None:
     assert [text.split()[0] for text in first_things(rows)] == ["Stroke", "Type"]
 
 
-def test_a_calm_night_says_so() -> None:
-    """Nothing to do is a sentence too."""
+def test_a_night_without_work_says_so() -> None:
+    """A night without work gives a sentence too."""
     assert first_things([row("A", 0.0)]) == (CALM,)
     assert first_things([]) == (CALM,)
 
@@ -112,15 +114,17 @@ def test_a_calm_night_says_so() -> None:
     ],
 )
 def test_names_read_as_a_list(names: list[str], text: str) -> None:
-    """A few names are told, the rest counted."""
+    """Three names are listed, and the others are counted."""
     assert listed(names) == text
 
 
-def test_a_loop_that_swings_from_limit_to_limit_is_not_sent_to_the_valves_size() -> None:
-    """Of a loop too tight for its process that rests at a limit half of the time, an interim step is told, not the
-    valve's size; of a calm loop at its limit the valve's size is."""
+def test_a_loop_that_oscillates_between_limits_gets_no_check_of_the_valve_size() -> None:
+    """For a loop that is too tight and at a limit half of the time, a first step is named, not the size of the valve.
+
+    For a loop without oscillation at its limit, the size of the valve is named.
+    """
     tight = row("CH3", 60.0, action="needs data", cause="tuning", lanes="oscillation, at limit")
     still = row("TIC2", 0.0, action="check limit", lanes="at limit")
-    said = first_things([tight, still])
-    assert said[0].startswith("Halve the gain of CH3 or go to manual")
-    assert said[1] == "Find out why OP of TIC2 is at its limit: check the valve's size and supply."
+    lines = first_things([tight, still])
+    assert lines[0].startswith("Halve the gain of CH3 or go to manual")
+    assert lines[1] == "Find out why OP of TIC2 is at its limit: check the valve's size and supply."

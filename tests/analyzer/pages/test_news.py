@@ -1,4 +1,4 @@
-"""What changed overnight stands under the heading that an engineer expects."""
+"""A change of the night is listed under the heading that an engineer expects."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ ROW = NO_LANES | CALM | {"kp_new": None, "ti_new": None, "action": "none", "news
 LOST = {"status": "not assessed", "oscillating_pct": None, "oscillation_significance": None}
 
 
-def told(before: dict[str, object], now: dict[str, object]) -> tuple[list[str], list[str]]:
-    """News of one loop under New and under Better."""
+def changes_of(before: dict[str, object], now: dict[str, object]) -> tuple[list[str], list[str]]:
+    """Changes of one loop under New and under Better."""
     night = ShownNight("2026-03-03", (ROW | now,), {"L": [ROW | before]}, "2026-03-02", ())
     tables = [news_table(night, tones, "t", "T") for tones in (("worse", "unclear"), ("better",))]
     return tuple([row[1].text for row in t.rows] for t in tables)  # type: ignore[return-value]
@@ -35,13 +35,13 @@ def told(before: dict[str, object], now: dict[str, object]) -> tuple[list[str], 
         ({}, [], []),
     ],
 )
-def test_news_stand_where_they_belong(now, new, better):
-    """What is believed anew stands under new or better, before what the lanes say."""
-    assert told({}, now) == (new, better)
+def test_changes_are_listed_under_the_right_heading(now, new, better):
+    """A changed belief is listed under New or Better, before the changes of lanes."""
+    assert changes_of({}, now) == (new, better)
 
 
 def night_by_night(nights: list[dict[str, object]]) -> list[str]:
-    """The news of one loop on each of some nights but the first, '' where there are none."""
+    """The changes of one loop on each night after the first, '' if there are none."""
     rows = [ROW | n for n in nights]
     found = []
     for k in range(1, len(rows)):
@@ -62,13 +62,15 @@ def night_by_night(nights: list[dict[str, object]]) -> list[str]:
         (LOST | {"lanes": "manual", "manual_pct": 100.0}, {}, [], ["no more: manual"]),
     ],
 )
-def test_lanes_are_news_too(before, now, new, better):
-    """A loop at its limit or in manual is new, one that left a lane better; what a night cannot tell is neither."""
-    assert told(before, now) == (new, better)
+def test_changes_of_lanes_are_listed_too(before, now, new, better):
+    """A loop at its limit or in manual is listed under New, one that left a lane under Better; unknown figures give
+    neither.
+    """
+    assert changes_of(before, now) == (new, better)
 
 
-def test_a_lane_that_is_inferred_is_told_by_the_second_night():
-    """Sluggish for one night is no news, nor is one night without; manual is told at once."""
+def test_an_inferred_lane_is_listed_on_the_second_night():
+    """Sluggish for one night is not listed, and neither is one night without it; manual is listed at once."""
     slow, still, by_hand = {"lanes": "sluggish"}, {"lanes": None}, {"lanes": "manual"}
     assert night_by_night([still, slow, still, slow, slow, still, slow]) == [
         "",

@@ -1,4 +1,4 @@
-"""A number exists once: every figure of the store that a page shows is the store's, of the same loop and night."""
+"""Each number exists once: each figure of the store on a page is that of the store, for the same loop and night."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from tests.reports.small_store import small_store
 
 TIMES = {"s": 1.0, "min": 60.0, "h": 3600.0}
 DIGITS = 0.006
-"""Part by which a number of three digits may differ from what it stands for."""
+"""Relative difference that a number of three digits may have from its value."""
 
 
 class Tables(HTMLParser):
-    """The cells of a page's tables, (table, key of the column, text, full number), a list a row."""
+    """The cells of a page's tables (table, key of the column, text, full number), one list for each row."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -31,7 +31,7 @@ class Tables(HTMLParser):
         self.sort, self.text = "", None
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Follow into tables, rows and cells."""
+        """Enter tables, rows and cells."""
         held = {k: v or "" for k, v in attrs}
         if tag == "table":
             self.table, self.keys = held.get("id", ""), []
@@ -45,26 +45,26 @@ class Tables(HTMLParser):
             self.sort, self.text = held.get("data-sort", ""), ""
 
     def handle_data(self, data: str) -> None:
-        """Take a cell's text."""
+        """Read the text of a cell."""
         if self.text is not None:
             self.text += data
 
     def handle_endtag(self, tag: str) -> None:
-        """Keep a cell at its end."""
+        """Store a cell at its end."""
         if tag in ("td", "th") and self.text is not None and self.at < len(self.keys):
             self.rows[-1].append((self.table, self.keys[self.at], self.text.strip(), self.sort))
             self.text = None
 
 
 def rows_of(path: Path) -> Iterator[list[tuple[str, str, str, str]]]:
-    """The rows of a page's tables that hold anything."""
+    """The rows of a page's tables that are not empty."""
     parser = Tables()
     parser.feed(path.read_text("utf-8"))
     return (row for row in parser.rows if row)
 
 
 def shown(text: str) -> float:
-    """The number that a cell shows, a time in seconds."""
+    """The number that a cell shows, with times in seconds."""
     found = re.match(r"([-+\d.e]+) ?(s|min|h)?", text.replace("\u2212", "-"))
     assert found, text
     return float(found[1]) * TIMES.get(found[2] or "s", 1.0)
@@ -76,8 +76,10 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
     return small_store(tmp_path_factory.mktemp("numbers") / "store", loops=30, nights=5)
 
 
-def test_every_figure_of_every_table_is_the_store_s(store: Store, tmp_path: Path) -> None:
-    """Loops' figures in all tables of all pages have the store's value, to three digits and in full for sorting."""
+def test_every_figure_of_every_table_is_that_of_the_store(store: Store, tmp_path: Path) -> None:
+    """Figures of loops in all tables of all pages have the value of the store, to three digits and in full for
+    sorting.
+    """
     write_html(list(night.pages_of_night(store)), tmp_path)
     held: dict[tuple[str, str], dict[str, Any]] = {
         (row["loop"], name): row
@@ -110,7 +112,7 @@ def test_every_figure_of_every_table_is_the_store_s(store: Store, tmp_path: Path
 
 
 def _loop_of(path: Path, held: dict[tuple[str, str], dict[str, Any]]) -> str:
-    """The loop that a page is about."""
+    """The loop of a page."""
     from reports.texts import slug
 
     return next((loop for loop, _ in held if f"{slug(loop)}.html" == path.name), "")

@@ -1,4 +1,4 @@
-"""Changes are read as people write them, and refused with the row that is wrong."""
+"""Changes are read in the usual notations, and an error names the wrong row."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def written(folder: Path, text: str) -> Path:
 
 
 def test_all_columns_are_read(tmp_path: Path) -> None:
-    """Loop, time, settings and name come back as written, whatever the delimiter and the decimal mark."""
+    """Loop, time, settings and name are read as written, for each delimiter and decimal mark."""
     head = "loop;time;kp_old;ti_old;kp_new;ti_new;who\n"
     path = written(
         tmp_path,
@@ -38,7 +38,7 @@ def test_the_mills_changes_are_read() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "fragment"),
     [
         ("loop,when\nA,2026\n", "no column 'time'"),
         ("loop,time\nA,yesterday evening\n", "row 2: time"),
@@ -46,26 +46,26 @@ def test_the_mills_changes_are_read() -> None:
         ("loop,time\n", "no changes"),
     ],
 )
-def test_errors_name_the_place(tmp_path: Path, text: str, said: str) -> None:
-    """What is wrong is said with row and column, and what would be right."""
-    with pytest.raises(InputError, match=said):
+def test_errors_name_the_place(tmp_path: Path, text: str, fragment: str) -> None:
+    """An error is reported with its row and column."""
+    with pytest.raises(InputError, match=fragment):
         read_changes(written(tmp_path, text))
 
 
-def test_a_missing_file_is_said(tmp_path: Path) -> None:
-    """A file that is not there is an error of one line."""
+def test_a_missing_file_is_reported(tmp_path: Path) -> None:
+    """A missing file is an error of one line."""
     with pytest.raises(InputError, match="cannot be opened"):
         read_changes(tmp_path / "none.csv")
 
 
 @pytest.mark.parametrize("text", ["2026-03-09T08:00:00Z", "2026-03-09 08:00", "2026-03-09T10:00+02:00"])
 def test_times_have_zones(text: str) -> None:
-    """A time with a zone is taken at it, one without is UTC."""
+    """A time with a zone is read in that zone, and one without is UTC."""
     assert parse_time(text, "") == T
 
 
 def test_settings_that_differ_between_nights_are_changes() -> None:
-    """Settings of loops.csv that differ from the night before are a change at that night's start."""
+    """Settings of loops.csv that differ from the night before are a change at the start of that night."""
     rows = [
         {"loop": "A", "start_s": T + k, "settings_changed_s": None, "kp": kp, "ti": 10.0}
         for k, kp in enumerate((1.0, 1.0, 2.0, 2.0))
@@ -76,7 +76,7 @@ def test_settings_that_differ_between_nights_are_changes() -> None:
 
 
 def test_a_change_within_a_night_is_dated_to_its_sample() -> None:
-    """Where settings were typed in within a night, the change is dated to that moment, not to the night's start."""
+    """If settings were typed in during a night, the change is dated to that moment, not to the start of the night."""
     days = [
         {"loop": "A", "start_s": T + 86400.0 * k, "settings_changed_s": None, "kp": 1.0 + (k > 0), "ti": 10.0}
         for k in range(2)

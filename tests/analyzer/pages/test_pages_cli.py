@@ -1,4 +1,4 @@
-"""The commands report and pages write what they say, and refuse in one line what they cannot do."""
+"""The commands `report` and `pages` write their pages, and refuse impossible requests in one line."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.reports.small_store import NASTY, small_store
 
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
-    """Two weeks of eight made-up loops."""
+    """Two weeks of eight invented loops."""
     return small_store(tmp_path_factory.mktemp("store"), loops=8)
 
 
@@ -59,7 +59,7 @@ def test_lost_changes_give_exit_status_1(store: Store, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "fragment"),
     [
         ((), "no change named"),
         (("--loop", "GONE", "--changed", "2026-03-09"), "GONE"),
@@ -70,17 +70,19 @@ def test_lost_changes_give_exit_status_1(store: Store, tmp_path: Path) -> None:
         ),
     ],
 )
-def test_what_cannot_be_done_is_said(
-    store: Store, tmp_path: Path, arguments: tuple[str, ...], said: str
+def test_an_impossible_request_is_reported(
+    store: Store, tmp_path: Path, arguments: tuple[str, ...], fragment: str
 ) -> None:
-    """What is missing or wrong is said with what to do."""
+    """A missing or wrong argument is reported with its name or remedy."""
     found = run(store.path, *arguments, "--out", tmp_path)
     assert found.exit_code == 2
-    assert said in found.stderr
+    assert fragment in found.stderr
 
 
 def test_pages_of_a_night(store: Store, tmp_path: Path) -> None:
-    """The command writes the morning page, the hand-over sheet, a page a night and as many loops' as asked for."""
+    """The command writes the morning page, the hand-over sheet, a page for each night and the requested number of
+    loop pages.
+    """
     found = CliRunner().invoke(main, ["pages", str(store.path), "--top", "3", "--out", str(tmp_path)])
     assert found.exit_code == 0
     names = [p.name for p in tmp_path.glob("*.html")]
@@ -89,8 +91,10 @@ def test_pages_of_a_night(store: Store, tmp_path: Path) -> None:
     assert (len(dated), len(names)) == (14, 14 + 4 + 3)
 
 
-def test_nights_are_linked_and_stale_pages_go(tmp_path: Path) -> None:
-    """Each dated page leads to the one before and after; pages of loops that are calm by now are deleted, no more."""
+def test_nights_are_linked_and_outdated_pages_are_deleted(tmp_path: Path) -> None:
+    """Each dated page links to those before and after it; pages of loops that are no longer listed are deleted, and
+    no others.
+    """
     kept = small_store(tmp_path / "store", loops=8, nights=3)
     out = tmp_path / "out"
     assert CliRunner().invoke(main, ["pages", str(kept.path), "--out", str(out)]).exit_code == 0
@@ -111,15 +115,15 @@ def test_nights_are_linked_and_stale_pages_go(tmp_path: Path) -> None:
 
 
 def test_commands_are_quick_to_import() -> None:
-    """Importing the commands loads neither numpy nor pandas nor matplotlib."""
+    """The import of the commands loads neither numpy nor pandas nor matplotlib."""
     heavy = "numpy", "pandas", "matplotlib"
     code = f"import sys, analyzer.commands.report; print([m for m in {heavy} if m in sys.modules])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
 
 
-def test_a_calm_night_has_its_page(tmp_path: Path) -> None:
-    """Where no loop is worth a look the morning page is written all the same, and the calm loop's page beside it."""
+def test_a_night_without_work_has_its_page(tmp_path: Path) -> None:
+    """If no loop needs attention, the morning page and the page of the loop are still written."""
     rows = [row_of({"loop": "FIC1", "night": "2026-03-02", "status": "ok", "cause": "none"})]
     write_table(rows_table(rows, NIGHTS), tmp_path / "store" / "nights" / "2026-03-02.parquet")
     found = CliRunner().invoke(main, ["pages", str(tmp_path / "store"), "--out", str(tmp_path / "out")])

@@ -1,4 +1,6 @@
-"""The sample mill's two weeks come out as the study's: from the store alone, the recordings' truth unread."""
+"""The results of the sample mill's two weeks agree with those of the study, from the store only, without the
+truth.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,7 @@ OTHERS = ("FIC2110", "FIC2113", "PIC2116")
 
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
-    """The mill's fourteen nights, of the retuned loops and some others."""
+    """The fourteen nights of the mill, for the retuned loops and some others."""
     from analyzer.night import batch
     from analyzer.night.nights import Plant
 
@@ -41,14 +43,14 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
 
 @pytest.fixture(scope="module")
 def found(store: Store) -> dict[str, ChangeCase]:
-    """What became of each change."""
+    """The result of each change."""
     known, missing = change_cases(store, read_changes(MILL / "changes.csv"))
     assert missing == []
     return {c.found.loop: c for c in known}
 
 
 def test_five_loops_improve_clearly(found: dict[str, ChangeCase]) -> None:
-    """Five of the seven retuned loops improve clearly in all four assessments, as in the study."""
+    """Five of the seven retuned loops improve clearly in all four figures, as in the study."""
     clear = [loop for loop, c in found.items() if grade(c.found) == "clear"]
     assert clear == ["LIC2102", "TIC2104", "LIC2105", "TIC2106", "LIC2107"]
 
@@ -59,7 +61,7 @@ def test_loop_1_improves_modestly(found: dict[str, ChangeCase]) -> None:
 
 
 def test_loop_3_improves_only_in_travel(found: dict[str, ChangeCase]) -> None:
-    """Loop 3 improves in valve travel alone, and its neighbour is named as the cause, as in the study."""
+    """Loop 3 improves only in valve travel, and its neighbour is named as the cause, as in the study."""
     case = found["LIC2103"].found
     better = [c.measure.name for c in case.primary if c.verdict is ChangeVerdict.BETTER]
     assert better == ["valve_travel_pct_per_h"]
@@ -68,7 +70,7 @@ def test_loop_3_improves_only_in_travel(found: dict[str, ChangeCase]) -> None:
 
 
 def test_untouched_loops_do_not_change(store: Store) -> None:
-    """Loops that nobody touched are called neither better nor worse at the same moment."""
+    """Loops without a change are called neither better nor worse at the same moment."""
     moment = read_changes(MILL / "changes.csv")[0]
     known, _ = change_cases(store, [replace(moment, loop=loop) for loop in OTHERS])
     calls = {c.found.loop: {x.verdict for x in c.found.primary} for c in known}
@@ -76,8 +78,10 @@ def test_untouched_loops_do_not_change(store: Store) -> None:
     assert all(v <= {ChangeVerdict.UNCLEAR, ChangeVerdict.INCOMPARABLE} for v in calls.values())
 
 
-def test_changes_are_offered_where_there_were_some(store: Store) -> None:
-    """Changes of behaviour are offered for retuned loops only, within six hours of the truth; most are seen."""
+def test_changes_are_found_for_retuned_loops(store: Store) -> None:
+    """Changes of behaviour are found for retuned loops only, within six hours of the truth, and for at least five of
+    them.
+    """
     truth = {c.loop: c.time_s for c in read_changes(MILL / "changes.csv")}
     offered = {c.loop: c.time_s for c in detected(store, None, Config())}
     assert set(offered) <= set(truth)
@@ -86,18 +90,18 @@ def test_changes_are_offered_where_there_were_some(store: Store) -> None:
 
 
 def kept_part(text: str) -> str:
-    """What a change of the analysis should not move: outcomes and verdicts, without their digits."""
+    """The part that a change of the analysis should not alter: outcomes and verdicts, without their digits."""
     short, _, rest = text.partition("## In pictures")
     table = rest.partition("## Figures before and after")[2].partition("## ")[0]
     loops = [line.split(" | ") for line in short.splitlines() if line.startswith("| ")]
     rows = [line.split(" | ") for line in table.splitlines() if line.startswith("| ")]
-    told = short.partition("\n| ")[0]
+    head = short.partition("\n| ")[0]
     kept = [(r[0], r[-1]) for r in loops] + [(*r[:2], *r[-2:]) for r in rows]
-    return told + "\n" + "\n".join(map(" | ".join, kept)) + "\n"
+    return head + "\n" + "\n".join(map(" | ".join, kept)) + "\n"
 
 
-def test_markdown_says_what_it_said(found: dict[str, ChangeCase]) -> None:
-    """The report's summary and verdicts in Markdown are those kept beside this test."""
+def test_markdown_equals_the_stored_text(found: dict[str, ChangeCase]) -> None:
+    """The report's summary and verdicts in Markdown equal those stored with this test."""
     text = render(
         before_after.changes_page(list(found.values()), [], "7 days before against after the change.")
     )

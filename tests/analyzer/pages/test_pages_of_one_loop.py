@@ -1,4 +1,4 @@
-"""The pages of one named loop, beside those that a folder has."""
+"""The pages of one named loop in a folder with other pages."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from reports.texts import slug
 from tests.analyzer.conftest import RunPlant
 
 
-def test_the_page_of_one_loop_is_that_of_all_pages(run_plant: RunPlant, tmp_path: Path) -> None:
-    """--loop writes the page that all pages have of the loop, beside them, and none of another loop."""
+def test_the_page_of_one_loop_is_that_among_all_pages(run_plant: RunPlant, tmp_path: Path) -> None:
+    """--loop writes the page of the loop that is also among all pages, and no page of another loop."""
     store = Store(run_plant.store)
     loop = store.read("nights", store.require(), ["loop"]).column(0).to_pylist()[7]
     made = {}
@@ -32,7 +32,7 @@ def test_the_page_of_one_loop_is_that_of_all_pages(run_plant: RunPlant, tmp_path
 
 
 def test_a_loop_that_the_night_lacks_is_one_line(run_plant: RunPlant, tmp_path: Path) -> None:
-    """--loop of a loop that is not there ends with 2 and one line, and writes no page."""
+    """--loop with an unknown loop ends with 2 and one line, and writes no page."""
     done = CliRunner().invoke(
         main, ["pages", str(run_plant.store), "--out", str(tmp_path / "p"), "--loop", "NONE1"]
     )

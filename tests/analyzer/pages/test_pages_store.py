@@ -1,4 +1,4 @@
-"""Pages hold what the store holds, of the right size, in good time."""
+"""Pages show the content of the store, with a limited size and in limited time."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ CHANGED_S = START_S + 7 * 86400.0
 
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
-    """Two weeks of 30 made-up loops."""
+    """Two weeks of 30 invented loops."""
     return small_store(tmp_path_factory.mktemp("store"))
 
 
 def table(page: Page, name: str) -> Table:
-    """A page's table by name."""
+    """A table of a page by name."""
     return next(t for t in page.tables() if t.name == name)
 
 
@@ -49,7 +49,7 @@ def column(found: Table, key: str) -> list[float | None]:
 
 
 def test_ranking_holds_the_nights_numbers(store: Store) -> None:
-    """Every number of the ranking equals the store's, to the last digit."""
+    """Each number of the ranking equals that of the store exactly."""
     found = table(morning.morning_page(read_night(store, None, 5)), "ranking")
     rows = {r["loop"]: r for r in store.read("nights", store.require()).to_pylist()}
     tags = [row[0].text for row in found.rows]
@@ -59,7 +59,7 @@ def test_ranking_holds_the_nights_numbers(store: Store) -> None:
 
 
 def test_before_after_means_are_the_hours(store: Store) -> None:
-    """Means before and after equal the means of the store's hours, the hours of the change left out."""
+    """Means before and after equal the means of the store's hours, without the hours of the change."""
     loop = NASTY[0]
     (case,), missing = change_cases(store, [TuningChange(loop, CHANGED_S)])
     assert missing == []
@@ -73,7 +73,7 @@ def test_before_after_means_are_the_hours(store: Store) -> None:
 
 
 def test_loops_that_the_store_lacks_are_named(store: Store) -> None:
-    """A change of a loop that the store does not hold is named with the reason, the others are looked at."""
+    """A change of a loop that the store does not have is named with the reason; the others are evaluated."""
     found, missing = change_cases(store, [TuningChange("GONE", CHANGED_S), TuningChange(NASTY[1], CHANGED_S)])
     assert [c.found.loop for c in found] == [NASTY[1]]
     assert [m[0] for m in missing] == ["GONE"]
@@ -81,7 +81,7 @@ def test_loops_that_the_store_lacks_are_named(store: Store) -> None:
 
 
 def test_morning_page_names_every_loop_once(tmp_path: Path) -> None:
-    """Loops not assessed stand in the list of those with their reason; what is new and better is told."""
+    """Loops that are not assessed are listed with their reason, and changes are listed under New and Better."""
     store = small_store(tmp_path)
     settle_anew(store, Config())
     view = read_night(store, "2026-03-09", 50)
@@ -95,20 +95,20 @@ def test_morning_page_names_every_loop_once(tmp_path: Path) -> None:
 
 
 def test_first_night_has_nothing_before(store: Store) -> None:
-    """The first night's page says that there is none before."""
+    """The page of the first night says that it is the first night."""
     page = morning.morning_page(read_night(store, "2026-03-02", 3))
     texts = [b.paragraphs[0] for s in page.sections for b in s.blocks if isinstance(b, Text)]
     assert "This is the first night in the store." in texts
 
 
 def test_unknown_night_is_an_error(store: Store) -> None:
-    """A night that the store lacks is refused with those it has."""
+    """A night that the store does not have is refused with the nights that it has."""
     with pytest.raises(InputError, match="2026-03-15"):
         list(night.pages_of_night(store, "1999-01-01"))
 
 
 def test_trends_keep_extremes_and_gaps(store: Store) -> None:
-    """Thinning further keeps the least and the greatest; a gap between nights is a gap in the trend."""
+    """Further thinning keeps minimum and maximum; a gap between nights is a gap in the trend."""
     nights = store.nights()
     loop = NASTY[2]
     thin = read_trends(store, [loop], [nights[0], nights[2]])[loop]
@@ -123,7 +123,7 @@ def test_trends_keep_extremes_and_gaps(store: Store) -> None:
 
 
 def test_rhythm_shows_the_period(store: Store) -> None:
-    """Autocorrelation and spectrum of a cycle of 400 s have their peaks where the mark is."""
+    """Autocorrelation and spectrum of a cycle of 400 s have their peaks at the mark."""
     loop = NASTY[0]
     thin = read_trends(store, [loop], store.nights()[:1])[loop]
     correlation, spectrum = rhythm_plots(thin, 400.0)
@@ -138,7 +138,7 @@ def test_rhythm_shows_the_period(store: Store) -> None:
 
 
 def test_short_periods_are_not_drawn_from_coarse_trends(store: Store) -> None:
-    """A period that the stored trend cannot show is said, not drawn."""
+    """A period that the stored trend cannot show is stated and not drawn."""
     loop = NASTY[0]
     thin = read_trends(store, [loop], store.nights()[:1])[loop]
     (found,) = rhythm_plots(thin, 30.0)
@@ -154,7 +154,9 @@ def test_autocorrelation_equals_its_definition() -> None:
 
 
 def test_area_score_weighs_importance() -> None:
-    """The score is the share of sound loops by importance; an area in which none is assessed has none."""
+    """The score is the share of loops without fault, weighted by importance; without an assessed loop there is no
+    score.
+    """
     row = {"status": "ok", "importance": 3.0, "cause": "none", "action": "none"}
     bad = {**row, "importance": 1.0, "cause": "valve"}
     frozen = {**row, "importance": 1.0, "action": "check measurement"}
@@ -162,8 +164,8 @@ def test_area_score_weighs_importance() -> None:
     assert score([{**row, "status": "failed"}]) is None
 
 
-def test_wear_is_never_invented(store: Store) -> None:
-    """Valve life and cost appear only where the plant states its numbers, and follow from them."""
+def test_wear_is_only_computed_from_stated_numbers(store: Store) -> None:
+    """Valve life and cost are shown only if the plant states its numbers, and are computed from them."""
     (case,), _ = change_cases(store, [TuningChange(NASTY[0], CHANGED_S)])
     assert wear_texts(case.found, {}) == ()
     assert wear_texts(case.found, {"extra": '{"valve_life_travel_pct": "nonsense"}'}) == ()
@@ -175,7 +177,7 @@ def test_wear_is_never_invented(store: Store) -> None:
 
 
 def test_everything_is_written(store: Store, tmp_path: Path) -> None:
-    """HTML, Markdown with its pictures, and a CSV of every table are written, all inside the folder."""
+    """HTML, Markdown with its pictures, and a CSV of each table are written inside the folder."""
     pages = list(night.pages_of_night(store, None, 3))
     html, text = write_html(pages, tmp_path / "h"), write_markdown(pages, tmp_path / "m")
     tables = [p for page in pages for p in write_csv(page, tmp_path / "c")]
@@ -187,8 +189,8 @@ def test_everything_is_written(store: Store, tmp_path: Path) -> None:
     assert not list(tmp_path.rglob("*.tmp"))
 
 
-def test_behaviour_changes_are_offered(tmp_path: Path) -> None:
-    """A loop whose valve moves four times as much for the same error is offered as changed, at the right hour."""
+def test_behaviour_changes_are_found(tmp_path: Path) -> None:
+    """A loop whose valve moves four times as much for the same error is found as changed, at the right hour."""
     found = small_store(tmp_path, loops=6)
     for path in sorted((tmp_path / "hours").glob("*.parquet"))[7:]:
         rows = pq.read_table(path)
@@ -203,7 +205,9 @@ def test_behaviour_changes_are_offered(tmp_path: Path) -> None:
 
 
 def test_a_big_plant_is_small(tmp_path: Path) -> None:
-    """The morning page of 1,500 loops is under 1 MB beside its assets, 50 loop pages with a week under 1.5 MB."""
+    """The morning page of 1,500 loops is under 1 MB without its assets; 50 loop pages with a week are under 1.5 MB
+    each.
+    """
     big = small_store(tmp_path / "store", loops=1500, nights=7, hours=False)
     written = write_html(night.pages_of_night(big, None, 50), tmp_path / "out", single_file=True)
     assert len(written) == 54
@@ -213,7 +217,9 @@ def test_a_big_plant_is_small(tmp_path: Path) -> None:
 
 
 def test_half_cycles_are_drawn_in_the_loops_unit() -> None:
-    """Stored half-cycles become three pictures: falling ones turned over, in the loop's unit, stuck parts marked."""
+    """Stored half-cycles become three pictures in the unit of the loop: falling ones are mirrored, sticking parts
+    marked.
+    """
     up = {
         "start_s": 0.0,
         "op": [10, 12, 14, 16],
@@ -237,16 +243,18 @@ def test_half_cycles_are_drawn_in_the_loops_unit() -> None:
     assert turn_panels({"turns": None, "cause": "valve"}, PvScale(0.0, 1.0, "")) is None
 
 
-def test_a_follower_is_laid_beside_its_source() -> None:
-    """The page of a loop that follows another one links to both on one time axis, whatever their names hold."""
+def test_a_follower_is_linked_with_its_source() -> None:
+    """The page of a loop that follows another one links to both on one time axis, for any characters in their
+    names.
+    """
     known = {"loop": "A 1", "night": "2026-03-02", "status": "ok", "source_loop": "B,2"}
     row = row_of(known)
     links = loop.loop_page([row | dict.fromkeys(set(loop.COLUMNS) - set(row))], None).links
     assert ("Compare with B,2", "side-by-side.html#B%2C2,A%201") in links
 
 
-def test_loops_side_by_side_stand_in_their_own_units(tmp_path: Path) -> None:
-    """Beside others a loop's trend has the unit and the figures that it has on its own page."""
+def test_loops_side_by_side_have_their_own_units(tmp_path: Path) -> None:
+    """Next to other loops, the trend of a loop has the unit and the values of its own page."""
     store = small_store(tmp_path / "store")
     file = store.file("nights", store.require())
     whole = pq.read_table(file)
@@ -254,16 +262,16 @@ def test_loops_side_by_side_stand_in_their_own_units(tmp_path: Path) -> None:
         at = whole.column_names.index(name)
         whole = whole.set_column(at, whole.schema.field(name), [[value] * whole.num_rows])
     pq.write_table(whole, file)
-    (beside,) = night.side_by_side(store, read_night(store, None, 1)).sections[0].blocks
-    assert isinstance(beside, Beside)
-    (shown,) = beside.trends
+    (neighbours,) = night.side_by_side(store, read_night(store, None, 1)).sections[0].blocks
+    assert isinstance(neighbours, Beside)
+    (shown,) = neighbours.trends
     thin = read_trends(store, [shown.title], [store.require()])[shown.title]
     assert shown.panels[0] == "SP, PV [degC]"
     assert shown.bands[0].low.min() == pytest.approx(-40.0 + 2.0 * thin.extremes["pv_min"].min())
 
 
 def test_beliefs_without_a_column_of_this_version_are_read(tmp_path: Path) -> None:
-    """A table of beliefs that an earlier version wrote lacks a column: it is unknown, the others are as they were."""
+    """A column that is missing from beliefs of an earlier version is unknown, and the others are unchanged."""
     old = small_store(tmp_path / "store")
     settle_anew(old, Config())
     night = old.require()

@@ -1,4 +1,4 @@
-"""What reading costs grows with the store, not with its square."""
+"""The cost of reading grows with the size of the store, not with its square."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from analyzer.store.store import Store
 from analyzer.store.table import read_stored, rows_table, write_table
 
 
-def test_parts_of_a_table_without_a_loop_that_is_asked_for_are_not_read(
+def test_parts_of_a_table_without_a_requested_loop_are_not_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Loops that lie in no order of their names are found, and only the parts that hold some are read whole."""
+    """Loops in any order are found, and only the parts that contain them are read completely."""
     names = [f"L{(7 * k) % 40:02d}" for k in range(40)]
     parts = [pa.table({"loop": names[k : k + 4], "reason": ["x" * 9] * 4}) for k in range(0, 40, 4)]
     write_table(parts, tmp_path / "2026-03-02.parquet")
@@ -38,7 +38,7 @@ def test_parts_of_a_table_without_a_loop_that_is_asked_for_are_not_read(
 def test_pages_of_many_nights_read_each_night_before_them_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Pages under their dates remember what they have read of earlier nights, though each looks back at all."""
+    """Pages of several nights read each earlier night once, although each page uses all of them."""
     store = Store(tmp_path)
     store.upgrade()
     for k in range(2, 9):

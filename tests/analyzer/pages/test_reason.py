@@ -1,4 +1,4 @@
-"""The sentence that says what a loop does."""
+"""The sentence that describes the oscillation of a loop."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from analyzer.words.reason import in_short, reason
 
 
 @pytest.mark.parametrize(
-    ("share", "said"),
+    ("share", "expected"),
     [
         (0.0, "does not oscillate"),
         (6.3, "cycles every 18.1 min, for 6 % of the time"),
@@ -20,12 +20,14 @@ from analyzer.words.reason import in_short, reason
         ),
     ],
 )
-def test_a_loop_that_cycles_for_a_part_of_the_night_is_not_said_to_be_calm(share: float, said: str) -> None:
-    """A cycle of too little time to count is told with its share; only a loop without one does not oscillate."""
+def test_a_loop_that_oscillates_for_a_part_of_the_night_is_reported(share: float, expected: str) -> None:
+    """A cycle of a small share of the time is reported with its share; only a loop without a cycle does not
+    oscillate.
+    """
     signs = (Sign(Cause.LOAD, 1.0, SignKind.REGULARITY, (1.5, 0.2, 1.0)),)
     swing = Swing(1.0, share, 1086.0 if share else None, 1.0)
     cause = Cause.LOAD if share >= 20 else Cause.NONE
-    assert reason(Finding("L", "2026-03-02", Status.OK, swing=swing, cause=cause, signs=signs)) == said
+    assert reason(Finding("L", "2026-03-02", Status.OK, swing=swing, cause=cause, signs=signs)) == expected
 
 
 @pytest.mark.parametrize(
@@ -39,7 +41,9 @@ def test_a_loop_that_cycles_for_a_part_of_the_night_is_not_said_to_be_calm(share
     ],
 )
 def test_a_reason_in_short_is_its_first_clauses(text: str, head: str) -> None:
-    """Whole clauses stand in front as far as twenty words go, one at least; the others follow, and none is lost."""
+    """The short form has complete clauses of up to twenty words, at least one; the others follow, and none is
+    lost.
+    """
     first, rest = in_short(text)
     assert first == head
     assert "; ".join(filter(None, (first, rest))) == text

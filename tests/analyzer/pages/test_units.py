@@ -1,4 +1,4 @@
-"""Settings in words: in the controller's own units, and without an integral time where there is none."""
+"""Settings in words: in the units of the controller, and without an integral time if there is none."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from identification.models import Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
 
 
-def test_a_gain_is_in_percent_of_op_only_where_op_is() -> None:
-    """Where OP runs from 0 to 255 counts a gain is in its units for one of PV; from 0 to 100 it is in percent."""
+def test_a_gain_is_in_percent_of_op_only_if_op_is_in_percent() -> None:
+    """If OP is from 0 to 255 counts, a gain is in these units; if it is from 0 to 100, it is in percent."""
     counts = LoopSpec("A", op_lo=0.0, op_hi=255.0, gain_unit="engineering", pv_unit="counts")
     percent = LoopSpec("A", gain_unit="engineering", pv_unit="degC")
     assert [gain_unit(s.gain_unit, s.pv_unit, s.op_unit) for s in (counts, percent)] == [
@@ -27,7 +27,7 @@ def test_a_gain_is_in_percent_of_op_only_where_op_is() -> None:
 
 
 def test_a_controller_without_integral_action_has_no_integral_time() -> None:
-    """Of P alone on a noisy loop no integral time of years is found but none, and the list says so."""
+    """For P action alone on a noisy loop, no integral time is found, and the list says so."""
     rng = np.random.default_rng(8)
     sp = 50 + np.repeat(rng.uniform(-5, 5, 20), 200)
     r = closed_loop(Loop(Fopdt(1.0, 30.0, 3.0), Pid(2.0, math.inf)), sp, rng.normal(0, 0.1, sp.size))
@@ -40,12 +40,12 @@ def test_a_controller_without_integral_action_has_no_integral_time() -> None:
 
 
 def test_a_number_just_under_a_thousand_has_no_exponent() -> None:
-    """999.7 rounds to 1000, in a cell and between two settings; -0 is 0, and what is not known is said so."""
+    """999.7 is shown as 1000, in a cell and between two settings; -0 is shown as 0, and an unknown value is empty."""
     assert [number(x) for x in (999.7, 99.96, 0.01234, -0.0, None)] == ["1000", "100", "0.0123", "0", ""]
     assert arrow(999.7, None) == "1000 \u2192 none"
 
 
 def test_settings_are_typed_in_without_an_exponent() -> None:
-    """Settings that somebody types in stand as the controller takes them: 1150 s, not 1.15e+03 s."""
+    """Settings to type in are written without an exponent: 1154 s, not 1.15e+03 s."""
     assert settings(7.8, 1153.956, "%/m", "s") == "Kp 7.8 %/m, Ti 1154 s"
     assert settings(5209.5, 0.0, "% band", "s") == "Kp 5210 % band, no integral action"

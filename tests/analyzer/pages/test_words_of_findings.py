@@ -1,4 +1,6 @@
-"""A finding holds figures; its words are made at the store's door, the same whichever way it came there."""
+"""A finding contains figures; its words are made when it is stored, and are the same for each source of the
+finding.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +52,7 @@ STORED = [
         "figures": "",
     },
 ]
-"""The same as the store has kept them from its first version on."""
+"""The same signs as the store has kept them since its first version."""
 FOUND = Finding(
     "FIC1",
     "2026-03-02",
@@ -64,7 +66,7 @@ FOUND = Finding(
 
 
 def test_each_kind_has_its_words() -> None:
-    """There is no sign, and nothing that is needed, that words do not tell."""
+    """Each kind of sign and each kind of need has its sentences."""
     assert set(SAYS) == set(SignKind)
     assert set(sentences("needs")) == set(RequirementKind)
 
@@ -87,26 +89,26 @@ BOTH_WAYS = {
     SignKind.OF_BELOW: tuple(("F1", cause, tie) for cause in (*Cause, None) for tie in Tie),
     SignKind.OF_ABOVE: tuple(("F1", tie) for tie in Tie),
 }
-"""Figures that ask for each sentence of a sign."""
+"""Figures that use each sentence of a sign."""
 
 
-def test_every_sentence_of_a_sign_is_there_and_is_asked_for() -> None:
-    """Figures of either size find a sentence without a brace left in it, and no sentence is there for nothing."""
+def test_every_sentence_of_a_sign_exists_and_is_used() -> None:
+    """Figures of each size give a sentence without a brace, and each sentence is used."""
     assert set(BOTH_WAYS) == set(SignKind)
     signs = [Sign(Cause.LOAD, 0.5, kind, each) for kind, figures in BOTH_WAYS.items() for each in figures]
     assert not [text for text in map(sign_in_full, signs) if not text or "{" in text]
-    asked = {SAYS[s.kind](*s.figures)[0] for s in signs}
-    assert asked == set(sentences("signs"))
-    assert asked > set(sentences("figures_of_signs"))
+    used = {SAYS[s.kind](*s.figures)[0] for s in signs}
+    assert used == set(sentences("signs"))
+    assert used > set(sentences("figures_of_signs"))
 
 
-def test_the_store_keeps_words_as_ever() -> None:
-    """Signs stand in a row as cause, strength, text, name and figures."""
+def test_the_store_keeps_the_same_words() -> None:
+    """Signs are stored in a row as cause, strength, text, name and figures."""
     assert night_row(FOUND)["signs"] == json.dumps(STORED)
 
 
 def test_a_piece_keeps_figures_and_gives_the_same_night() -> None:
-    """What a worker writes holds no sentence, and the night made of it says what the finding says."""
+    """A piece that a worker writes contains no sentence, and the night made of it has the words of the finding."""
     piece = piece_row(FOUND)
     assert "explains" not in piece["signs"]
     assert "measured" not in json.loads(piece["reason"])[2]

@@ -1,4 +1,4 @@
-"""The work list: what notes say of the work on a loop, and what the nights since say of it."""
+"""The work list: the state of the work on a loop from its notes, and the result of the nights since the work."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ def at(day: str) -> float:
     return datetime.fromisoformat(f"{day}T12:00:00").replace(tzinfo=UTC).timestamp()
 
 
-def test_each_part_of_the_work_is_as_the_newest_note_says_that_speaks_of_it() -> None:
-    """A note without a state leaves the state, and the day on which it was reached, as they were."""
-    told = [
+def test_each_part_of_the_work_is_that_of_the_newest_note_with_this_part() -> None:
+    """A note without a state changes neither the state nor the day on which it was reached."""
+    given_notes = [
         Note("A", 1.0, "seen", "Laine"),
         Note("A", 2.0, "ordered", "Berg", "", "ordered", "2026-04-01"),
         Note("A", 3.0, "packing came"),
     ]
-    work = work_on(told)
+    work = work_on(given_notes)
     assert (work.note.text, work.owner, work.state, work.since_s, work.due) == (
         "packing came",
         "Berg",
@@ -44,14 +44,18 @@ def test_each_part_of_the_work_is_as_the_newest_note_says_that_speaks_of_it() ->
         2.0,
         "2026-04-01",
     )
-    assert work_on(told[:1]).state == "open"
+    assert work_on(given_notes[:1]).state == "open"
 
 
-def test_work_that_is_checked_is_done_since_it_was_done() -> None:
-    """A check a week later does not part the nights anew; work that is opened again and done is done since then."""
+def test_checked_work_keeps_the_day_on_which_it_was_done() -> None:
+    """A check a week later does not change the day of the work; work that is opened again and done counts from
+    then.
+    """
     states = ("open", "done", "checked", "open", "done")
-    told = [Note("A", float(k), s, "", "", s) for k, s in enumerate(states)]
-    assert [(work_on(told[: k + 1]).state, work_on(told[: k + 1]).since_s) for k in range(5)] == [
+    given_notes = [Note("A", float(k), s, "", "", s) for k, s in enumerate(states)]
+    assert [
+        (work_on(given_notes[: k + 1]).state, work_on(given_notes[: k + 1]).since_s) for k in range(5)
+    ] == [
         *(("open", 0.0), ("done", 1.0), ("checked", 1.0), ("open", 3.0), ("done", 4.0)),
     ]
 
@@ -62,8 +66,8 @@ def night(name: str, oscillating: float, error: float) -> dict[str, object]:
     return {"night": name, "status": "ok", "oscillating_pct": oscillating, **figures}
 
 
-def test_the_nights_since_are_held_against_those_before() -> None:
-    """The day of the work is on neither side; half the error and a cycle that is gone are told in figures."""
+def test_the_nights_since_are_compared_with_those_before() -> None:
+    """The day of the work belongs to neither side; half the error and the end of the cycle are given in figures."""
     rows = [night(f"2026-03-0{d}", 90.0, 2.0) for d in (2, 3, 4)] + [
         night(f"2026-03-0{d}", 0.0, 1.0) for d in (5, 6)
     ]
@@ -75,16 +79,16 @@ def test_the_nights_since_are_held_against_those_before() -> None:
         "2026-03-05",
         "2026-03-06",
     ]
-    said = said_since(done, both)
+    text = said_since(done, both)
     assert (
-        said == "2 nights: no longer oscillates, average absolute error \u221250 %, valve travel \u221250 %"
+        text == "2 nights: no longer oscillates, average absolute error \u221250 %, valve travel \u221250 %"
     )
     assert said_since(work_on([Note("A", 1.0, "seen")]), both) == ""
     assert said_since(done, sides(rows[:3], "2026-03-04")) == "no night since"
 
 
-def test_the_page_lists_what_waits_before_what_is_done_and_says_what_was_won(store: Store) -> None:
-    """What is overdue is coloured, what is done stands last with its nights, and its gain is summed up."""
+def test_the_page_lists_open_work_before_finished_work_with_its_gain(store: Store) -> None:
+    """Overdue work is coloured, finished work comes last with its nights, and its gain is summed."""
     for note in (
         Note("FIC0001", at("2026-03-08"), "stroked, packing changed", "Laine", "", "done"),
         Note("FIC0002", at("2026-03-09"), "to be stroked", "Berg", "", "open", "2026-03-10"),
@@ -106,15 +110,15 @@ def test_the_page_lists_what_waits_before_what_is_done_and_says_what_was_won(sto
     assert tiles[0].items[0][0] == f"{100 * (since / before - 1):+.0f} %".replace("-", "\u2212")
 
 
-def test_state_and_due_date_are_kept_by_the_command(store: Store, tmp_path: Path) -> None:
-    """`note` with a state alone says the state; the pages' list has it, and so has its CSV."""
+def test_state_and_due_date_are_stored_by_the_command(store: Store, tmp_path: Path) -> None:
+    """`note` with a state alone prints the state; the list of the pages and its CSV contain it."""
     run = CliRunner()
     path = str(store.path)
-    asked = run.invoke(
+    result = run.invoke(
         main, ["note", path, "FIC0001", "--state", "ordered", "--due", "2026-04-01", "--owner", "me"]
     )
-    assert asked.exit_code == 0
-    assert "ordered, due 2026-04-01" in asked.stdout
+    assert result.exit_code == 0
+    assert "ordered, due 2026-04-01" in result.stdout
     assert run.invoke(main, ["note", path, "FIC0001", "--state", "lost"]).exit_code == 2
     run.invoke(main, ["pages", path, "--out", str(tmp_path / "out")])
     text = (tmp_path / "out" / "csv" / "work-work-list.csv").read_text("utf-8")
