@@ -21,8 +21,8 @@ from tests.analyzer.belief.nights_of_a_loop import (
 
 
 def test_a_fault_too_small_for_one_night_is_found_by_several() -> None:
-    """If each night has 60 % of the evidence that one night needs, at one width, the fault is found by the fourth
-    night and not by the first.
+    """With 60 % of the required evidence in each night, at one width, the fault is found by the fourth night and not
+    by the first.
     """
     found = followed([row(k, CALM, witness=witness(0.8, 6.0)) for k in range(5)])
     assert found[0].valve.certain == ""
@@ -41,8 +41,9 @@ def test_nights_that_differ_in_width_give_no_valve_fault() -> None:
 
 
 def test_one_night_of_high_evidence_among_others_without_is_not_enough() -> None:
-    """The best night is left out: a backlash that is narrow compared with the range of OP and that only one of seven
-    nights shows is not reported.
+    """The best night is left out: a backlash that only one of seven nights shows is not reported.
+
+    Its width is small compared with the range of OP in that night.
     """
     odd = witness(0.8, 15.0).replace('"op_range": 1.6', '"op_range": 8.0')
     found = followed([row(k, CALM, witness=odd if k == 3 else witness(0.8, 0.0, 0.0)) for k in range(7)])

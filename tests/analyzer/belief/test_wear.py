@@ -39,8 +39,10 @@ def growing(start: float, per_day: float, begins: int, nights: int) -> np.ndarra
 
 @pytest.mark.parametrize(("missing", "alike"), [(0.0, 0.0), (0.4, 0.0), (0.0, 0.06)])
 def test_forecasts_contain_the_truth(missing: float, alike: float) -> None:
-    """For at least 20 of 24 valves that wear from 0.3 to 3 % in sixty nights, the forecast interval contains the day
-    on which they reach 5 %. This holds too if all widths of a valve have a common error.
+    """For at least 20 of 24 wearing valves, the forecast interval contains the day on which the width reaches 5 %.
+
+    The width grows from 0.3 to 3 % in sixty nights. The result holds too if all widths of a valve have a common
+    error.
     """
     held = 0
     for seed in range(24):

@@ -211,8 +211,8 @@ def test_settings_that_were_never_typed_in_are_reported(before: str, count: int)
 
 
 def test_the_loops_of_the_proof_change_as_stated() -> None:
-    """In the proof, one loop in three changes in load only: its part due to the change is below 0.05 and due to the
-    load above.
+    """In the proof, one loop in three changes in load only: its part due to the change is small, and its part due to
+    the load large.
     """
     found = changed(3, 6)
     assert [c.what in LOADS for c in found] == [False, True, False] * 2

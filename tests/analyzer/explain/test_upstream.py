@@ -15,7 +15,7 @@ from analyzer.loops.tags import match
 
 
 def loaded(n: int = 5400) -> pd.DataFrame:
-    """A PI loop on a lag of 60 s, with a measured load FT9 that acts through a lag of 20 s; one sample a second."""
+    """A PI loop on a lag of 60 s, one sample a second; its measured load FT9 acts through a lag of 20 s."""
     rng = np.random.default_rng(4)
     rows, load, felt, x, total = np.empty((n, 4)), 0.0, 0.0, 50.0, 50.0
     for k in range(n):

@@ -66,8 +66,9 @@ def test_two_controllers_of_one_valve_are_equal_at_times(walks):
 
 
 def test_halves_of_a_split_range_follow_their_controller(walks):
-    """A half of a split range moves with OP above 50 % and is constant below; a tag that is constant at its own
-    limits is no half.
+    """A half of a split range moves with OP above 50 % and is constant below.
+
+    A tag that is constant at its own limits is no half.
     """
     op = np.clip(walks[:, 0], 0, 100)
     middle = float(np.median(op))

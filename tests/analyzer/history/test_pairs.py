@@ -65,8 +65,9 @@ def sheet(header: str, excel: bool, quality: bool = False) -> str:
     ],
 )
 def test_a_zone_in_names_or_stamps_is_used(tmp_path: Path, name: str, behind: str, hours: float) -> None:
-    """A zone in the name or in the stamps is used as in any other table; letters after a tag above the stamps are no
-    zone.
+    """A zone in the name or in the stamps is used as in other tables.
+
+    Letters after a tag above the stamps are no zone.
     """
     rows = [f"2024-11-21 08:00:{k:02d}{behind},{k},2024-11-21 08:00:{k:02d}{behind},{k}" for k in range(20)]
     (tmp_path / "x.csv").write_text("\n".join([f"{name},a.PV,{name},a.OP", *rows]) + "\n")

@@ -182,7 +182,7 @@ def test_units_and_form_of_the_plant(pipe):
 
 
 def test_load_is_left_alone():
-    """A loop that a load oscillates gets the action to find the disturbance, and no settings."""
+    """A loop that oscillates because of a load gets the action to find the disturbance, and no settings."""
     found = assessed(OSCILLATING_LOAD)
     advice = settings(found, OSCILLATING_LOAD)
     assert found.verdict.cause == "load"
@@ -225,10 +225,10 @@ def test_one_hour_is_a_hint():
 
 @pytest.mark.parametrize(("every", "action"), [(15, "repair valve"), (5, "retune")])
 def test_a_sample_for_each_half_of_ti_gives_no_settings(every, action):
-    """At a sample every 15 s, a loop with Ti 30 s and no stated scan gets no settings, but the repair of its worn
-    valve.
+    """At a sample every 15 s, a loop with Ti 30 s and no stated scan gets no settings.
 
-    The reason states the required interval; at 5 s the loop gets settings.
+    The repair of its worn valve is still advised, and the reason states the required interval. At 5 s the loop gets
+    settings.
     """
     t = simulate(PIPE, 24.0)
     thin = {

@@ -31,9 +31,7 @@ def test_a_loop_s_own_period_is_identified_by_the_control_law() -> None:
 @pytest.mark.parametrize("fold", [1, 2, 3])
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_an_aliased_period_is_not_the_loop_s_own(fold: int, side: float) -> None:
-    """Cycles with frequency k/10 s ± 1/69 s, which appear as 69 s in rows of 10 s, are not taken for a cycle of 69
-    s.
-    """
+    """Cycles of 1/(k/10 s ± 1/69 s), which rows of 10 s show as 69 s, are not taken for 69 s."""
     true_s = 1.0 / (fold / EVERY + side / 69.0)
     assert not is_own_period(sampled(true_s), 69.0, PID)
 

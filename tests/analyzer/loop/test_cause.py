@@ -122,7 +122,7 @@ def test_stick_slip_is_distinguished_from_backlash(name):
 
 @pytest.mark.parametrize("name", named("load"))
 def test_period_of_the_load_is_that_of_the_machine(name):
-    """The period of a loop that a load oscillates is the period of the load within 1 %."""
+    """The period of a loop that oscillates because of a load is the period of the load within 1 %."""
     first = assessed(name).oscillations.first
     assert first is not None
     assert first.period_s == pytest.approx(SKETCHES[name].sine_s, rel=0.01)
@@ -178,8 +178,9 @@ def test_trends_that_do_not_identify_a_cause_state_what_they_need():
 @pytest.mark.parametrize("seed", [0, 1, 4, 5])
 @pytest.mark.parametrize("grid", [0.01, 0.1])
 def test_a_large_backlash_is_found_for_any_noise_and_load(seed, grid):
-    """A backlash of half the range of OP is found, and not a small one with a long dead time that looks the same at
-    the period.
+    """A backlash of half the range of OP is found.
+
+    A small backlash with a long dead time, which looks the same at the period, is not chosen instead.
     """
     sketch = SKETCHES["backlash, tank"]
     made = simulate(sketch, 6, seed)
@@ -298,7 +299,7 @@ def test_a_follower_is_traced_to_its_source():
 
 
 def test_loops_that_cycle_by_themselves_follow_no_loop():
-    """Two loops with backlash, and one that a load oscillates, follow no other loop."""
+    """Two loops with backlash, and one that oscillates because of a load, follow no other loop."""
     found = [
         assessed(name) for name in ("backlash, tank", "backlash, temperature", "swinging load, pressure")
     ]
@@ -352,10 +353,10 @@ def test_a_sign_that_is_not_known_names_no_cause(name):
 
 
 def test_a_load_of_few_samples_a_cycle_is_named_by_its_phase_alone():
-    """With rows every 10 s and fewer than 8 samples a cycle there is no third harmonic, and the waveform does not
-    separate backlash from a load.
+    """With rows every 10 s and fewer than 8 samples a cycle, only the phase identifies the load.
 
-    Only the phase, which a sine keeps over 500 periods, names the load.
+    There is no third harmonic, so the waveform does not separate backlash from a load. A sine keeps its phase over
+    500 periods.
     """
     swung = Sketch("load", (1.4, 40.0, 5.0), 0.8, 60.0, noise=0.05, load_std=0.3, sine=4.0, sine_s=55.0)
     worn = Sketch("valve", (1.2, 8.0, 3.0), 0.4, 20.0, stickband=4.0, slip_jump=3.0, noise=0.08)

@@ -25,7 +25,7 @@ def test_the_simulated_present_agrees_under_ramps_of_the_load(at: int) -> None:
     """A level and a lag with worn valves and three changes of throughput are simulated with their present settings.
 
     Their error and OP's travel are the recorded ones. An earlier version took the offset of a nearly integrating
-    noise model for a load of 27 and 65 % of PV's span, and OP stayed at its limit.
+    noise model for a load. That load was 27 and 65 % of PV's span, and OP stayed at its limit.
     """
     config, d = Config(), drawn(662, at + 1, ("backlash",))[at]
     spec = spec_of(d)

@@ -50,7 +50,7 @@ def test_the_same_loop_with_a_free_valve_names_no_friction(tmp_path: Path) -> No
 
 
 def worn(folder: Path) -> PlantLoop:
-    """Eleven hours of a level that a backlash of 2 % makes oscillate; only a stretch of them is simulated."""
+    """Eleven hours of a level that oscillates because of a backlash of 2 %; only a stretch of them is simulated."""
     n = 41_000
     rng = np.random.default_rng(4)
     r = closed_loop(

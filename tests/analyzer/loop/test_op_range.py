@@ -86,7 +86,7 @@ def test_which_op_fits_a_range_of_0_to_100(low, high, resting, fits):
     """A valve that is constant at its limit fits the range; one that moves freely only near the limit, or beyond it,
     does not.
 
-    At 1.0 for a third of the time, an OP from 0 to 1 is at its own limit, which is no limit of 0 to 100.
+    An OP from 0 to 1 that is at 1.0 for a third of the time is at its own limit. This is no limit of 0 to 100.
     """
     op = np.linspace(low, high, 1000)
     at = low if low == 0.0 else high
@@ -98,8 +98,7 @@ def test_which_op_fits_a_range_of_0_to_100(low, high, resting, fits):
     ("other", "stated", "is_reported"), [(12.0, "", True), (60.0, "", False), (12.0, "4,20", False)]
 )
 def test_a_current_is_no_percent(tmp_path, other, stated, is_reported):
-    """If the OPs of all loops lie between 4 and 20, they look like mA: this is reported, and no figure is given in %
-    of OP.
+    """If the OPs of all loops lie between 4 and 20, they are reported as mA, and no figure is given in % of OP.
 
     This does not hold if one OP is in percent, or if the range is stated.
     """

@@ -153,9 +153,7 @@ def test_two_periods_at_once_are_both_reported():
 
 
 def test_amplitude_includes_the_noise_of_its_band():
-    """The amplitude is that of the band from f/1.6 to 1.6 f: white noise adds its power in that band to the power of
-    the sine.
-    """
+    """The amplitude is that of the band from f/1.6 to 1.6 f, and includes the power of white noise in that band."""
     period, sigma = 23.0, 2.0
     width = (1.6 - 1 / 1.6) / period  # in cycles a sample, of 0.5
     expected = np.sqrt(2.0**2 + 2 * sigma**2 * width / 0.5)

@@ -1,5 +1,6 @@
-"""External cycles: settings that reject them better if the process is known, and a first step with less travel if an
-undecided cycle rings through the loop.
+"""External cycles get settings that reject them better if the process is known.
+
+If an undecided cycle rings through the loop, a first step reduces the travel.
 """
 
 from __future__ import annotations

@@ -95,8 +95,8 @@ def test_a_constant_error_of_pv_is_no_other_integral_time():
 def test_a_series_law_stated_as_ideal_is_reported_if_each_scan_is_recorded():
     """The series law of Kp 2, Ti 80 s, Td 4 s is the ideal law of 2.1, 84 and 3.81.
 
-    If it is stated as the ideal law of 2, 80 and 4, it is reported although its gain is only 5 % off; stated
-    correctly, it is not.
+    If it is stated as the ideal law of 2, 80 and 4, it is reported although its gain is only 5 % off. If it is stated
+    correctly, it is not reported.
     """
     as_it_is, as_read = Pid(2.1, 84.0, 80.0 * 4.0 / 84.0), Pid(2.0, 80.0, 4.0)
     record = recorded(as_it_is)

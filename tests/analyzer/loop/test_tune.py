@@ -138,7 +138,7 @@ def test_stale_settings_get_no_advice(tmp_path, tank):
 
 
 def test_load_is_left_alone(tmp_path):
-    """A loop that a load oscillates gets no settings: the load oscillates."""
+    """A loop that oscillates because of a load gets no settings."""
     swung = Sketch("load", (1.4, 90.0, 10.0), 0.8, 120.0, load_std=0.3, sine=3.0, sine_s=300.0)
     out = clean(tune_result(tmp_path, simulate(swung, 2.0), "0.8,120,0,100"), 0)
     assert "action: find disturbance" in out

@@ -124,10 +124,10 @@ def test_a_valve_causes_no_cycle_at_a_period_at_which_its_loop_attenuates_loads(
 
 @pytest.mark.parametrize(("size", "strong"), [(0.05, False), (0.6, True)])
 def test_evidence_of_a_fault_too_small_for_op_counts_little(loaded, size, strong):
-    """Evidence of 60 nat for a fault of 5 % of the range of OP is weak, and a constant size is then no sign of the
-    valve.
+    """Evidence of 60 nat for a fault of 5 % of the range of OP is weak.
 
-    For a fault of 60 % of the range, the evidence is strong and the constant size is a sign.
+    A constant size is then no sign of the valve. For a fault of 60 % of the range, the evidence is strong and the
+    constant size is a sign.
     """
     _, found = loaded
     m, cycle = found.verdict.measured, counting(found.oscillations)

@@ -49,7 +49,7 @@ def causes_of(cause: str, loops: int = 12) -> Counter[str]:
 
 @pytest.mark.parametrize("cause", ["healthy", "tuning"])
 def test_no_valve_is_the_cause_if_valves_move_freely(cause):
-    """Of twelve loops without fault, and twelve that their tuning oscillates, no valve is the cause."""
+    """Of twelve loops without fault, and twelve that oscillate because of their tuning, no valve is the cause."""
     assert causes_of(cause)["valve"] == 0
 
 
@@ -62,8 +62,8 @@ def test_periodic_loads_that_drift_are_rarely_called_tuning():
     assert found["tuning"] + found["valve"] <= 2
 
 
-def test_loops_that_their_tuning_oscillates_are_found():
-    """Of twelve loops that their own tuning oscillates, at least eight are found."""
+def test_loops_that_oscillate_because_of_their_tuning_are_found():
+    """Of twelve loops that oscillate because of their own tuning, at least eight are found."""
     assert causes_of("tuning")["tuning"] >= 8
 
 
@@ -94,10 +94,9 @@ def test_a_backlash_of_many_steps_of_the_grid_is_still_found():
     ("seed", "expected"), [(1503739, "tuning"), (1503856, "tuning"), (1503904, "undecided")]
 )
 def test_a_tuning_is_found_on_a_grid_of_two_steps_an_amplitude(seed, expected):
-    """For loops that their tuning oscillates by at least 1.5 steps of PV's grid, the tuning is found if settings are
-    known and eight rows a cycle show the ringing.
+    """A tuning is found at an amplitude of at least 1.5 steps of PV's grid if settings are known.
 
-    Otherwise the cause is undecided.
+    Eight rows a cycle must show the ringing. Otherwise the cause is undecided.
     """
     drawn = draw(seed)
     ready, stated = recorded(drawn, CONFIG)

@@ -124,7 +124,7 @@ def test_slow_rows_of_a_loop_tuned_too_tight_show_no_backlash(number):
 
 
 def test_a_limit_cycle_with_a_load_of_another_period_is_the_valves():
-    """If a valve makes a cycle of 223 s while a sine load of 67 s acts, the valve is the cause, with a width within 5
+    """If a valve makes a cycle of 223 s under a sine load of 67 s, the valve is the cause, with a width within 5
     %.
     """
     d = loop(594, "worn-sine", 0)

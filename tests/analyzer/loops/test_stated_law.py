@@ -111,7 +111,7 @@ def test_the_typing_error_that_explains_the_settings_is_named(spec, found, chang
 
 
 def test_found_terms_are_written_in_the_units_of_loops_csv(tmp_path):
-    """A gap of 1 % of a span of 200, a rate of 1 %/s and a limit of 50 % of 4 to 20 mA are 2, 0.16 and 12."""
+    """Of spans of 200 and 4 to 20 mA, 1 % of gap, 1 %/s of rate and 50 % of limit are written as 2, 0.16 and 12."""
     spec = row(tmp_path, "pv_lo,pv_hi,op_lo,op_hi,kp,ti", "100,300,4,20,2,60")
     stated = controller(spec, 200.0)
     assert stated is not None

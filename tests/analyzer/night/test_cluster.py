@@ -76,10 +76,9 @@ def test_a_worker_killed_during_the_run_loses_no_loop(export, whole, cluster, tm
 
 @pytest.mark.slow
 def test_a_scheduler_that_dies_is_one_line(export, whole, tmp_path):
-    """If the scheduler is killed with kill -9 during the run, the run ends with exit 2 and a last line that names it
-    and --resume.
+    """If the scheduler is killed with kill -9 during the run, the run ends with exit 2 and one last line.
 
-    The resumed run on this machine gives the store of an undisturbed run.
+    The line names the scheduler and --resume. The resumed run on this machine gives the store of an undisturbed run.
     """
     store = tmp_path / "store"
     command = [sys.executable, "-m", "analyzer.cli", "run", str(export), "--store", str(store)]

@@ -29,8 +29,8 @@ N = HOURS * 3600
 FROZEN, SLUGGISH, TIGHT, SINE, BACKLASH_ON_LEVEL = "FT101", "TC102", "PC103", "PC104", "LC105"
 LIMITED, NO_FAULT, WORN, MANUAL = "TC106", "FC107", "TC108", "FC109"
 SINE_S, FROZEN_FROM, MANUAL_FROM = 840.0, 0.6, 0.25
-"""Period of the load of PC104 [s]; share of the night after which the PV of FT101 is constant, and after which FC109
-is in manual.
+"""Period of the load of PC104 [s]; start of the constant PV of FT101 and of manual of FC109 as a share of the
+night.
 """
 WIDTHS = {BACKLASH_ON_LEVEL: 3.0, WORN: 4.0}
 """True widths of the backlash [% OP]."""

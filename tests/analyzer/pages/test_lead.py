@@ -119,7 +119,7 @@ def test_names_read_as_a_list(names: list[str], text: str) -> None:
 
 
 def test_a_loop_that_oscillates_between_limits_gets_no_check_of_the_valve_size() -> None:
-    """For a loop that is too tight and at a limit half of the time, a first step is named, not the size of the valve.
+    """For a loop that is too tight and often at a limit, a first step is named, not the size of the valve.
 
     For a loop without oscillation at its limit, the size of the valve is named.
     """

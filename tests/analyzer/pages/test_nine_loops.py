@@ -56,8 +56,9 @@ def answered(*words: str, status: int = 0) -> str:
 
 @dataclass(frozen=True)
 class Results:
-    """The results of each command for the night: rows of `rank` by loop, the text of `summary`, `tune` as data by
-    loop, and the pages by title.
+    """The results of each command for the night.
+
+    These are the rows of `rank` by loop, the text of `summary`, the data of `tune` by loop, and the pages by title.
     """
 
     arguments: tuple[str, ...]
