@@ -1,4 +1,4 @@
-"""Steps that a call takes: what a clock would measure, without the clock's noise."""
+"""Count of the function calls that a piece of work makes: a measure of effort without the noise of a clock."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 
 def steps(work: Callable[[], object]) -> int:
-    """Calls, of Python's functions and of C's, that `work` makes in this thread."""
+    """Number of calls of Python and C functions that `work` makes in this thread."""
     count = 0
 
     def counted(_frame: object, event: str, _what: object) -> None:

@@ -1,4 +1,4 @@
-"""The documents do not drift from the program."""
+"""The documents agree with the program."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def shell_blocks() -> list[str]:
 
 
 def test_readme_starts_with_two_commands():
-    """The README holds two sh blocks of one command each: the main job and the tests."""
+    """The README has two sh blocks of one command each: the main job and the tests."""
     blocks = shell_blocks()
     assert len(blocks) == 2
     assert all(block.count("\n") == 1 for block in blocks)
@@ -36,8 +36,8 @@ def test_readme_starts_with_two_commands():
     assert "pytest" in blocks[1]
 
 
-def test_the_walk_names_modules_that_exist():
-    """Each module and folder that the walk through the rooms names is there."""
+def test_the_architecture_page_names_modules_that_exist():
+    """Each module and folder that docs/architecture.md names exists."""
     walk = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
     named = set(re.findall(r"\b(?:analyzer|identification|tuning|reports)/[\w/]+(?:\.py)?", walk))
     assert len(named) > 25
@@ -51,10 +51,10 @@ def test_ci_runs_the_readme_tests():
     assert command.group(0) in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
 
 
-def test_floors_are_those_of_the_project():
-    """.ci/oldest pins each dependency of a user at the version from which pyproject.toml allows it, once."""
-    asked = [sys.executable, str(ROOT / ".ci" / "floors.py"), str(ROOT / "pyproject.toml")]
-    pins = subprocess.run(asked, capture_output=True, text=True, check=True).stdout.split()
+def test_oldest_versions_are_those_of_the_project():
+    """.ci/oldest pins each dependency of a user once, at the oldest version that pyproject.toml allows."""
+    command = [sys.executable, str(ROOT / ".ci" / "floors.py"), str(ROOT / "pyproject.toml")]
+    pins = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert [pin.replace("==", ">=") for pin in pins[: len(project["dependencies"])]] == project[
         "dependencies"
@@ -64,7 +64,7 @@ def test_floors_are_those_of_the_project():
 
 @pytest.mark.parametrize("name", sorted(main.commands))
 def test_each_command_has_help_and_an_example(name):
-    """Each command explains itself and shows an example."""
+    """Each command has a help text with an example."""
     result = CliRunner().invoke(main, [name, "--help"])
     assert result.exit_code == 0
     assert "Example" in result.output
@@ -73,8 +73,9 @@ def test_each_command_has_help_and_an_example(name):
 @pytest.mark.parametrize(
     "page", ["README.md", *(f"docs/{p.name}" for p in sorted((ROOT / "docs").glob("*.md")))]
 )
-def test_commands_on_pages_are_the_program_s(page):
-    """Each `triage` command on a page, in a block or in a sentence, exists and has the options that are shown."""
+def test_commands_on_pages_exist_in_the_program(page):
+    """Each `triage` command on a page, in a block or in a sentence, exists and has the options that the page
+    shows."""
     text = (ROOT / page).read_text(encoding="utf-8")
     shown = re.findall(r"(?:^|`|bin/)triage ([a-z-][^`&;|#\n]*)", text, re.MULTILINE)
     for name, *words in (line.split() for line in shown):
@@ -92,8 +93,8 @@ def headings(text: str) -> list[str]:
 
 
 @pytest.mark.skipif(os.environ.get("TRIAGE_WALK") != "all", reason="takes minutes: TRIAGE_WALK=all runs it")
-def test_the_list_in_the_readme_is_the_command_s(tmp_path):
-    """The list that the README shows is, to the character, the first lines that its first command prints."""
+def test_the_list_in_the_readme_is_what_the_command_prints(tmp_path):
+    """The list in the README is identical to the first lines that the `rank` command prints."""
     triage, sample = [sys.executable, "-m", "analyzer.cli"], ROOT / "sample_data"
     run = [*triage, "run", str(sample / "mill.parquet"), "--loops", str(sample / "loops.csv")]
     more = ["--store", str(tmp_path), "--until", "2026-03-09", "--jobs", "2"]
@@ -104,8 +105,9 @@ def test_the_list_in_the_readme_is_the_command_s(tmp_path):
 
 
 def test_main_job_of_the_readme_on_one_day(tmp_path):
-    """The README's main job, on one day of the sample mill, ranks the loops that are hidden as faulty first, tells a
-    cascade's sticking valve at its slave, and takes the phases of a batch for no cycle."""
+    """The README's main job, on one day of the sample mill, ranks the loops with a simulated fault first. It
+    reports the sticking valve of a cascade at the slave loop. It does not report the phases of a batch as an
+    oscillation."""
     triage = [sys.executable, "-m", "analyzer.cli"]
     sample = ROOT / "sample_data"
     run = [*triage, "run", str(sample / "mill.parquet"), "--loops", str(sample / "loops.csv")]
@@ -133,7 +135,7 @@ def test_main_job_of_the_readme_on_one_day(tmp_path):
 
 
 def cells(path: str) -> list[list[str]]:
-    """Rows of all tables of a page, their cells without back quotes."""
+    """Rows of all tables of a page. The cells have no back quotes."""
     lines = (ROOT / path).read_text("utf-8").splitlines()
     rows = [
         [c.strip().strip("`") for c in line.strip("|").split("|")] for line in lines if line.startswith("|")
@@ -142,12 +144,13 @@ def cells(path: str) -> list[list[str]]:
 
 
 def test_loops_csv_is_documented_column_by_column() -> None:
-    """docs/loops-csv.md names every column that the reader knows and no other, of changes.csv too."""
+    """docs/loops-csv.md lists every column that the readers of loops.csv and changes.csv know, and no other
+    column."""
     named = [row[0] for row in cells("docs/loops-csv.md") if len(row) in (2, 3) and row[0] != "column"]
     assert sorted(named) == sorted([*spec.COLUMNS, *changes.COLUMNS[1:], "loop"])
 
 
-def test_ten_systems_are_stated_in_words_that_loops_csv_takes() -> None:
+def test_ten_systems_are_stated_in_values_that_loops_csv_allows() -> None:
     """Each of the ten systems has a gain unit, a time unit and a form that loops.csv allows."""
     rows = [row for row in cells("docs/loops-csv.md") if len(row) == 7][1:]
     assert len(rows) == 10
@@ -157,7 +160,7 @@ def test_ten_systems_are_stated_in_words_that_loops_csv_takes() -> None:
 
 
 def test_pages_are_documented_with_the_words_they_use() -> None:
-    """docs/reading-a-page.md has every action, and every lane by its name."""
+    """docs/reading-a-page.md lists every action and every lane by its name."""
     text = (ROOT / "docs" / "reading-a-page.md").read_text("utf-8")
     actions = [row[0] for row in cells("docs/reading-a-page.md") if len(row) == 2]
     assert set(Action) <= set(actions)
@@ -166,7 +169,7 @@ def test_pages_are_documented_with_the_words_they_use() -> None:
 
 
 def test_the_table_of_faults_names_tests_that_exist():
-    """Each line of RELIABILITY.md names a file, a command or a test that there is."""
+    """Each file, command and test that a line of RELIABILITY.md names exists."""
     page = (ROOT / "docs" / "RELIABILITY.md").read_text(encoding="utf-8")
     code = "\n".join(p.read_text(encoding="utf-8") for p in (ROOT / "tests").rglob("test_*.py"))
     for name in re.findall(r"\btest_[a-z0-9_]+\b(?!\.py)", page):
@@ -177,8 +180,8 @@ def test_the_table_of_faults_names_tests_that_exist():
         assert (ROOT / (module.replace(".", "/") + ".py")).exists(), module
 
 
-def test_the_first_evening_goes_as_it_stands(tmp_path, monkeypatch):
-    """The five commands of docs/first-evening.md lead from an export without loops.csv to a list and pages."""
+def test_the_commands_of_the_first_evening_work_unchanged(tmp_path, monkeypatch):
+    """The five commands of docs/first-evening.md produce a list and pages from an export without loops.csv."""
     page = (ROOT / "docs" / "first-evening.md").read_text(encoding="utf-8")
     (block,) = re.findall(r"```sh\n(.*?)```", page, flags=re.DOTALL)
     commands = [line.split()[1:] for line in block.splitlines()]
@@ -186,7 +189,13 @@ def test_the_first_evening_goes_as_it_stands(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "sample_data").symlink_to(ROOT / "sample_data")
     done = [CliRunner().invoke(main, command, catch_exceptions=False) for command in commands]
-    assert [d.exit_code for d in done] == [0, 1, 0, 0, 0]  # of one loop nothing is recorded: check says so
+    assert [d.exit_code for d in done] == [
+        0,
+        1,
+        0,
+        0,
+        0,
+    ]  # one loop has no recorded data, and check reports it
     assert "21 of 22 loops assessed" in done[2].output
     assert "FIC2110" in done[3].output
     assert (tmp_path / "evening" / "pages" / "index.html").exists()

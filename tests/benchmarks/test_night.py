@@ -1,4 +1,4 @@
-"""The benchmark runs on a small plant; what it measures stands in night.md."""
+"""The benchmark of a night runs on a small plant. Its results are in night.md."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from benchmarks.night import measured, plant, stated, table
 
 
 def test_the_benchmark_measures_every_loop(tmp_path):
-    """Night and floor are measured for each loop of a plant, and the table tells cycling loops from others."""
+    """Night and floor are measured for each loop of a plant, and the table separates oscillating loops from the
+    others."""
     path, sketches = plant(4, 3.0, tmp_path)
     export = open_export([path])
     costs = measured(path, export, stated(find_loops(export.tags), sketches))

@@ -1,4 +1,5 @@
-"""A small fixed part of benchmarks/world: causes of plain loops, and whether a simulated present is believed."""
+"""A small fixed part of benchmarks/world: the causes of simulated loops, and the check of a simulated present
+loop."""
 
 from __future__ import annotations
 
@@ -28,15 +29,17 @@ START_S = 1_772_409_600.0
 PROCESS = Process(1.2, 150.0, 0.0, 15.0)
 TIGHT = Drawn("T", "tight", PROCESS, Controller(11.5, 110.0), Valve(), 21, 0.0, 0.0, 1.0, 0.0)
 SINE = Drawn("L", "load", PROCESS, Controller(2.5, 150.0), Valve(), 23, 0.0, 260.0, 1.0, 0.0)
-WORN = Drawn("B", "backlash", PROCESS, Controller(3.5, 40.0), Valve(BACKLASH, 3.0), 24, 0.0, 0.0, 1.0, 0.0)
-HEALTHY = Drawn("H", "healthy", PROCESS, Controller(2.5, 150.0), Valve(), 25, 0.0, 0.0, 1.0, 2.0)
+BACKLASH_LOOP = Drawn(
+    "B", "backlash", PROCESS, Controller(3.5, 40.0), Valve(BACKLASH, 3.0), 24, 0.0, 0.0, 1.0, 0.0
+)
+FAULT_FREE = Drawn("H", "healthy", PROCESS, Controller(2.5, 150.0), Valve(), 25, 0.0, 0.0, 1.0, 2.0)
 
 
 def assessed(
     d: Drawn, way: str = "plain", hours: float = 8, scan_s: float | None = 1.0, filter_s: float = 0.0
 ) -> tuple[Assessment, Pid]:
-    """What some hours of a loop come to, whose scan is stated or not and whose filter of PV is not, and its
-    controller."""
+    """The assessment of some hours of a loop, and the loop's controller. The scan is stated or not; the filter
+    of PV is not stated."""
     made = run(d, hours=hours, settings=replace(d.controller, pv_filter_s=filter_s))
     r, spec = recorded(made, way, 1), replace(spec_of(d), scan_s=scan_s)
     stamp, good = START_S + r["stamp_s"], np.zeros(r["pv"].size, dtype=bool)
@@ -48,27 +51,29 @@ def assessed(
 
 
 @pytest.mark.parametrize("way", ["plain", "rows missing"])
-@pytest.mark.parametrize(("loop", "cause"), [(HEALTHY, "none"), (SINE, "load"), (TIGHT, "tuning")])
-def test_the_loop_or_its_load_makes_the_cycle(loop: Drawn, cause: str, way: str) -> None:
-    """A loop of Ms above 4 that rings is tuning's; under a sine the same process well tuned has a load's cycle, and
-    without one none; missing rows change nothing."""
+@pytest.mark.parametrize(("loop", "cause"), [(FAULT_FREE, "none"), (SINE, "load"), (TIGHT, "tuning")])
+def test_the_loop_or_its_load_causes_the_oscillation(loop: Drawn, cause: str, way: str) -> None:
+    """A badly tuned loop (Ms above 4) has the cause tuning, a well tuned one under a sine the cause load,
+    without a sine none. Missing rows do not change the cause."""
     assert (sensitivity(loop.process, loop.controller)[0] > 4.0) == (cause == "tuning")
     assert assessed(loop, way)[0].verdict.cause == cause
 
 
 @pytest.mark.parametrize(("kind", "seed", "number"), [("backlash", 115, 7), ("load", 117, 2)])
-def test_the_likelier_model_names_what_other_signs_leave_open(kind: str, seed: int, number: int) -> None:
-    """A worn valve is named where its model explains PV far better than a load, a sine by the phase that it keeps."""
+def test_the_likelier_model_or_the_constant_phase_names_the_cause(kind: str, seed: int, number: int) -> None:
+    """Backlash is reported where its model explains PV far better than a load does. A sine is reported by its
+    constant phase."""
     d = drawn(seed, 8, (kind,))[number]
     verdict = assessed(d, hours=HOURS)[0].verdict
     assert verdict.cause == d.cause
     assert verdict.signs[0].kind is (SignKind.KEPT_PHASE if kind == "load" else SignKind.LIKELIER)
 
 
-def test_a_simulated_present_is_believed_only_where_it_agrees() -> None:
-    """The identified loop of a worn valve has the recorded reversals, error and travel; with a derivative that the
-    plant's controller has not its valve moves many times as much, and it is not believed."""
-    found, pid = assessed(WORN)
+def test_a_simulated_present_loop_is_accepted_only_where_it_agrees() -> None:
+    """The identified loop of a valve with backlash has the recorded reversals, error and travel, and is
+    accepted. With a derivative action that the plant's controller lacks, its valve moves at least three times
+    as much, and it is rejected."""
+    found, pid = assessed(BACKLASH_LOOP)
     limits = Config().advice
     assert (found.verdict.cause, found.verdict.fault) == ("valve", "backlash")
     loop, fit, _ = sought_for(found.verdict, pid, limits)
@@ -80,20 +85,20 @@ def test_a_simulated_present_is_believed_only_where_it_agrees() -> None:
     assert made.stem_travel > 3.0
 
 
-@pytest.mark.parametrize("loop", [HEALTHY, WORN], ids=["healthy", "worn"])
-def test_a_filter_of_pv_is_recognized_where_stated_gains_agree_without_it(loop: Drawn) -> None:
-    """Where little of OP is noise, the stated gains agree whatever filters PV; the filter is still recognized, and
-    none where there is none."""
+@pytest.mark.parametrize("loop", [FAULT_FREE, BACKLASH_LOOP], ids=["fault-free", "backlash"])
+def test_a_filter_of_pv_is_recognized_although_stated_gains_agree_without_it(loop: Drawn) -> None:
+    """If noise is a small part of OP, the stated gains agree with any filter of PV. The filter is recognized
+    nevertheless, and no filter is reported where there is none."""
     behind, plain = (assessed(loop, filter_s=smooth)[0].shown for smooth in (5.0, 0.0))
     assert plain is None
     assert behind is not None
     assert behind.pv_filter_s == pytest.approx(5.0, rel=0.12)
 
 
-def test_rounding_costs_no_settings() -> None:
-    """Rounded to a tenth of a percent OP flickers; without moves within a digit its simulated travel is the recorded
-    one, and the simulated present is believed as that of the record in full."""
-    found, pid = assessed(WORN, "rounded")
+def test_rounding_does_not_prevent_settings() -> None:
+    """A record rounded to a tenth of a percent is accepted like the full record. Without moves within one
+    digit, its simulated OP travel is the recorded one."""
+    found, pid = assessed(BACKLASH_LOOP, "rounded")
     limits = Config().advice
     loop, fit, _ = sought_for(found.verdict, pid, limits)
     made = agreement(loop, fit, load_of(fit, pid))
@@ -101,10 +106,11 @@ def test_rounding_costs_no_settings() -> None:
     assert made.op_travel == pytest.approx(1.0, abs=0.2)
 
 
-def test_a_scan_that_is_stated_replaces_close_rows() -> None:
-    """Of a worn valve recorded in more than a quarter of the integral time the law, whose scan is stated, tells OP
-    between the rows, and settings are sought; without the scan it takes a sample in that quarter."""
-    fast = replace(WORN, controller=replace(WORN.controller, ti_s=36.0))
+def test_a_stated_scan_replaces_close_rows() -> None:
+    """A valve with backlash is recorded in rows slower than a quarter of the integral time. If the scan is
+    stated, the control law gives OP between the rows, and settings are computed. Without the scan, settings
+    need a sample in each quarter of the integral time."""
+    fast = replace(BACKLASH_LOOP, controller=replace(BACKLASH_LOOP.controller, ti_s=36.0))
     found, pid = assessed(fast, "every 10 s", HOURS)
     spec = spec_of(fast)
     assert found.verdict.cause == "valve"
@@ -115,38 +121,39 @@ def test_a_scan_that_is_stated_replaces_close_rows() -> None:
     assert "a sample every 9 s" in kept.reason
 
 
-def test_intervals_in_slow_rows_hold_the_truth() -> None:
-    """Of a worn valve recorded every 10 s width, slope, gain, lag and dead time lie in their intervals, though
-    OP between the rows is unknown; in rows of every scan the same intervals are narrower."""
-    slow, fast = (assessed(WORN, way, HOURS) for way in ("every 10 s", "plain"))
-    p = WORN.process
+def test_intervals_in_slow_rows_contain_the_true_values() -> None:
+    """In rows of 10 s, backlash, slope, gain, time constant and dead time are in their intervals, although OP
+    between the rows is unknown. In rows of every scan the same intervals are narrower."""
+    slow, fast = (assessed(BACKLASH_LOOP, way, HOURS) for way in ("every 10 s", "plain"))
+    p = BACKLASH_LOOP.process
     true = {
-        "backlash_pct": WORN.valve.band,
+        "backlash_pct": BACKLASH_LOOP.valve.band,
         "gain": p.gain,
         "time_constant_s": p.lag_s,
         "dead_time_s": p.dead_s,
     }
     true["slope_pct_per_s"] = p.gain / p.lag_s
     limits = Config().advice
-    told, close = (intervals(found.verdict.fit, True, limits, pid) for found, pid in (slow, fast))
-    assert set(true) <= set(told)
+    slow_rows, close = (intervals(found.verdict.fit, True, limits, pid) for found, pid in (slow, fast))
+    assert set(true) <= set(slow_rows)
     for name, value in true.items():
-        assert told[name].low <= value <= told[name].high, name
-        assert told[name].high - told[name].low > close[name].high - close[name].low, name
+        assert slow_rows[name].low <= value <= slow_rows[name].high, name
+        assert slow_rows[name].high - slow_rows[name].low > close[name].high - close[name].low, name
 
 
-def test_a_worn_valve_is_told_beside_a_load_that_makes_the_cycle() -> None:
-    """Under one sine a valve with play is worn, by the width that it has, and a sound one is not."""
-    worn = replace(SINE, kind="worn-sine", valve=Valve(BACKLASH, 2.0))
-    verdict, sound = (assessed(d)[0].verdict for d in (worn, SINE))
-    assert (verdict.fault, sound.fault) == ("backlash", "none")
+def test_backlash_is_reported_in_addition_to_a_load_that_causes_the_oscillation() -> None:
+    """Under one sine, a valve with backlash is reported with its width, and a valve without backlash has no
+    fault."""
+    with_backlash = replace(SINE, kind="worn-sine", valve=Valve(BACKLASH, 2.0))
+    verdict, other = (assessed(d)[0].verdict for d in (with_backlash, SINE))
+    assert (verdict.fault, other.fault) == ("backlash", "none")
     assert verdict.measured is not None
     assert verdict.measured.play.valve.stickband == pytest.approx(2.0, rel=0.15)
 
 
 def test_models_that_do_not_ring_as_recorded_choose_no_settings() -> None:
-    """A tight loop whose models every 10 s have 84 % of the recorded error gets no settings that raise the error of
-    the true plant: by the models the calmest ones are best, which double it."""
+    """A tight loop whose models have 84 % of the recorded error gets no settings that raise the error of the
+    true plant. The models alone would choose the slowest settings, which double this error."""
     d = drawn(613, 7, ("tight",))[6]
     made = recorded(run(d), "every 10 s", d.seed)
     spec, good = spec_of(d), np.zeros(made["pv"].size, dtype=bool)
@@ -165,26 +172,26 @@ def test_models_that_do_not_ring_as_recorded_choose_no_settings() -> None:
     assert error < 1.0
 
 
-def test_a_narrow_stick_slip_may_be_a_wide_one() -> None:
-    """A sticking valve that is identified with half its stickband and three times the dead time gets settings that
-    lower the error of the true plant: they are tested on the widest stickband that the cycle allows too. Without
-    that test they raised it by 38 %."""
+def test_settings_are_also_tested_on_the_widest_stickband() -> None:
+    """A sticking valve identified with half its stickband and three times the dead time gets settings that
+    lower the true error. The settings are also tested on the widest stickband that the oscillation allows.
+    Without that test they raised the error by 38 %."""
     d = drawn(685, 8, ("stiction",))[2]
     found, pid = assessed(d, hours=HOURS)
     spec = spec_of(d)
-    told = advise(found, spec, pid, 100.0, Config())
+    advice = advise(found, spec, pid, 100.0, Config())
     assert found.verdict.fit.valve.stickband < 0.6 * d.valve.band
-    assert told.kp_new is not None
-    assert told.ti_new is not None
-    error, travel, *_ = outcome(d, replace(d.controller, kp=told.kp_new, ti_s=told.ti_new))
+    assert advice.kp_new is not None
+    assert advice.ti_new is not None
+    error, travel, *_ = outcome(d, replace(d.controller, kp=advice.kp_new, ti_s=advice.ti_new))
     assert error < 1.0
     assert travel < 0.7
 
 
 @pytest.mark.parametrize("way", ["every 5 s", "averages"])
-def test_a_clock_is_no_valve(way: str) -> None:
-    """A sine on the load keeps its phase over 700 periods, as no cycle of a valve does. In rows of 5 s backlash
-    explains a fast loop under it better than a line does."""
+def test_a_constant_frequency_is_not_a_valve_fault(way: str) -> None:
+    """A load that is a sine keeps its phase over 700 periods, which no limit cycle of a valve does. In rows of
+    5 s, backlash explains a fast loop under this load better than a linear model does."""
     d = drawn(689, 4, ("load",))[3]
     verdict = assessed(d, way, hours=HOURS)[0].verdict
     assert (verdict.cause, verdict.fault) == ("load", "none")
@@ -194,8 +201,8 @@ def test_a_clock_is_no_valve(way: str) -> None:
 
 @pytest.mark.parametrize(("number", "helped"), [(4, False), (5, True)], ids=["none help", "some help"])
 def test_settings_of_a_sticking_valve_are_tested_under_a_whole_day(number: int, helped: bool) -> None:
-    """A sticking loop of 20 minutes gets no settings, since those that a stretch of it promises raise the travel of
-    the true plant; one of 7 minutes gets settings that halve it."""
+    """A sticking loop with a period of 20 minutes gets no settings, because settings that look good on a part
+    of the day raise the true travel. A loop with a period of 7 minutes gets settings that halve the travel."""
     d = drawn(701, 6, ("stiction",))[number]
     spec, made = spec_of(d), recorded(run(d), "plain", d.seed)
     stamp, good = START_S + made["stamp_s"], np.zeros(made["pv"].size, dtype=bool)
@@ -203,9 +210,9 @@ def test_settings_of_a_sticking_valve_are_tested_under_a_whole_day(number: int, 
     one = prepare(spec, series, Config().quality)
     found = assess(one, controller_of(spec, one), Config())
     assert found.verdict.cause == "valve"
-    said = advise(found, spec, controller_of(spec, one), 100.0, Config(), record=one.record)
-    assert (said.kp_new is not None) == helped
-    if said.kp_new is not None and said.ti_new is not None:
-        error, travel, *_ = outcome(d, replace(d.controller, kp=said.kp_new, ti_s=said.ti_new))
+    advice = advise(found, spec, controller_of(spec, one), 100.0, Config(), record=one.record)
+    assert (advice.kp_new is not None) == helped
+    if advice.kp_new is not None and advice.ti_new is not None:
+        error, travel, *_ = outcome(d, replace(d.controller, kp=advice.kp_new, ti_s=advice.ti_new))
         assert error <= 1.0
         assert travel <= 0.5

@@ -1,4 +1,4 @@
-"""Loops of benchmarks/world in rows slower than their scan, put to `explain`: no effect that is not there."""
+"""Loops of benchmarks/world in rows slower than their scan: `explain` reports no effect that is absent."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ WAY = "every 10 s"
 
 
 def explained(d: Drawn, folder: Path) -> tuple[Explanation, dict]:
-    """The explanation of a loop's day at 10 s, and its data."""
+    """The explanation of one day of a loop in rows of 10 s, and its data."""
     settings = {"kp": d.controller.kp, "ti": d.controller.ti_s, "scan_s": d.controller.scan_s}
     pd.DataFrame([{"loop": d.name, "pv_lo": 0, "pv_hi": 100, **settings}]).to_csv(
         folder / "loops.csv", index=False
@@ -27,21 +27,23 @@ def explained(d: Drawn, folder: Path) -> tuple[Explanation, dict]:
     return found.found, found.data
 
 
-def test_a_healthy_loop_in_slow_rows_is_explained_by_the_baseline_model(tmp_path: Path) -> None:
-    """OP between two rows predicts PV too; that is no physics, and no settings are called wrong."""
+def test_a_fault_free_loop_in_slow_rows_is_explained_by_the_baseline_model(tmp_path: Path) -> None:
+    """A fault-free loop in slow rows has no effect and no wrong settings, although OP between two rows also
+    predicts PV."""
     data = explained(drawn(601, 6, ("healthy",))[5], tmp_path)[1]
     assert (data["verdict"], data["effects"]) == ("none", [])
 
 
 def test_a_quiet_loop_in_slow_rows_is_not_identified(tmp_path: Path) -> None:
-    """A healthy loop whose OP hardly moves has no effect, and the reason states what is missing."""
+    """A fault-free loop whose OP hardly moves has no effect, and the reason states what is missing."""
     data = explained(drawn(601, 6, ("healthy",))[1], tmp_path)[1]
     assert data["effects"] == []
     assert "Not identified: needs moves" in data["reason"]
 
 
 def test_a_worn_valve_in_slow_rows_has_no_second_effect(tmp_path: Path) -> None:
-    """Behind the backlash that the cycles show, what the model lacks between the rows gets no other name."""
+    """Backlash in slow rows is the only effect; the model's error between the rows is not reported as a second
+    one."""
     d = drawn(601, 6, ("backlash",))[3]
     found, data = explained(d, tmp_path)
     assert [effect["name"] for effect in data["effects"]] == ["backlash"]

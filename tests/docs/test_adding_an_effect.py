@@ -1,4 +1,4 @@
-"""The page on adding an effect works as it stands: its code is taken from it and finds the effect it describes."""
+"""The code on the page about adding an effect works unchanged and finds the effect that the page describes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from identification.mismatch.recording import Recording
 
 
 def recording(band, seed=3, n=2600):
-    """A lag of 15 s under a random staircase of OP, its sensor behind a band: a state machine, not the simulator."""
+    """A lag of 15 s and a sensor with a dead band under random steps of OP, computed without the simulator."""
     rng = np.random.default_rng(seed)
     op = 50 + np.cumsum(np.where(np.arange(n) % 60 == 0, rng.normal(0, 4, n), 0.0))
     op = 50 + 12 * np.tanh((op - 50) / 12)
@@ -43,18 +43,19 @@ def recording(band, seed=3, n=2600):
     return Recording(None, pv, op, np.ones(n, dtype=bool), 1.0, np.arange(n) * 1.0)
 
 
-said = []
+answers = []
 for band in (1.0, 0.0):
     s = recording(band)
     found = answer(explain(s), s)
     first = found.effects[0].parameters if found.effects else {}
-    said.append([found.verdict, {k: v.value for k, v in first.items()}])
-print(json.dumps(said))
+    answers.append([found.verdict, {k: v.value for k, v in first.items()}])
+print(json.dumps(answers))
 '''
 
 
 def test_page_adds_an_effect(tmp_path: Path) -> None:
-    """The page's file alone makes `explain` name a sticking sensor with its band, and none where none sticks."""
+    """With the page's file alone, `explain` reports a sticking sensor with its band, and reports no effect if
+    the sensor does not stick."""
     code = re.search(r"```python\n(.*?)```", PAGE.read_text(), re.S)
     assert code is not None
     (tmp_path / "sensor_sticks.py").write_text(code.group(1))

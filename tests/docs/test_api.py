@@ -1,4 +1,4 @@
-"""The Python API does what its examples say."""
+"""The Python API behaves as its examples show."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_examples_of_the_api(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every example in the API's docstrings gives what it shows, from the project's folder."""
+    """Every example in the API's docstrings gives the result that it shows, run from the project's folder."""
     monkeypatch.chdir(ROOT)
     found = doctest.testmod(api)
     assert found.attempted >= 12
@@ -26,7 +26,7 @@ def test_examples_of_the_api(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_package_gives_the_functions_of_the_page() -> None:
-    """`import analyzer as triage` has every function that the page lists, and no other name of its own."""
+    """`import analyzer as triage` has every function that the page lists, and no other public name."""
     page = (ROOT / "docs" / "python.md").read_text()
     assert sorted(re.findall(r"^\| `(\w+)\(", page, re.M)) == sorted(analyzer.__all__)
     assert all(callable(getattr(analyzer, name)) for name in analyzer.__all__)
@@ -35,8 +35,9 @@ def test_the_package_gives_the_functions_of_the_page() -> None:
         analyzer.asses  # noqa: B018
 
 
-def test_a_command_does_not_wait_for_the_functions() -> None:
-    """`triage rank` imports neither pandas nor the API, and the package explain stays callable once imported."""
+def test_a_command_does_not_import_the_api() -> None:
+    """`triage rank` imports neither pandas nor the API. The name `analyzer.explain` is callable also after an
+    import of the package with this name."""
     script = (
         "import sys, analyzer.cli, analyzer; assert 'analyzer.api' not in sys.modules;"
         "assert not {'pandas', 'scipy', 'numba'} & set(sys.modules);"
@@ -46,7 +47,7 @@ def test_a_command_does_not_wait_for_the_functions() -> None:
 
 
 def test_page_on_python(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The lines of the page run as they stand, and their results hold what the comments say."""
+    """The code of the page runs unchanged, and its results agree with the comments."""
     monkeypatch.chdir(ROOT)
     code = re.search(r"```python\n(.*?)```", (ROOT / "docs" / "python.md").read_text(), re.S)
     assert code is not None

@@ -1,4 +1,4 @@
-"""What the page on operations shows is what happens."""
+"""The page on operations agrees with what the program does."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ EVENT = re.compile(r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ triage\[\d+\] [a-z ]+( [a-
 
 @pytest.fixture
 def plant(tmp_path: Path) -> Path:
-    """A plant's folder: two exports, of which the newer one holds two loops of an hour, and loops.csv."""
+    """A plant's folder with loops.csv and two exports; the newer export has two loops of one hour."""
     folder = tmp_path / "mill"
     (folder / "exports").mkdir(parents=True)
     (folder / "exports" / "old.csv").write_text("no export at all")
@@ -36,8 +36,9 @@ def plant(tmp_path: Path) -> Path:
 
 
 @pytest.mark.skipif(shutil.which("sh") is None, reason="no shell")
-def test_the_night_script_makes_a_night(plant: Path) -> None:
-    """The script that cron and systemd call takes the newest export, keeps the night, writes pages and the log."""
+def test_the_night_script_stores_a_night(plant: Path) -> None:
+    """The script for cron and systemd reads the newest export, stores the night, and writes the pages and the
+    log."""
     triage = f"{sys.executable} -m analyzer.cli"
     environment = {**os.environ, "TRIAGE": triage, "PYTHONPATH": str(ROOT), "ZONE": "Europe/Helsinki"}
     script = ["sh", str(DEPLOY / "night.sh"), str(plant)]
@@ -52,7 +53,7 @@ def test_the_night_script_makes_a_night(plant: Path) -> None:
 
 
 def test_a_night_that_cannot_begin_is_logged(plant: Path) -> None:
-    """Without a usable export the script ends with 2, and the log says why."""
+    """Without a usable export the script ends with 2, and the log states the reason."""
     (plant / "exports" / "new.parquet").unlink()
     environment = {**os.environ, "TRIAGE": f"{sys.executable} -m analyzer.cli", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(["sh", str(DEPLOY / "night.sh"), str(plant)], env=environment, check=False)
@@ -62,8 +63,9 @@ def test_a_night_that_cannot_begin_is_logged(plant: Path) -> None:
     assert "old.csv" in last
 
 
-def test_a_log_line_is_one_line_of_words(tmp_path: Path) -> None:
-    """Whatever a reason holds, its event is one line of printable characters that a shell's quoting splits again."""
+def test_a_log_event_is_one_line_of_words(tmp_path: Path) -> None:
+    """An event with any reason is one line of printable characters, and the shell's quoting rules split the
+    line into its words again."""
     log = RunLog(tmp_path / "logs" / "x.log")
     log.say("lost", loop="FIC 1", reason='a "quoted"\nline\x1b[2J \u202e back\\slash', share=0.5)
     (line,) = (tmp_path / "logs" / "x.log").read_text(encoding="utf-8").splitlines()
@@ -77,10 +79,10 @@ def test_a_log_line_is_one_line_of_words(tmp_path: Path) -> None:
     ]
 
 
-def test_a_log_that_cannot_be_written_costs_no_night(
+def test_a_log_that_cannot_be_written_does_not_stop_the_night(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A log under a file in place of a folder is told once, and work goes on."""
+    """If the log's folder is a file, the program reports this once and continues to work."""
     (tmp_path / "file").write_text("")
     log = RunLog(tmp_path / "file" / "x.log")
     log.say("begin")
@@ -88,13 +90,13 @@ def test_a_log_that_cannot_be_written_costs_no_night(
     assert capsys.readouterr().err.count("no log is kept") == 1
 
 
-def test_the_page_names_what_there_is() -> None:
-    """Files that the page links exist, and the options that it and the script use are the program's."""
+def test_the_page_names_existing_files_and_options() -> None:
+    """The files that the page links exist, and the program has the options that the page and the script use."""
     page = (ROOT / "docs" / "operations.md").read_text(encoding="utf-8")
     for target in re.findall(r"\]\((deploy[^)]*)\)", page):
         assert (ROOT / "docs" / target).exists(), target
     for command in ("run", "pages", "store prune", "store check"):
-        told = subprocess.run(
+        printed = subprocess.run(
             [sys.executable, "-m", "analyzer.cli", *command.split(), "--help"],
             capture_output=True,
             text=True,
@@ -102,4 +104,4 @@ def test_the_page_names_what_there_is() -> None:
         ).stdout
         used = re.findall(rf"(?:triage|TRIAGE) {command} (.*)", page + (DEPLOY / "night.sh").read_text())
         for option in re.findall(r"--[a-z-]+", " ".join(used)):
-            assert option in told, (command, option)
+            assert option in printed, (command, option)

@@ -1,4 +1,4 @@
-"""The check of the pages' prose finds what it is for, and nothing else."""
+"""The prose check finds every banned phrase and long sentence, and nothing else."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ echo the plain loop is told
 
 
 def checked(folder: Path) -> subprocess.CompletedProcess[str]:
-    """The check on the pages of a folder."""
+    """The prose check, run on the pages of a folder."""
     return subprocess.run(
         [sys.executable, str(CHECK), str(folder)], capture_output=True, text=True, check=False
     )
@@ -43,8 +43,8 @@ def checked(folder: Path) -> subprocess.CompletedProcess[str]:
     ids=["plain", "phrase", "cell", "sentence", "length"],
 )
 def test_prose_is_checked(text: str, found: list[str], tmp_path: Path) -> None:
-    """A banned phrase, also over two lines, a long sentence and a long README are found with their line; code is not
-    read, and plain text has no finding."""
+    """The check finds a banned phrase (also across two lines), a long sentence and a long README, each with its
+    line. It does not read code, and a plain text has no finding."""
     (tmp_path / "README.md").write_text(text, encoding="utf-8")
     done = checked(tmp_path)
     lines = done.stdout.splitlines()
@@ -54,7 +54,8 @@ def test_prose_is_checked(text: str, found: list[str], tmp_path: Path) -> None:
 
 
 def test_the_newest_changes_are_checked(tmp_path: Path) -> None:
-    """Of a CHANGELOG with two versions the newer one is read; the older one, or a single one, is not."""
+    """The check reads the newer of two versions in CHANGELOG. It does not read the older version, and it does
+    not read a single version."""
     (tmp_path / "README.md").write_text(PLAIN, encoding="utf-8")
     log, old = tmp_path / "CHANGELOG.md", "## 0.1\n\nThe valve is told.\n"
     for text, status in (
@@ -67,8 +68,8 @@ def test_the_newest_changes_are_checked(tmp_path: Path) -> None:
 
 
 def test_printed_texts_are_checked(tmp_path: Path) -> None:
-    """A banned phrase in a value of a TOML file, also over two lines, is found with its name; keys and comments
-    are not read."""
+    """The check finds a banned phrase in a value of a TOML file, also across two lines, and reports the value's
+    name. It does not read keys and comments."""
     (tmp_path / "README.md").write_text(PLAIN, encoding="utf-8")
     (tmp_path / "tuning").mkdir()
     for file, text, found in (
