@@ -1,7 +1,9 @@
-"""Pictures of every kind of page for the documentation: python -m tests.browser.screenshots WEEK WEEKS [--out DIR]
+"""Pictures of every kind of page for the documentation: python -m tests.browser.screenshots WEEK WEEKS [--out
+DIR]
 
-Each page at three widths and as it prints, beside each other in one small picture. Needs chromium, its driver and two
-stores of the sample mill: its first week (README, first command), and both weeks for the page before and after.
+Each small picture shows one page at three widths and in print, side by side. The program needs chromium, its
+driver and two stores of the sample mill: one of the first week (README, first command), and one of both weeks
+for the before-and-after page.
 """
 
 from __future__ import annotations
@@ -22,14 +24,14 @@ from tests.browser.test_pages import A4_PX, CHROMIUM, DRIVER, OPTIONS
 
 WIDTHS = (390, 1280, 1920)
 HEIGHT = 1700
-"""Height of a picture before it is made small [px]; longer pages are cut."""
+"""Height of a picture before it is reduced [px]. Longer pages are cut."""
 SMALL = 0.4
-"""Factor by which pictures are made small."""
+"""Factor by which pictures are reduced."""
 GAP = 12
 
 
 def shot(browser: Any, page: Path, width: int, media: str) -> Image.Image:
-    """One page as it is seen."""
+    """One page as the browser shows it."""
     size = {"width": width, "height": HEIGHT, "deviceScaleFactor": 1, "mobile": width < 500}
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": media})
@@ -39,7 +41,7 @@ def shot(browser: Any, page: Path, width: int, media: str) -> Image.Image:
 
 
 def sheet(browser: Any, page: Path) -> Image.Image:
-    """All views of a page beside each other, made small."""
+    """All views of a page side by side, reduced."""
     views = [*((w, "screen") for w in WIDTHS), (A4_PX, "print")]
     drawn = [shot(browser, page, width, media) for width, media in views]
     small = [im.resize((round(im.width * SMALL), round(im.height * SMALL)), Image.LANCZOS) for im in drawn]
@@ -52,7 +54,7 @@ def sheet(browser: Any, page: Path) -> Image.Image:
 
 
 def run(arguments: list[str]) -> None:
-    """Run a command of triage in this process; those that end with a status are let end."""
+    """Run a command of triage in this process. A command may end with a status."""
     with contextlib.suppress(SystemExit):
         triage(arguments, standalone_mode=False)
 
@@ -70,12 +72,12 @@ def written(store: Path, weeks: Path, out: Path) -> dict[str, Path]:
 
 
 def main() -> None:
-    """Draw and save."""
-    asked = argparse.ArgumentParser(description=__doc__)
-    asked.add_argument("week", type=Path)
-    asked.add_argument("weeks", type=Path)
-    asked.add_argument("--out", type=Path, default=Path("docs/images"))
-    options = asked.parse_args()
+    """Draw and save the pictures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("week", type=Path)
+    parser.add_argument("weeks", type=Path)
+    parser.add_argument("--out", type=Path, default=Path("docs/images"))
+    options = parser.parse_args()
     chrome = webdriver.ChromeOptions()
     chrome.binary_location = str(CHROMIUM)
     for option in OPTIONS:

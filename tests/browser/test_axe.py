@@ -1,4 +1,5 @@
-"""Nobody is locked out: axe-core finds nothing serious on any kind of page, in light, in dark and on a phone."""
+"""Accessibility: axe-core finds nothing serious on any kind of page, in light mode, in dark mode and on a
+phone."""
 
 from __future__ import annotations
 
@@ -24,7 +25,8 @@ RUN = """const done = arguments[arguments.length - 1];
 
 
 def kinds(folder: Path) -> list[Path]:
-    """One page of each kind: morning, hand-over, side by side, work list, before and after, a loop's."""
+    """One page of each kind: morning, maintenance, side by side, work list, before and after, and one loop's
+    page."""
     here = folder / "folder"
     loop = next(p for p in sorted(here.glob("FIC*.html")))
     names = ("index", "maintenance", "side-by-side", "work", "before-after")
@@ -35,7 +37,7 @@ def kinds(folder: Path) -> list[Path]:
     ("width", "scheme"), [(390, "light"), (1280, "dark"), slow(390, "dark"), slow(1280, "light")]
 )
 def test_nothing_serious(browser: Any, folder: Path, scheme: str, width: int) -> None:
-    """No serious or critical violation on any page."""
+    """No page has a serious or critical violation."""
     size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     media = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
@@ -55,7 +57,7 @@ def test_nothing_serious(browser: Any, folder: Path, scheme: str, width: int) ->
 
 
 def test_nothing_serious_in_an_explanation(browser: Any, explained: list[Path]) -> None:
-    """Nor on the page of an explanation."""
+    """The page of an explanation has no serious or critical violation."""
     opened(browser, explained[0])
     wait(browser, "return Array.from(document.querySelectorAll('.trend')).every((t) => t.dataset.ready)")
     browser.execute_cdp_cmd("Runtime.evaluate", {"expression": SCRIPT})
@@ -65,17 +67,16 @@ def test_nothing_serious_in_an_explanation(browser: Any, explained: list[Path]) 
 @pytest.mark.parametrize(
     ("width", "scheme"), [(390, "dark"), (1280, "light"), slow(390, "light"), slow(1280, "dark")]
 )
-def test_nothing_serious_where_settings_are_tried(
-    browser: Any, settings: Path, scheme: str, width: int
-) -> None:
-    """Nor on the page with sliders, on a phone, in light and in dark; nothing is wider than the phone."""
+def test_nothing_serious_on_the_settings_page(browser: Any, settings: Path, scheme: str, width: int) -> None:
+    """The page with sliders has no serious or critical violation, on a phone, in light and in dark mode.
+    Nothing is wider than the screen."""
     size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     browser.execute_cdp_cmd(
         "Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
     )
     try:
-        opened(browser, settings / "play.html")
+        opened(browser, settings / "backlash.html")
         wait(browser, "return document.querySelector('.whatif').dataset.ready === 'yes'")
         assert browser.execute_script("return document.documentElement.scrollWidth") <= width
         browser.execute_cdp_cmd("Runtime.evaluate", {"expression": SCRIPT})

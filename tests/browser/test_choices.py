@@ -1,4 +1,5 @@
-"""Readers choose: loops side by side, rows by area and action, another night; followers stay under their source."""
+"""Readers choose loops side by side, rows by area and action, and another night. Followers stay below their
+source."""
 
 from __future__ import annotations
 
@@ -13,8 +14,9 @@ from tests.browser.test_pages import browser, column, folder, head, opened, pyte
 __all__ = ["browser", "folder", "pytestmark"]
 
 
-def test_loops_chosen_in_the_table_are_laid_on_one_time_axis(browser: Any, folder: Path) -> None:
-    """Two boxes and a button lead to both trends; zooming one zooms the other, and a seventh cannot be chosen."""
+def test_loops_chosen_in_the_table_are_shown_on_one_time_axis(browser: Any, folder: Path) -> None:
+    """Two boxes and a button lead to both trends. A zoom of one trend zooms the other, and a seventh loop
+    cannot be chosen."""
     opened(browser, folder / "folder" / "index.html")
     for box in browser.find_elements(By.CSS_SELECTOR, "#worst tbody input[type=checkbox]")[:2]:
         box.click()
@@ -42,7 +44,7 @@ def test_loops_chosen_in_the_table_are_laid_on_one_time_axis(browser: Any, folde
 
 
 def test_rows_are_filtered_by_area_and_action_together(browser: Any, folder: Path) -> None:
-    """Only rows of both the area and the action chosen are left."""
+    """Only rows with both the chosen area and the chosen action remain."""
     opened(browser, folder / "folder" / "index.html")
     for key, value in (("area", "Area 1"), ("action", "retune")):
         Select(
@@ -53,7 +55,7 @@ def test_rows_are_filtered_by_area_and_action_together(browser: Any, folder: Pat
 
 
 def test_another_night_is_picked(browser: Any, folder: Path) -> None:
-    """The list of nights has all of them, and the page of the one that is picked opens."""
+    """The list has all nights, and the page of the chosen night opens."""
     opened(browser, folder / "folder" / "index.html")
     picker = Select(browser.find_element(By.CSS_SELECTOR, "select.nights"))
     names = [o.text for o in picker.options]
@@ -64,7 +66,7 @@ def test_another_night_is_picked(browser: Any, folder: Path) -> None:
 
 
 def test_followers_stay_under_their_source_when_sorted(browser: Any, folder: Path) -> None:
-    """A row that stands under another one moves with it."""
+    """A row that follows its source in the table stays below it after sorting."""
     opened(browser, folder / "folder" / "index.html")
     browser.execute_script(
         "const r = document.querySelector('#worst tbody').rows[2]; r.cells[0].querySelector('a').prepend('\u2514 ');"

@@ -1,4 +1,4 @@
-"""The page of an explanation works in a real browser: from disk, at every width, drawn in full, on paper."""
+"""The page of an explanation works in a real browser: from disk, at every width, with all plots, and in print."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def explained(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return [write_html([pages.explanation_page(explanation(k))], out / k, True)[0] for k in KINDS]
 
 
-def test_explanations_load_without_complaint(browser: Any, explained: list[Path]) -> None:
-    """No page has an error in the console or asks for anything; all its trends and panels are drawn."""
+def test_explanations_load_without_errors(browser: Any, explained: list[Path]) -> None:
+    """No page has an error in the console or requests a resource, and all its trends and panels are drawn."""
     for path in explained:
         opened(browser, path)
         wait(browser, "return Array.from(document.querySelectorAll('.trend')).every((t) => t.dataset.ready)")
@@ -52,7 +52,7 @@ def test_explanations_fit_each_width(browser: Any, explained: list[Path], width:
 
 
 def test_spans_are_shaded(browser: Any, explained: list[Path]) -> None:
-    """Inside a marked span the trend's paper has another colour than outside."""
+    """The background of a trend has another colour inside a marked span than outside."""
     opened(browser, explained[0])
     wait(browser, "return Array.from(document.querySelectorAll('.trend')).every((t) => t.dataset.ready)")
     colours = browser.execute_script(
@@ -66,7 +66,7 @@ def test_spans_are_shaded(browser: Any, explained: list[Path]) -> None:
 
 
 def test_explanation_prints(browser: Any, explained: list[Path]) -> None:
-    """On paper an explanation takes few sheets, its closed parts included."""
+    """A printed explanation has 2 to 8 sheets, its closed parts included."""
     opened(browser, explained[0])
     pdf = base64.b64decode(browser.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})["data"])
     sheets = len(re.findall(rb"/Type ?/Page[^s]", pdf))

@@ -35,7 +35,7 @@ A4_PX = 703
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Pages of a made-up store: morning, loops, before/after; in a folder and in single files."""
+    """Pages of a synthetic store: morning, loops, before and after; in a folder and in single files."""
     out = tmp_path_factory.mktemp("pages")
     store = small_store(out / "store", loops=40)
     changes = [TuningChange(tag, START_S + 7 * 86400.0, 1, 2, 3, 4, "<b>me</b>") for tag in NASTY[:3]]
@@ -49,7 +49,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """A headless Chromium with a profile of its own and no way out."""
+    """A headless Chromium with a separate profile and without network."""
     from selenium import webdriver
 
     options = webdriver.ChromeOptions()
@@ -69,7 +69,8 @@ def opened(browser: Any, path: Path) -> None:
 
 
 def wait(browser: Any, condition: str, tries: int = 2000) -> None:
-    """Wait until a script returns true; the number of tries is for a busy machine and decides nothing."""
+    """Wait until a script returns true. The number of tries allows for a busy machine and does not change the
+    result."""
     for _ in range(tries):
         if browser.execute_script(condition):
             return
@@ -102,27 +103,30 @@ def head(browser: Any, table: str, key: str) -> Any:
     return browser.find_element(By.CSS_SELECTOR, f"#{table} th[data-key='{key}'] button")
 
 
-def test_no_page_complains(browser: Any, folder: Path) -> None:
-    """Every page loads from disk without an error in the console and without asking any network."""
+def test_pages_load_without_errors(browser: Any, folder: Path) -> None:
+    """Every page loads from disk without an error in the console and without a request to a network."""
     paths = every_page(folder)
     assert len(paths) == 26
     for path in paths:
         opened(browser, path)
         assert [e for e in browser.get_log("browser") if e["level"] == "SEVERE"] == [], path.name
-        asked = browser.execute_script("return performance.getEntriesByType('resource').map((e) => e.name)")
-        assert all(name.startswith("file:") for name in asked)
+        requested = browser.execute_script(
+            "return performance.getEntriesByType('resource').map((e) => e.name)"
+        )
+        assert all(name.startswith("file:") for name in requested)
         wait(browser, "return Array.from(document.querySelectorAll('.trend')).every((t) => t.dataset.ready)")
 
 
 def test_plant_text_runs_no_script(browser: Any, folder: Path) -> None:
-    """A tag that is a script is shown as text, in the table and in the title."""
+    """A tag that contains a script is shown as text in the table and in the title."""
     opened(browser, folder / "folder" / "index.html")
     assert NASTY[0] in column(browser, "ranking", "loop")
     assert browser.execute_script("return document.querySelectorAll('main script:not([type])').length") == 0
 
 
 def test_sorting(browser: Any, folder: Path) -> None:
-    """A heading sorts by number or name, says so, and turns round at the second click; unknown cells stay last."""
+    """A heading sorts by number or name and reports the order; the second click reverses the order. Unknown
+    cells stay last."""
     opened(browser, folder / "folder" / "index.html")
     key = "valve_travel_pct_per_h"
     head(browser, "ranking", key).click()
@@ -139,7 +143,7 @@ def test_sorting(browser: Any, folder: Path) -> None:
 
 
 def test_sorting_by_keyboard(browser: Any, folder: Path) -> None:
-    """A heading that has the focus sorts at Enter."""
+    """A heading that has the focus sorts when the user presses Enter."""
     from selenium.webdriver.common.keys import Keys
 
     opened(browser, folder / "folder" / "index.html")
@@ -149,7 +153,7 @@ def test_sorting_by_keyboard(browser: Any, folder: Path) -> None:
 
 
 def test_filtering(browser: Any, folder: Path) -> None:
-    """Text and cause filter the rows together, and the number shown is told."""
+    """Text and cause filter the rows together, and the page shows the number of visible rows."""
     from selenium.webdriver.common.by import By
     from selenium.webdriver.support.ui import Select
 
@@ -165,7 +169,8 @@ def test_filtering(browser: Any, folder: Path) -> None:
 
 
 def test_zooming(browser: Any, folder: Path) -> None:
-    """Buttons, keys, wheel and drag zoom a trend on both axes at once; all is shown again at the end."""
+    """Buttons, keys, wheel and drag zoom a trend on both axes at the same time. A double click shows the full
+    trend again."""
     from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.by import By
     from selenium.webdriver.common.keys import Keys
@@ -214,7 +219,7 @@ def test_zooming(browser: Any, folder: Path) -> None:
 
 @pytest.mark.parametrize("width", [390, pytest.param(1280, marks=pytest.mark.slow), 1920])
 def test_nothing_overflows(browser: Any, folder: Path, width: int) -> None:
-    """No page is wider than a phone, a laptop or a wide screen; wide tables scroll in a box of their own."""
+    """No page is wider than a phone, a laptop or a wide screen. Wide tables scroll in their own box."""
     size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     for path in every_page(folder):
@@ -232,8 +237,8 @@ def words(pdf: bytes, path: Path) -> list[str]:
 
 
 @pytest.mark.skipif(not shutil.which("pdftotext"), reason="needs pdftotext of poppler-utils")
-def test_headings_stand_on_every_sheet(browser: Any, folder: Path, tmp_path: Path) -> None:
-    """A table that goes over several printed sheets has its headings on each of them."""
+def test_headings_are_printed_on_every_sheet(browser: Any, folder: Path, tmp_path: Path) -> None:
+    """A table that needs several printed sheets has its headings on each of them."""
     opened(browser, folder / "folder" / "index.html")
     pdf = base64.b64decode(browser.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})["data"])
     sheets = [s for s in words(pdf, tmp_path / "page.pdf") if re.search(r"\bflow\b", s)]
@@ -241,8 +246,8 @@ def test_headings_stand_on_every_sheet(browser: Any, folder: Path, tmp_path: Pat
     assert all("Description" in s and "Action" in s for s in sheets)
 
 
-def test_print_is_whole(browser: Any, folder: Path) -> None:
-    """Printed on A4, a page gives several sheets; no table is wider than the sheet and no row is cut, by style."""
+def test_print_is_complete(browser: Any, folder: Path) -> None:
+    """A page printed on A4 has several sheets. No table is wider than the sheet, and the style cuts no row."""
     opened(browser, folder / "folder" / "index.html")
     pdf = base64.b64decode(browser.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})["data"])
     boxes = re.findall(rb"/MediaBox \[([\d. ]+)\]", pdf)
@@ -266,7 +271,7 @@ def test_print_is_whole(browser: Any, folder: Path) -> None:
 
 
 def test_dark_follows_the_system(browser: Any, folder: Path) -> None:
-    """With a dark system the page is dark and its text light."""
+    """If the system uses a dark mode, the page is dark and its text is light."""
     opened(browser, folder / "folder" / "index.html")
     shade = "return getComputedStyle(document.documentElement)[arguments[0]].match(/\\d+/g).slice(0, 3).map(Number)"
     for scheme, dark in (("dark", True), ("light", False)):
@@ -276,8 +281,9 @@ def test_dark_follows_the_system(browser: Any, folder: Path) -> None:
         assert (paper < ink) == dark
 
 
-def test_structure_is_sane_for_screen_readers(browser: Any, folder: Path) -> None:
-    """Each page has one main heading, a language, named pictures (but for ornaments) and controls, unique ids."""
+def test_structure_is_correct_for_screen_readers(browser: Any, folder: Path) -> None:
+    """Each page has one main heading, a language and unique ids. All controls and all pictures except ornaments
+    have names."""
     for path in every_page(folder):
         opened(browser, path)
         wrong = browser.execute_script(

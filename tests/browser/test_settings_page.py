@@ -1,4 +1,4 @@
-"""The page on which settings are tried simulates as the analysis does, in the units of the plant's controller."""
+"""The settings page simulates as the analysis does, in the units of the plant's controller."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ PARALLEL = replace(BAND, loop="FIC2", kp=0.5, ti=40.0, gain_unit="percent", ti_u
 ENGINEERING = replace(BAND, loop="FIC3", kp=0.3, ti=2.5, gain_unit="engineering", ti_unit="repeats/min")
 ALONE = replace(BAND, loop="FIC4", kp=0.5, ti=0.0, gain_unit="percent", ti_unit="s")
 CASES = {
-    "play": (BAND, Backlash(3.0)),
+    "backlash": (BAND, Backlash(3.0)),
     "stick-slip": (PARALLEL, Stiction(4.0, 2.0, Motion.RESTS)),
     "dry friction": (ENGINEERING, Stiction(3.0, 1.0, Motion.HALTS)),
     "free": (BAND, None),
@@ -55,7 +55,7 @@ def loop_of(name: str) -> Loop:
 
 
 def load() -> np.ndarray:
-    """A load that wanders, with noise [% PV]."""
+    """A slowly varying load with noise [% PV]."""
     rng = np.random.default_rng(5)
     return 0.3 * np.sin(np.arange(9000) / 700.0) + 0.05 * rng.standard_normal(9000)
 
@@ -85,7 +85,7 @@ def shown(browser: Any) -> tuple[float, float]:
 
 @pytest.mark.parametrize("name", CASES)
 def test_page_simulates_as_the_analysis_does(browser: Any, settings: Path, name: str) -> None:
-    """Recommended settings give in the page the travel and error that the analysis gives, to nine digits."""
+    """With the recommended settings the page shows the travel and error of the analysis, to nine digits."""
     opened(browser, settings / f"{name}.html")
     wait(browser, "return document.querySelector('.whatif').dataset.ready === 'yes'")
     assert [e for e in browser.get_log("browser") if e["level"] == "SEVERE"] == []
@@ -98,7 +98,8 @@ def test_page_simulates_as_the_analysis_does(browser: Any, settings: Path, name:
 
 @pytest.mark.parametrize("name", CASES)
 def test_settings_typed_in_are_those_of_the_controller(browser: Any, settings: Path, name: str) -> None:
-    """What loops.csv states, typed in, is the present loop again, whatever form and units the controller has."""
+    """If the user types the settings of loops.csv, the page shows the present loop again, for every form and
+    unit of the controller."""
     opened(browser, settings / f"{name}.html")
     wait(browser, "return document.querySelector('.whatif').dataset.ready === 'yes'")
     spec = CASES[name][0]
@@ -118,9 +119,10 @@ def test_settings_typed_in_are_those_of_the_controller(browser: Any, settings: P
     assert cells[2] in ("0 %", "–")
 
 
-def test_sliders_move_the_loop(browser: Any, settings: Path) -> None:
-    """A longer Ti by the slider cuts the travel of a loop with play, and says so for those who do not see it."""
-    opened(browser, settings / "play.html")
+def test_sliders_change_the_simulation(browser: Any, settings: Path) -> None:
+    """A longer Ti by the slider reduces the travel of a loop with backlash. The page also states this as text
+    for screen readers."""
+    opened(browser, settings / "backlash.html")
     wait(browser, "return document.querySelector('.whatif').dataset.ready === 'yes'")
     browser.execute_script("Array.from(document.querySelectorAll('.choices button'))[0].click()")
     wait(browser, "return document.querySelectorAll('.whatif td')[2].textContent === '0 %'")
@@ -145,10 +147,10 @@ def test_sliders_move_the_loop(browser: Any, settings: Path) -> None:
         ("ti", "-1", "Ti needs a number above 0"),
     ],
 )
-def test_a_number_that_nobody_means_is_refused_beside_its_field(
+def test_an_invalid_number_is_refused_next_to_its_field(
     browser: Any, settings: Path, of: str, typed: str, why: str
 ) -> None:
-    """It is told what is wanted, and what was simulated stays; a number that is meant takes the words away."""
+    """The page states the allowed numbers and keeps the last simulation. A valid number removes the message."""
     opened(browser, settings / "stick-slip.html")
     wait(browser, "return document.querySelector('.whatif').dataset.ready === 'yes'")
     before = shown(browser)
@@ -159,8 +161,8 @@ def test_a_number_that_nobody_means_is_refused_beside_its_field(
     assert refused(browser, of) == ""
 
 
-def test_what_runs_away_is_called_unstable(browser: Any, settings: Path) -> None:
-    """Twenty times the gain is no figure with a change in percent."""
+def test_an_unstable_loop_is_reported_as_unstable(browser: Any, settings: Path) -> None:
+    """At twenty times the gain the page reports an unstable loop instead of a change in percent."""
     opened(browser, settings / "free.html")
     wait(browser, "return document.querySelector('.whatif').dataset.ready === 'yes'")
     type_in(browser, "kp", "1")
@@ -182,7 +184,7 @@ def type_in(browser: Any, of: str, text: str) -> None:
 
 
 def refused(browser: Any, of: str) -> str:
-    """What is said beside a field."""
+    """The message next to a field."""
     return str(
         browser.execute_script(
             "return document.querySelector('.refused[data-of=' + arguments[0] + ']').textContent", of

@@ -1,4 +1,5 @@
-"""A store written outright, so that pages can be tested without an analysis: numbers and texts are made up."""
+"""A store written directly, so that pages can be tested without an analysis. Its numbers and texts are
+synthetic."""
 
 from __future__ import annotations
 
@@ -38,7 +39,7 @@ LEVELS = {**LEVELS, "op_mean_pct": 45.0, "sp_travel_pct": 0.1, "usable_h": 1.0}
 
 
 def tags(loops: int) -> list[str]:
-    """Names of loops, the first ones chosen to do harm."""
+    """Names of loops; the first ones contain hostile text."""
     return [*NASTY, *(f"FIC{i:04d}" for i in range(loops))][:loops]
 
 
@@ -67,7 +68,7 @@ def _night(name: str, day: int, loops: list[str], rng: np.random.Generator) -> l
     return rows
 
 
-SIGNS = [{"points_to": "valve", "strength": 0.9, "text": "play <i>explains</i> PV"}]
+SIGNS = [{"points_to": "valve", "strength": 0.9, "text": "backlash <i>explains</i> PV"}]
 
 
 def _hours(name: str, day: int, loops: list[str], rng: np.random.Generator) -> list[dict[str, Any]]:
@@ -103,7 +104,8 @@ def _trends(day: int, loops: list[str], buckets: int, rng: np.random.Generator) 
 def small_store(
     path: Path, loops: int = 30, nights: int = 14, buckets: int = 1200, hours: bool = True
 ) -> Store:
-    """Write a store of made-up results; from the eighth night on every figure but oscillation is halved."""
+    """Write a store of synthetic results. From the eighth night on, every figure except the oscillation is
+    halved."""
     rng = np.random.default_rng(0)
     names = tags(loops)
     for day in range(nights):

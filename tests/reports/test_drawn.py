@@ -1,4 +1,4 @@
-"""Pictures as files of their own: whole, well formed, and in the colours of the style sheet."""
+"""Pictures as separate files are complete, well formed, and in the colours of the style sheet."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ PICTURES: tuple[Picture, ...] = (
 
 @pytest.mark.parametrize("block", PICTURES, ids=lambda b: type(b).__name__)
 def test_a_picture_is_a_file_that_needs_no_other(block: Picture) -> None:
-    """Each kind is well-formed SVG with its title, names no file and no variable, and leads nowhere."""
+    """Each kind of picture is well-formed SVG with its title, and refers to no file, variable or link."""
     text = as_file(block)
     root = ElementTree.fromstring(text)
     assert root.tag == "{http://www.w3.org/2000/svg}svg"
@@ -64,7 +64,8 @@ def test_a_picture_is_a_file_that_needs_no_other(block: Picture) -> None:
 
 
 def test_lines_have_the_colours_of_the_style_sheet() -> None:
-    """A line of the file has the style sheet's colour in light; rules that the picture does not use are left out."""
+    """A line in the file has the light-mode colour of the style sheet. Rules that the picture does not use are
+    left out."""
     pv = re.search(r"--pv: (#\w+);", html.asset("page.css"))
     assert pv is not None
     text = as_file(PLOT)
@@ -74,7 +75,7 @@ def test_lines_have_the_colours_of_the_style_sheet() -> None:
 
 
 def test_a_trend_breaks_at_its_gap_and_keeps_its_peaks() -> None:
-    """A band has an outline on either side of a gap; a peak of one bucket among ten thousand is still drawn."""
+    """A band has one outline on each side of a gap. A peak of one bucket among ten thousand is still drawn."""
     assert as_file(PICTURES[3]).count("Z") == 2
     t = 60.0 * np.arange(10_000.0)
     y = np.where(np.arange(10_000) == 5_003, 9.0, 0.0)
@@ -86,8 +87,8 @@ def test_a_trend_breaks_at_its_gap_and_keeps_its_peaks() -> None:
 
 
 @pytest.mark.parametrize(("zone", "midnight"), [("UTC", "2 Mar"), ("Asia/Tokyo", "3 Mar")])
-def test_times_stand_on_the_plants_clock(zone: str, midnight: str) -> None:
-    """A day from midnight UTC on has its hours and its date as the plant's clock shows them."""
+def test_times_are_in_the_plants_time_zone(zone: str, midnight: str) -> None:
+    """A day that starts at midnight UTC shows its hours and its date in the plant's time zone."""
     ((_, drawn),) = drawings(PICTURES[3], zone)
     texts = re.findall(r'class="tick">([^<]*)<', drawn.body)
     assert midnight in texts
@@ -97,7 +98,8 @@ def test_times_stand_on_the_plants_clock(zone: str, midnight: str) -> None:
 
 @pytest.mark.parametrize("travel", [0.0, 3.0, 1e-9])
 def test_a_field_of_one_value_is_drawn(travel: float) -> None:
-    """A plane that cycles nowhere, or everywhere alike, is a picture with its calm and its unstable regions."""
+    """A map of Kp and Ti with zero or constant travel is drawn with its regions without oscillation and its
+    unstable regions."""
     calm, unstable = np.arange(20)[:, None] > 14 + NONE, NONE | (np.arange(20) > 14)
     f = Field("f", "Map", "Kp", "Ti", X, X, np.full((20, 20), travel), calm, unstable)
     ((_, drawn),) = drawings(f)
@@ -107,7 +109,7 @@ def test_a_field_of_one_value_is_drawn(travel: float) -> None:
 
 
 def test_places_are_named_on_the_side_with_room() -> None:
-    """A point at the right has its name at its left, inside the picture."""
+    """A point at the right edge has its name on its left, inside the picture."""
     places = (Place(1.0, 1.0, "left", "now"), Place(100.0, 1.0, "right", "now"))
     ((_, drawn),) = drawings(replace(PLOT, places=places))
     assert re.search(r'text-anchor="start" class="placed">left<', drawn.body)
@@ -115,8 +117,8 @@ def test_places_are_named_on_the_side_with_room() -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_names_of_points_near_each_other_cover_none(seed: int) -> None:
-    """Five settings within a twentieth of the map have names that overlap neither each other nor leave it."""
+def test_names_of_points_near_each_other_do_not_overlap(seed: int) -> None:
+    """The names of five settings within a twentieth of the map do not overlap and stay inside the map."""
     rng = np.random.default_rng(seed)
     centre = rng.uniform(0.2, 1.8, 2)
     at = 10.0 ** (centre + rng.uniform(-0.05, 0.05, (5, 2)))

@@ -1,4 +1,4 @@
-"""Text of the plant is text everywhere."""
+"""Text of the plant is shown as text in every format."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ NASTY = (
 
 
 def page_of(text: str) -> Page:
-    """A page that shows a text in every place that a text can stand in."""
+    """A page that shows a text in every place that can hold a text."""
     x = np.arange(4.0)
     columns = (Column("a", text, hint=text), Column("n", "n", True))
     table = Table("t", text, columns, ((Cell(text), Cell("1", 1.0)),), text, True, "a")
@@ -83,25 +83,26 @@ class Shape(HTMLParser):
         self.feed(text)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Note an element."""
+        """Record an element."""
         self.elements.append((tag, *(name for name, _ in attrs)))
 
     def handle_data(self, data: str) -> None:
-        """Note a text."""
+        """Record a text."""
         self.words.append(data)
 
 
 @pytest.mark.parametrize("text", NASTY)
 @pytest.mark.parametrize("single_file", [True, False])
 def test_html_holds_no_markup_of_the_plant(text: str, single_file: bool) -> None:
-    """A tag of the plant makes no element and no attribute, and is read as it was written."""
+    """A tag of the plant creates no element and no attribute, and the page shows the tag unchanged."""
     plain, nasty = (Shape(render(page_of(t), single_file)) for t in ("plain", text))
     assert nasty.elements == plain.elements
     assert "".join(nasty.words).count(text) >= "".join(plain.words).count("plain") - 6
 
 
-def test_no_page_turns_the_writing() -> None:
-    """Marks that turn the direction of writing and control characters of a tag stand as escapes in every format."""
+def test_no_page_changes_the_direction_of_writing() -> None:
+    """Control characters of a tag, and characters that change the direction of writing, are escaped in every
+    format."""
     page = page_of("FIC\u202e101\x1b[2J\u2066")
     tables = [as_csv(t) for t in page.tables()]
     for text in (render(page), render_mail(page), render_text(page), render_markdown(page), *tables):
@@ -110,7 +111,8 @@ def test_no_page_turns_the_writing() -> None:
 
 
 def test_markdown_runs_nothing() -> None:
-    """No scheme that a careless renderer would run stands before its colon; words before a colon stay as they are."""
+    """No scheme that an unsafe renderer could run remains before its colon. Words before a colon stay as they
+    are."""
     found = escaped("[x](javascript:alert(1)) JavaScript:x data:text/html,x vbscript:x file:///etc")
     assert not re.search(r"(?i)(javascript|vbscript|data|file):", found)
     assert escaped("about the data: none") == "about the data: none"
@@ -118,7 +120,7 @@ def test_markdown_runs_nothing() -> None:
 
 @pytest.mark.parametrize("text", NASTY)
 def test_markdown_tables_keep_their_cells(text: str) -> None:
-    """A tag of the plant opens no cell, no link, no heading and no HTML in Markdown."""
+    """A tag of the plant creates no cell, no link, no heading and no HTML in Markdown."""
     nasty = render_markdown(page_of(text))
     plain = render_markdown(page_of("plain"))
     assert nasty.count("\n") == plain.count("\n")
@@ -130,7 +132,7 @@ def test_markdown_tables_keep_their_cells(text: str) -> None:
 
 @given(st.text(max_size=60))
 def test_escaped_markdown_is_one_line(text: str) -> None:
-    """Whatever a tag holds, its Markdown is one line without bare marks."""
+    """The Markdown of any tag is one line without unescaped marks."""
     found = escaped(text)
     assert "\n" not in found
     assert not re.search(r"(?<!\\)(?:\\\\)*[|`*\[\]<>]", found)
@@ -138,7 +140,7 @@ def test_escaped_markdown_is_one_line(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["=1+1", "+1", "-1", "@SUM(A1)", "\tx", "\r=x", " =1"])
 def test_csv_texts_are_no_formulas(text: str) -> None:
-    """A text that a spreadsheet would compute begins with an apostrophe."""
+    """A text that a spreadsheet would compute starts with an apostrophe."""
     assert harmless(text).startswith("'")
     assert harmless("LIC2101") == "LIC2101"
 
@@ -152,7 +154,7 @@ def test_csv_numbers_stay_numbers() -> None:
 
 @given(st.text(max_size=80))
 def test_file_names_stay_in_their_folder(tag: str) -> None:
-    """Whatever a tag holds, its file name is one plain name inside the folder."""
+    """The file name of any tag is one plain name inside the folder."""
     name = slug(tag)
     assert re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9-]*", name)
     assert (Path("/out") / name).resolve().parent == Path("/out")
@@ -160,6 +162,6 @@ def test_file_names_stay_in_their_folder(tag: str) -> None:
 
 
 def test_file_names_of_different_tags_differ() -> None:
-    """Tags that differ only in signs that file names lack keep different files."""
+    """Tags that differ only in characters that file names cannot contain have different files."""
     tags = ["FIC-1", "FIC.1", "FIC/1", "FIC 1", "fic-1", "ФИК", "流量", ""]
     assert len({slug(t).lower() for t in tags}) == len(tags)

@@ -1,4 +1,4 @@
-"""A folder of pages holds what was written last, and nothing of what went before."""
+"""A folder of pages holds the files that were written last, and no file of an earlier run."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from pathlib import Path
 from reports.folder import forget_stale
 
 
-def test_a_stale_page_takes_its_tables_along(tmp_path: Path) -> None:
-    """Tables of a page that is gone go too; those of a page whose name begins alike, and other files, stay."""
+def test_tables_of_a_stale_page_are_removed(tmp_path: Path) -> None:
+    """Tables of a removed page are removed too. Tables of a page whose name starts with the same text, and
+    other files, stay."""
     kept = ["csv/FIC1-2-ranking.csv", "csv/index-worst.csv", "mine.html", "FIC1-2.html"]
     (tmp_path / "csv").mkdir()
     for name in (*kept, "FIC1.html", "csv/FIC1-ranking.csv"):

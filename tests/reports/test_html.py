@@ -28,13 +28,14 @@ def trend(n: int, rng: np.random.Generator) -> Trend:
 
 
 def decoded(coded: dict[str, float | str]) -> np.ndarray:
-    """What the page's script reads."""
+    """The values that the page's script reads."""
     level = np.frombuffer(base64.b64decode(str(coded["data"])), "<u2").astype(float)
     return np.where(level == html.MISSING, np.nan, float(coded["low"]) + level * float(coded["step"]))
 
 
 def test_trend_data_come_back() -> None:
-    """A trend's levels come back within a 65,000th of their range, gaps as gaps, times exactly."""
+    """The decoded levels of a trend differ by at most a 65,000th of their range. Gaps stay gaps, and times are
+    exact."""
     t = trend(2000, np.random.default_rng(1))
     data = json.loads(str(html.trend_data(t)))
     offset = np.frombuffer(base64.b64decode(data["time"]), "<u4")
@@ -46,14 +47,15 @@ def test_trend_data_come_back() -> None:
 
 
 def test_week_of_buckets_is_small() -> None:
-    """A loop page with a week of 1,200 buckets a day in one file stays under 1.5 MB; so it does at 6,000."""
+    """A page with a week of 1,200 buckets a day is smaller than 0.5 MB in one file; with 6,000 a day it is
+    smaller than 1.5 MB."""
     for buckets, most in ((8400, 0.5e6), (42000, 1.5e6)):
         page = Page("p", "p", "", (Section("s", (trend(buckets, np.random.default_rng(2)),)),))
         assert len(html.render(page, single_file=True)) < most
 
 
-def test_single_file_asks_for_nothing() -> None:
-    """A page in one file has no address to fetch, and its policy names the digest of every script and style."""
+def test_single_file_requests_nothing() -> None:
+    """A page in one file requests no address, and its policy lists the digest of every script and style."""
     page = Page("p", "p", "", (Section("s", (trend(10, np.random.default_rng(3)),)),))
     text = html.render(page, single_file=True)
     assert not re.search(r"<(?:link|img|iframe|script[^>]*\ssrc)", text)
@@ -67,28 +69,28 @@ def test_single_file_asks_for_nothing() -> None:
         assert base64.b64encode(hashlib.sha256(body.encode()).digest()).decode() in policy
 
 
-def test_folder_pages_ask_for_their_assets_alone() -> None:
-    """A page of a folder asks for files in its assets folder and for nothing else."""
+def test_folder_pages_request_only_their_assets() -> None:
+    """A page of a folder requests files in its assets folder and nothing else."""
     text = html.render(Page("p", "p", "", ()))
-    asked = re.findall(r'(?:src|href)="([^"#]+)"', text)
-    assert asked
-    assert all(re.fullmatch(r"assets/[\w.]+", a) for a in asked)
+    requested = re.findall(r'(?:src|href)="([^"#]+)"', text)
+    assert requested
+    assert all(re.fullmatch(r"assets/[\w.]+", a) for a in requested)
 
 
-def test_no_asset_names_a_network() -> None:
-    """No script or style sheet of ours fetches anything."""
+def test_no_asset_uses_a_network() -> None:
+    """No script or style sheet of this project requests anything."""
     for name in ("page.css", "page.js", "uPlot.min.css"):
         assert not re.search(r"https?://|fetch\(|XMLHttpRequest|@import|url\(", html.asset(name))
 
 
 def test_undefined_names_are_errors() -> None:
-    """A template that asks for what a page lacks fails instead of leaving a blank."""
+    """A template that uses a name that the page lacks fails instead of leaving a blank."""
     with pytest.raises(UndefinedError):
         html._environment().from_string("{{ page.nothing.at_all }}").render(page=Page("p", "p", "", ()))
 
 
 def test_cells_sort_by_full_numbers() -> None:
-    """A number's cell carries all its digits for sorting, an unknown one none."""
+    """The cell of a number carries all its digits for sorting. The cell of an unknown number carries none."""
     table = Table("t", "", (Column("x", "x", True),), ((Cell("1.23", 1.2345678),), (Cell(""),)))
     text = html.render(Page("p", "p", "", (Section("s", (table,)),)))
     assert 'data-sort="1.2345678"' in text
@@ -97,7 +99,7 @@ def test_cells_sort_by_full_numbers() -> None:
 
 @pytest.mark.parametrize(("low", "high"), [(0, 1), (-97, 12), (0.001, 0.0013), (-1e6, 3e6)])
 def test_ticks_are_round_and_inside(low: float, high: float) -> None:
-    """Ticks lie within the axis, evenly, at one, two or five times a power of ten."""
+    """Ticks are inside the axis, evenly spaced, at one, two or five times a power of ten."""
     ticks = nice_ticks(low, high)
     steps = np.diff(ticks)
     assert 2 <= len(ticks) <= 8
@@ -108,8 +110,9 @@ def test_ticks_are_round_and_inside(low: float, high: float) -> None:
     assert min(abs(mantissa - m) for m in (1, 2, 5, 10)) < 1e-6
 
 
-def test_a_long_table_shows_its_first_rows_and_says_so() -> None:
-    """Of ten thousand rows a page holds the first three thousand and says how many there are; its CSV holds all."""
+def test_a_long_table_shows_its_first_rows_and_their_number() -> None:
+    """Of ten thousand rows a page shows the first three thousand and states the total number. The CSV file has
+    all rows."""
     rows = tuple((Cell(f"L{k:05d}"),) for k in range(10_000))
     table = Table("all", "All", (Column("loop", "Loop"),), rows)
     text = html.render(Page("p", "P", "", (Section("S", (table,)),)), single_file=True)
@@ -120,8 +123,9 @@ def test_a_long_table_shows_its_first_rows_and_says_so() -> None:
     assert as_csv(table).count("\n") == 10_001
 
 
-def test_a_signal_that_is_held_is_held_again_without_loss() -> None:
-    """Levels of any signal are within a 32,500th of its range, and exact when held again, in single precision too."""
+def test_a_quantized_signal_is_quantized_again_without_loss() -> None:
+    """Quantized levels of any signal differ by at most a 32,500th of its range. A second quantization and
+    single precision change nothing."""
     rng = np.random.default_rng(1)
     for _ in range(200):
         size, place = 10.0 ** rng.uniform(-6, 6), rng.uniform(-100, 100)

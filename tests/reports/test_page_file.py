@@ -1,4 +1,4 @@
-"""A page survives being kept: what is drawn of it later is what would have been drawn at once."""
+"""A stored page is drawn later as it would have been drawn at once."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from reports.pages import (
 
 
 def made() -> Page:
-    """A page with every kind of number: texts of a plant, times, gaps, infinities."""
+    """A page with every kind of content: texts of a plant, times, gaps, infinities."""
     t = 1_772_409_600.0 + np.arange(50.0)
     y = np.where(np.arange(50) == 7, np.nan, np.sin(np.arange(50.0)))
     trend = Trend(
@@ -43,8 +43,9 @@ def made() -> Page:
     )
 
 
-def test_kept_page_is_drawn_alike() -> None:
-    """Rendered from its text, a page is the page, but for what single precision rounds off a picture's numbers."""
+def test_stored_page_is_drawn_identically() -> None:
+    """A page that is rendered from its stored text is identical, except for the rounding of a picture's numbers
+    to single precision."""
     page = made()
     again = loads(dumps(page))
     assert again.title == page.title
@@ -54,7 +55,7 @@ def test_kept_page_is_drawn_alike() -> None:
 
 
 def test_times_keep_their_seconds() -> None:
-    """Stamps since 1970 keep their fractions, values six digits, gaps their places."""
+    """Time stamps since 1970 keep their fractions, values keep six digits, and gaps keep their places."""
     page = made()
     trend, again = (p.sections[0].blocks[0] for p in (page, loads(dumps(page))))
     assert isinstance(trend, Trend)
@@ -78,6 +79,6 @@ def test_times_keep_their_seconds() -> None:
         json.dumps({"is": "Page", "evil": 1}),
     ],
 )
-def test_what_is_no_page_is_refused(text: str) -> None:
-    """Text that holds no page, names what is no part of one, or is nested without end is no page, and no error."""
+def test_text_that_is_not_a_page_is_refused(text: str) -> None:
+    """Text without a page, with an unknown part or with endless nesting gives no page and no error."""
     assert loads(text) is None

@@ -1,4 +1,4 @@
-"""Tables for a terminal are those that rich draws, which takes twenty times as long."""
+"""Tables for a terminal are identical to those of rich, which takes twenty times as long."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def drawn(rows: list[list[str]], width: int) -> list[str]:
 
 @pytest.mark.parametrize("width", [70, 100, 180])
 def test_a_table_is_the_one_that_rich_draws(width: int) -> None:
-    """Line by line and blank by blank, names of other scripts included."""
+    """Each line and each blank is identical to rich's table, also with names in other scripts."""
     rng = np.random.default_rng(3)
     rows = [
         [
@@ -54,13 +54,13 @@ def test_a_table_is_the_one_that_rich_draws(width: int) -> None:
 
 
 def test_a_tag_is_never_cut() -> None:
-    """On a terminal too narrow for it a tag stays whole."""
+    """A tag is printed in full on a terminal that is too narrow for it."""
     _, ((first, *_),) = table(HEADINGS, [["x" * 50, "1", "", "a reason"]], 40)
     assert "x" * 50 in first
 
 
 def test_wide_characters_keep_the_line() -> None:
-    """A reason in characters that take two places loses none, and its lines end before the width."""
+    """A reason in characters of double width loses no character, and its lines end before the terminal's width."""
     text = " ".join(["\u6d41\u91cf\u8ba1"] * 40)
     _, (lines,) = table(HEADINGS, [["FIC1", "1", "", text]], 80)
     assert "".join(lines).count("\u6d41\u91cf\u8ba1") == 40
