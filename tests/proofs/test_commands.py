@@ -1,4 +1,4 @@
-"""Proofs and benchmarks can still be run: each can be imported, and each command that is told of exists."""
+"""Proofs and benchmarks can be run: each module can be imported, and each command on a page exists."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MODULES = sorted(
     for path in (ROOT / folder).rglob("*.py")
     if path.name not in ("__init__.py", "__main__.py")
 )
-TOLD = "\n".join(
+PAGES = "\n".join(
     path.read_text("utf-8")
     for pattern in ("*.md", "docs/*.md", "proofs/**/*.md", "benchmarks/*.md")
     for path in ROOT.glob(pattern)
@@ -25,19 +25,19 @@ TOLD = "\n".join(
 
 @pytest.mark.parametrize("name", MODULES)
 def test_each_module_can_be_imported(name: str) -> None:
-    """What a proof takes from the packages is still there, so that a rename cannot break it unseen."""
+    """Each module of the proofs and benchmarks can be imported after a rename in the packages."""
     assert import_module(name)
 
 
-@pytest.mark.parametrize("name", sorted(set(re.findall(r"python -m ((?:proofs|benchmarks)[\w.]*)", TOLD))))
-def test_each_command_told_of_exists(name: str) -> None:
-    """Every `python -m` that a page names is a module."""
+@pytest.mark.parametrize("name", sorted(set(re.findall(r"python -m ((?:proofs|benchmarks)[\w.]*)", PAGES))))
+def test_each_command_on_a_page_exists(name: str) -> None:
+    """Every `python -m` command that a page names is a module."""
     assert find_spec(name) is not None
 
 
 @pytest.mark.parametrize(
-    "path", sorted(set(re.findall(r"\b(?:proofs|benchmarks)/[\w/]+\.(?:py|md)\b", TOLD)))
+    "path", sorted(set(re.findall(r"\b(?:proofs|benchmarks)/[\w/]+\.(?:py|md)\b", PAGES)))
 )
-def test_each_file_told_of_exists(path: str) -> None:
-    """Every script and table that a page names is there, from the repository's root or beside the docs."""
+def test_each_file_on_a_page_exists(path: str) -> None:
+    """Every script and table that a page names exists in the repository's root or in tests."""
     assert (ROOT / path).exists() or (ROOT / "tests" / path).exists()

@@ -1,4 +1,4 @@
-"""The walk through all commands sees a contradiction, and finds none on the mill and on two plants."""
+"""The comparison of all commands detects a contradiction, and finds none on the mill and on two plants."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ ROW: dict[str, Any] = {
 }
 
 
-def test_a_cell_that_differs_is_seen() -> None:
-    """Of two answers that differ in the fault and in Kp both cells are told; digits beyond the sixth are none."""
+def test_a_cell_that_differs_is_reported() -> None:
+    """Both cells are reported if two answers differ in the fault and in Kp. Differences after the sixth digit
+    are not reported."""
     other = ROW | {"valve_fault": "stiction", "kp_new": 1.6, "ti_new": 20.0000001}
     assert list(parted(ROW, other, "tune")) == [
         "tune: valve_fault stiction, rank backlash",
@@ -43,17 +44,18 @@ def test_a_cell_that_differs_is_seen() -> None:
         ({"kp_new": None}, 1),
     ],
 )
-def test_a_row_that_contradicts_itself_is_seen(change: dict[str, Any], told: int) -> None:
-    """A known cause beside no decision, settings without the action, and the action without settings are told."""
-    assert len(list(of_row(ROW | change))) == told
+def test_a_row_that_contradicts_itself_is_reported(change: dict[str, Any], reported: int) -> None:
+    """Reported are a known cause without a decision, settings without the action to retune, and this action
+    without settings."""
+    assert len(list(of_row(ROW | change))) == reported
 
 
 @pytest.mark.skipif(
     os.environ.get("TRIAGE_WALK") != "all", reason="takes half an hour: TRIAGE_WALK=all runs it"
 )
 @pytest.mark.parametrize("asked", [MILL, *PLANTS.values()], ids=["mill", *PLANTS])
-def test_every_command_gives_one_answer(asked: tuple[str, ...]) -> None:
-    """Of each loop `rank`, `tune` with and without the store, `explain` and its page tell the same."""
-    if not Path(asked[0]).exists():
+def test_every_command_gives_one_answer(options: tuple[str, ...]) -> None:
+    """`rank`, `tune` with and without the store, `explain` and its page report the same for each loop."""
+    if not Path(options[0]).exists():
         pytest.skip("../shared is absent")
-    assert walked(asked, 2)[1] == []
+    assert walked(options, 2)[1] == []

@@ -7,7 +7,7 @@ from proofs.concealed import make, plan, scene
 
 @pytest.fixture(scope="session")
 def short():
-    """Recordings short enough for tests."""
+    """Recordings that are short enough for tests."""
     usual, scene.SCANS = scene.SCANS, (2500, 5000)
     yield
     scene.SCANS = usual
@@ -15,7 +15,7 @@ def short():
 
 @pytest.fixture(scope="session")
 def sealed(tmp_path_factory, short):
-    """Six small cases: two with nothing hidden, three single effects, one pair."""
+    """Six small cases: two without an effect, three with a single effect, one with a pair of effects."""
     out = tmp_path_factory.mktemp("cases")
     hidden = [(("backlash", "plain"),), (("second-lag", "concealed"),), (("controller-settings", "plain"),)]
     hidden.append((("nonlinear-gain", "plain"), ("load-step", "masked")))

@@ -1,4 +1,4 @@
-"""One loop of the sealed generator whose set point moves every 150 s or so, under a load and noise."""
+"""One loop of the sealed generator. Its set point moves about every 150 s under a load and noise."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ PI = Pi(kp=1.2, ti=30.0)
 
 
 def recording(plant: Plant, seed: int, **acting: np.ndarray) -> Recording:
-    """The loop's recording; `acting` takes the place of what acts on an idle one (Drive), shape (N,) each."""
+    """The loop's recording. `acting` replaces signals of an undisturbed loop (Drive), each of shape (N,)."""
     rng = np.random.default_rng(seed)
     moves = np.repeat(rng.uniform(-6.0, 6.0, N // 150 + 1), 150)[:N]
     load = np.empty(N)

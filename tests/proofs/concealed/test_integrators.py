@@ -1,4 +1,4 @@
-"""The generator's own integrators, stem, controller and recorder against closed forms."""
+"""The generator's integrators, stem, controller and recorder against closed forms."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ REST = Plant(K=1.5, T=20.0, L=3.7)
 
 
 def step_response(plant, size=2.0, n=600):
-    """PV beyond rest after a step of OP at time 0, and the times of the rows [s]."""
+    """Deviation of PV from rest after a step of OP at time 0, and the times of the rows [s]."""
     op = np.full(n, plant.v0 + size)
     return open_loop(plant, op, idle(n, plant), 1.0) - plant.y0, np.arange(n, dtype=float)
 
@@ -22,21 +22,23 @@ def after(t, L):
     return np.maximum(t - L, 0.0)
 
 
-def test_plain_step_matches_the_closed_form():
-    """A plain loop's step response is K (1 - exp(-(t - L)/T)) to a millionth when L is a whole fine step."""
+def test_fopdt_step_matches_the_closed_form():
+    """The step response of a FOPDT process is K (1 - exp(-(t - L)/T)) within 1e-6 if L is a multiple of the
+    fine step."""
     y, t = step_response(REST)
     assert np.max(np.abs(y - 3.0 * (1 - np.exp(-after(t, 3.7) / 20.0)))) < 1e-6
 
 
 def test_two_lags_match_the_closed_form():
-    """Two lags give the textbook response of two unequal time constants."""
+    """Two lags have the textbook step response of two unequal time constants."""
     y, t = step_response(REST._replace(T2=8.0))
     s = after(t, 3.7)
     assert np.max(np.abs(y - 3.0 * (1 - (20 * np.exp(-s / 20) - 8 * np.exp(-s / 8)) / 12))) < 1e-5
 
 
 def test_inverse_response_has_its_zero():
-    """The opposing part makes the zero it states: the first slope after the step is -beta/(T fast)."""
+    """The opposing part gives the stated zero: the step response is the closed form with this zero, and starts
+    in the opposite direction."""
     beta, fast = 6.0, 4.0
     y, t = step_response(REST._replace(L=2.0, oppose=(beta + fast) / 16.0, oppose_s=fast))
     s = after(t, 2.0)
@@ -46,27 +48,28 @@ def test_inverse_response_has_its_zero():
 
 
 def test_integrator_ramps():
-    """Without a leak PV rises for ever at K/T of OP."""
+    """Without a leak, PV after a step of OP is a ramp of slope K/T times the step."""
     y, t = step_response(REST._replace(leak=0.0))
     assert np.allclose(y, 3.0 / 20.0 * after(t, 3.7), atol=1e-6)
 
 
 def test_root_outflow_settles_where_inflow_equals_it():
-    """With the head as PV, double flow beyond rest settles at the square of the flow."""
+    """With an outflow that is proportional to the root of PV, PV settles at the square of the relative flow."""
     plant = Plant(K=2.0, T=20.0, L=1.0, y0=25.0, root=1.0)
     y, _ = step_response(plant, size=5.0, n=4000)
     assert y[-1] + 25.0 == pytest.approx(25.0 * (1 + 2.0 * 5.0 / 50.0) ** 2, rel=1e-6)
 
 
 def test_pipe_delay_is_volume_over_flow():
-    """With twice the flow in the pipe the dead time halves."""
+    """Twice the flow in the pipe halves the dead time."""
     plant = REST._replace(L=20.0, pipe=1.0)
     y, t = step_response(plant, size=plant.v0, n=300)
     assert t[np.flatnonzero(y > 1e-6)[0]] == pytest.approx(10.0, abs=1.1)
 
 
-def test_gap_follows_its_geometry():
-    """The stem stays within half the play of its driver, and stands until the play is crossed."""
+def test_backlash_follows_its_geometry():
+    """The stem stays within half the backlash of its driver, and rests until the driver has crossed the
+    backlash."""
     u = 50 + 10 * np.sin(np.arange(2000) / 50.0)
     z = stem.gap_path(u, 4.0)
     exact = [u[0]]
@@ -77,7 +80,8 @@ def test_gap_follows_its_geometry():
 
 
 def test_friction_holds_then_jumps():
-    """A slow ramp leaves the stem at rest up to the static friction; then it slips by their difference."""
+    """On a slow ramp the stem rests up to the static friction, then slips by the difference of static and
+    Coulomb friction."""
     z, v, path = 50.0, 0.0, []
     ramp = 50 + np.arange(40_000) * 0.0005
     for u in ramp:
@@ -91,7 +95,7 @@ def test_friction_holds_then_jumps():
 
 
 def test_controller_is_the_stated_pi():
-    """Without filter, limits or rounding, OP is rebuilt from SP and PV by Kp and Ti."""
+    """Without filter, limits or rounding, OP follows from SP and PV by Kp and Ti."""
     d = replace(idle(800, REST), sp=50 + 4.0 * (np.arange(800) // 200 % 2))
     pv, op = close_loop(REST, Pi(1.2, 15.0), d, 1.0)
     e = d.sp - pv
@@ -100,14 +104,15 @@ def test_controller_is_the_stated_pi():
 
 
 def test_own_fopdt_agrees_with_the_plant():
-    """The plain model used for grading is exact for dead times between scans."""
+    """The baseline model of the grading is exact for dead times that are not multiples of the scan."""
     op = np.random.default_rng(0).normal(0, 2, 400).cumsum() * 0.2
     y = open_loop(REST, op + 50, idle(400, REST), 1.0) - 50.0
     assert np.max(np.abs(1.5 * grade.fopdt(op, 20.0, 3.7, 1.0) - y)) < 1e-6
 
 
-def test_swinging_door_keeps_its_promise():
-    """What compression gives back stays within its deviation, from far fewer points."""
+def test_swinging_door_stays_within_its_bound():
+    """Decompressed values differ from the signal by less than twice the deviation of the compression, with far
+    fewer points."""
     x = np.cumsum(np.random.default_rng(1).normal(0, 0.1, 3000))
     kept = recorder.swinging_door(x, 0.5)
     assert np.max(np.abs(recorder.compress(x, 0.5) - x)) < 1.0
@@ -115,7 +120,7 @@ def test_swinging_door_keeps_its_promise():
 
 
 def test_clock_offset_moves_pv_alone():
-    """A late clock shifts PV by its seconds and leaves OP where it was."""
+    """A late clock delays PV by its offset in seconds and does not change OP."""
     made = np.vstack([np.arange(50.0), np.arange(50.0)])
     at = np.arange(50.0)
     assert np.allclose(recorder.keep_pv(made[0], at, 2.0, Historian(late_s=6.0))[10:], np.arange(7.0, 47.0))

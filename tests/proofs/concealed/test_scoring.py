@@ -1,4 +1,4 @@
-"""Runner and scorer hold answers against truths, and only after the last answer."""
+"""Runner and scorer compare answers with the truth, only after the last answer."""
 
 import sys
 
@@ -26,8 +26,9 @@ else:
 """
 
 
-def test_runner_and_scorer_hold_a_known_answerer(sealed, tmp_path):
-    """A stub that knows one name scores that one, raises no false alarm and recovers all it simulates."""
+def test_runner_and_scorer_score_a_known_program(sealed, tmp_path):
+    """A stub program that knows one name scores this name, raises no false alarm, and recovers everything that
+    it simulates."""
     stub = tmp_path / "stub.py"
     stub.write_text(STUB)
     answers = tmp_path / "answers"
@@ -45,7 +46,7 @@ def test_runner_and_scorer_hold_a_known_answerer(sealed, tmp_path):
 
 
 def test_proof_is_replaced_not_repeated(sealed, tmp_path):
-    """The results' section is written once, however often; the rest of the file stays."""
+    """The section of the results is in the file once after several runs, and the rest of the file stays."""
     target = tmp_path / "PROOF.md"
     target.write_text("# Proof\n\nRigs.\n")
     for _ in range(2):
@@ -57,6 +58,6 @@ def test_proof_is_replaced_not_repeated(sealed, tmp_path):
 
 
 def test_intervals_are_exact():
-    """No alarm in 133 cases leaves a rate below 2.8 %, by the closed form 1 - 0.025^(1/n)."""
+    """No alarm in 133 cases gives a rate below 2.8 %, by the closed form 1 - 0.025^(1/n)."""
     assert proof.interval(0, 133)[1] == pytest.approx(1 - 0.025 ** (1 / 133))
     assert proof.interval(133, 133) == (pytest.approx(0.025 ** (1 / 133)), 1.0)

@@ -1,4 +1,4 @@
-"""That the generator of coupled plants does what it says."""
+"""The generator of coupled plants agrees with its description."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ SMALL = {"loops": 30, "hours": 6.0, "step_s": 10.0}
 """A plant that is quick to draw."""
 
 
-def sound(n: int, step: float = 5.0, seed: int = 1) -> Plant:
-    """Sound loops without cascades, all with tight valves."""
+def fault_free(n: int, step: float = 5.0, seed: int = 1) -> Plant:
+    """Fault-free loops without cascades, with valves without backlash."""
     plant = loops.drawn(np.random.default_rng(seed), 3 * n, step)[0]
     lone = [i for i in range(3 * n) if plant.master[i] < 0 and plant.slave[i] < 0][:n]
     plant = plant.part(lone)
@@ -30,13 +30,13 @@ def sound(n: int, step: float = 5.0, seed: int = 1) -> Plant:
 
 
 def at_rest(plant: Plant, scans: int) -> Trends:
-    """Neither loads nor noise."""
+    """Inputs without loads and without noise."""
     still = np.zeros((scans, plant.size))
     return Trends(still + plant.sp0, still, still.copy(), {})
 
 
-def by_hand(plant: Plant, drive: Trends, i: int) -> tuple[np.ndarray, np.ndarray]:
-    """PV and OP of a loop with play by plain Python."""
+def in_plain_python(plant: Plant, drive: Trends, i: int) -> tuple[np.ndarray, np.ndarray]:
+    """PV and OP of a loop with backlash, computed in plain Python."""
     dt, x, y, op, stem, last = plant.step, 0.0, 0.0, plant.op0[i], plant.op0[i], 0.0
     moved, pvs, ops = [0.0] * int(plant.dead[i]), [], []
     for sp, load, noise in zip(*(z[:, i] for z in (drive.sp, drive.load, drive.noise)), strict=True):
@@ -53,8 +53,9 @@ def by_hand(plant: Plant, drive: Trends, i: int) -> tuple[np.ndarray, np.ndarray
     return np.array(pvs), np.array(ops)
 
 
-def test_the_kernel_is_the_loop_written_by_hand():
-    """Every uncoupled loop of the kernel equals a plain Python loop to 1e-9, with play and at the limits of OP."""
+def test_the_kernel_equals_a_loop_in_plain_python():
+    """Every uncoupled loop of the kernel equals a loop in plain Python within 1e-9, with backlash and at the
+    limits of OP."""
     rng = np.random.default_rng(3)
     plant = loops.drawn(rng, 24, 5.0)[0]
     lone = [i for i in range(24) if plant.master[i] < 0 and plant.slave[i] < 0]
@@ -65,14 +66,14 @@ def test_the_kernel_is_the_loop_written_by_hand():
     ran = simulate(plant, drive)
     assert ran.op.min() == 0.0
     for i in range(plant.size):
-        pv, op = by_hand(plant, drive, i)
+        pv, op = in_plain_python(plant, drive, i)
         assert np.abs(pv - ran.pv[:, i]).max() < 1e-9
         assert np.abs(op - ran.op[:, i]).max() < 1e-9
 
 
-def test_a_swing_travels_as_the_frequency_response_says():
-    """A sine at one loop's load gives a chain and its recycle the amplitudes that the linear equations give."""
-    plant, turn, scans = sound(3), 600.0, 12_000
+def test_an_oscillation_propagates_as_the_frequency_response_predicts():
+    """A sine at one loop's load gives a chain with a recycle the amplitudes that the linear equations predict."""
+    plant, turn, scans = fault_free(3), 600.0, 12_000
     ends = ((0, 1, 0.0, 0.3, 40.0, 7), (1, 2, 1.0, -0.4, 80.0, 3), (2, 0, 0.0, 0.1, 10.0, 5))
     for link in ends:
         plant = plant.linked(*link)
@@ -83,8 +84,9 @@ def test_a_swing_travels_as_the_frequency_response_says():
     assert np.sqrt(2) * found.std(axis=0) == pytest.approx(0.5 * np.abs(pv), rel=1e-3)
 
 
-def test_the_critical_gain_parts_decay_from_growth():
-    """Just below the critical gain a kick dies away, just above it grows, in lags, levels and masters."""
+def test_the_critical_gain_separates_decay_from_growth():
+    """The response to a load pulse decays at 95 % of the critical gain and grows at 105 %, for lags, levels and
+    masters."""
     plant = loops.drawn(np.random.default_rng(5), 30, 5.0)[0]
     kinds = [int(np.flatnonzero(x)[0]) for x in (plant.slave >= 0, plant.slave < 0, plant.integrating > 0)]
     for i in kinds:
@@ -98,21 +100,24 @@ def test_the_critical_gain_parts_decay_from_growth():
             assert (e[4000:].max() > 0.7 * e.max()) == grows
 
 
-def test_a_sticking_valve_cycles_as_a_triangle_and_a_square():
-    """Under stiction without loads OP goes in ramps between slips and the stem in jumps, and without it all rests."""
-    plant = sound(1).changed(0, gain=1.0, first=20.0, second=0.0, integrating=0.0, dead=2, kp=0.5, ti=20.0)
+def test_a_sticking_valve_causes_a_triangle_in_op_and_jumps_of_the_stem():
+    """Under stiction without varying loads the stem moves in jumps between rests and PV oscillates. Without
+    stiction the loop rests."""
+    plant = fault_free(1).changed(
+        0, gain=1.0, first=20.0, second=0.0, integrating=0.0, dead=2, kp=0.5, ti=20.0
+    )
     drive = at_rest(plant, 6000)
     drive.load[100:] = 3.0
-    stuck = simulate(plant.changed(0, stick=2.0, slip=1.0), drive, stems=True)
+    sticking = simulate(plant.changed(0, stick=2.0, slip=1.0), drive, stems=True)
     free = simulate(plant, drive)
-    jumps = np.diff(stuck.stem[3000:, 0])
+    jumps = np.diff(sticking.stem[3000:, 0])
     assert (jumps == 0).mean() > 0.8
     assert np.abs(jumps).max() > 1.0
-    assert np.ptp(stuck.pv[3000:]) > 100 * np.ptp(free.pv[3000:])
+    assert np.ptp(sticking.pv[3000:]) > 100 * np.ptp(free.pv[3000:])
 
 
 def test_periods_are_found_to_a_thousandth():
-    """The period of a noisy sine, a square and a sawtooth is found within 0.1 %, and noise has no rhythm."""
+    """The period of a noisy sine, square or sawtooth is found within 0.1 %, and noise has no period."""
     rng, t = np.random.default_rng(1), np.arange(8000)
     for turn in (11.3, 47.9, 300.0):
         phase = t / turn
@@ -121,8 +126,9 @@ def test_periods_are_found_to_a_thousandth():
     assert returning(rng.standard_normal(8000))[1] < 0.1
 
 
-def test_the_truth_is_what_removing_a_fault_does(monkeypatch):
-    """Without its fault a source's line leaves its followers' spectra, and unrelated loops stay to the last digit."""
+def test_the_truth_is_the_effect_of_removing_a_fault(monkeypatch):
+    """Without its fault, the spectral line of a source disappears from its followers. Unrelated loops stay
+    identical to the last digit."""
     kept = []
     from proofs.coupled import draw as module
 
@@ -155,8 +161,9 @@ def line(e: np.ndarray, turn: float) -> float:
     return float(power[np.abs(at - 1) < 0.15].sum())
 
 
-def test_plants_hold_what_they_promise():
-    """Of 20 small plants each has a source, a follower and finite trends, and a source swells and cycles as said."""
+def test_plants_have_the_stated_sources_and_followers():
+    """Each of 20 small plants has a source, a follower and finite trends. Sources have the stated amplification
+    and period."""
     matched = 0
     for seed in range(20):
         drawn = draw(seed, **SMALL)
@@ -181,14 +188,14 @@ def test_plants_hold_what_they_promise():
 
 
 def test_the_same_seed_is_the_same_plant():
-    """A seed gives one plant again and again, and another seed another."""
+    """The same seed gives the same plant, and another seed gives another plant."""
     one, again, other = draw(5, **SMALL), draw(5, **SMALL), draw(6, **SMALL)
     assert one.truth == again.truth != other.truth
     assert all(np.array_equal(a.pv, b.pv) for a, b in zip(one.loops, again.loops, strict=True))
 
 
-def test_recycles_come_back_with_less():
-    """Once round any coupling that closes a ring the gain is below one at every frequency, over many plants."""
+def test_the_gain_of_a_recycle_is_below_one():
+    """The gain around every ring of couplings is below one at every frequency, over many plants."""
     from proofs.coupled import spread as module
 
     seen, real = [], module.Web.put
@@ -205,7 +212,7 @@ def test_recycles_come_back_with_less():
 
 
 def closes(plant: Plant, link: tuple[float, ...]) -> bool:
-    """Whether the beginning of a coupling is downstream of its end."""
+    """Whether the start of a coupling is downstream of its end."""
     seen = {int(link[1])}
     for _ in range(plant.size):
         on = {int(b) for a, b in zip(plant.link_from, plant.link_to, strict=True) if int(a) in seen}
@@ -215,8 +222,8 @@ def closes(plant: Plant, link: tuple[float, ...]) -> bool:
     return int(link[0]) in seen
 
 
-def test_odd_records_and_files(tmp_path):
-    """Late clocks and coarse loops keep their values, and a written plant reads back with its truth."""
+def test_records_with_late_clocks_and_coarse_rows_and_files(tmp_path):
+    """Records with late clocks or coarse rows keep their values. A written plant reads back with its truth."""
     drawn = draw(2, **SMALL)
     late, coarse = drawn.loops[0].name, drawn.loops[1].name
     odd = thinned(clock_off(drawn, 240.0, {late}), 3, {coarse})

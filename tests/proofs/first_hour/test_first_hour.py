@@ -1,4 +1,4 @@
-"""A new user's mistakes are answered in one line, or by a list that says what the trends can show."""
+"""Each mistake of a new user gives one line of explanation, or a list that states what the trends can show."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ PAGE = Path(__file__).resolve().parents[3] / "docs" / "first-hour.md"
 
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda m: m.what)
 def test_each_mistake_is_answered(mistake: Mistake, tmp_path: Path) -> None:
-    """Exit status, sentence and, where a night was written, action and reason are those of the page."""
-    status, said, action, reason = answered(mistake, tmp_path)
-    assert status == mistake.status, said
-    assert mistake.said in said
-    assert "Traceback" not in said
+    """Exit status, message and, if a night was written, action and reason agree with the page."""
+    status, message, action, reason = answered(mistake, tmp_path)
+    assert status == mistake.status, message
+    assert mistake.said in message
+    assert "Traceback" not in message
     if mistake.what in LISTED:
         wanted, part = LISTED[mistake.what]
         assert action == wanted
@@ -26,7 +26,7 @@ def test_each_mistake_is_answered(mistake: Mistake, tmp_path: Path) -> None:
 
 
 def test_the_page_names_them_all() -> None:
-    """docs/first-hour.md has a row for each."""
+    """docs/first-hour.md has a row for each mistake."""
     text = PAGE.read_text("utf-8")
     assert len(MISTAKES) >= 20
     assert all(f"| {m.what} |" in text for m in MISTAKES)

@@ -1,4 +1,4 @@
-"""What the fuzzer is led from, and a few mutants of it: all is read or refused in one line."""
+"""The fuzzer's seed files and some mutants of them are read, or refused in one line."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ def seeds(tmp_path_factory) -> list[bytes]:
 
 
 def test_every_seed_is_read_or_refused(seeds):
-    """Beginnings of exports of every dialect, and a file of each other kind, end in no other error; most are read."""
+    """Starts of exports of every dialect, and a file of each other kind, cause no unexpected error, and most
+    are read."""
     assert {data[0] for data in seeds} == {1, 2, 3, 4, 5}
     assert sum(read(data) for data in seeds) > 0.7 * len(seeds)
 
 
 def test_mutants_are_read_or_refused(seeds):
-    """Bytes changed, doubled, dropped and swapped between files end in no other error."""
+    """Bytes that are changed, doubled, dropped or swapped between files cause no unexpected error."""
     rng, understood = np.random.default_rng(7), 0
     for k in range(150):
         data = bytearray(seeds[k % len(seeds)])
@@ -36,8 +37,8 @@ def test_mutants_are_read_or_refused(seeds):
     assert 20 < understood < 150
 
 
-def test_the_first_byte_says_who_reads(tmp_path):
-    """Each kind of input reaches its own reader; a byte that names none is an export."""
+def test_the_first_byte_selects_the_reader(tmp_path):
+    """Each kind of input reaches its own reader. An input with an unknown first byte is read as an export."""
     assert [name for name, _ in ASKED][1:] == ["loops.csv", "changes.csv", "model.json", "config.toml"]
     assert read(b"\x01loop,pv\nFIC1,FIC1.PV\n")
     assert not read(b"\x03{}")
