@@ -1,4 +1,4 @@
-"""Forecasts: assessments against closed forms, intervals, and both tunings on one load."""
+"""Forecasts: assessments against closed forms, intervals, and present and new settings under the same load."""
 
 from dataclasses import replace
 
@@ -19,10 +19,11 @@ def record(error, stem):
 
 
 def test_assessments_of_a_sine():
-    """A sine of amplitude 1: mean 2/pi, 2 sigma 1.414, oscillation 1, travel of 4 amplitudes a period."""
+    """A sine of amplitude 1 has a mean absolute value of 2/pi, 2 sigma of 1.414, oscillation 1 and a travel of
+    4 amplitudes per period."""
     t = np.arange(36_000)
-    wave = np.sin(2 * np.pi * t / 100)
-    a = assess(record(wave, wave))
+    sine = np.sin(2 * np.pi * t / 100)
+    a = assess(record(sine, sine))
     assert a.average_absolute_error == pytest.approx(2 / np.pi, rel=1e-3)
     assert a.variability == pytest.approx(np.sqrt(2), rel=1e-3)
     assert a.oscillation == pytest.approx(1.0, rel=0.01)
@@ -38,7 +39,7 @@ def test_noise_does_not_oscillate():
 
 
 def test_forecast_of_the_same_tuning_is_no_change():
-    """Forecasting the present tuning changes nothing, interval included."""
+    """A forecast of the present tuning has no change, and the interval of the change is zero."""
     case = backlash_case(0)
     f = predict(case.loop, case.loop.controller, case.load)
     for name in NAMES:
@@ -46,8 +47,9 @@ def test_forecast_of_the_same_tuning_is_no_change():
         assert (f.change[name].low, f.change[name].high) == (0.0, 0.0)
 
 
-def test_forecast_of_the_rule_is_a_cut_in_travel():
-    """With the rule for play travel and error fall beyond their intervals, on the uncertainty samples too."""
+def test_forecast_of_the_rule_reduces_travel():
+    """With the rule for backlash the whole interval of the travel change is below -20 %, also with uncertainty
+    samples. The oscillation decreases."""
     case = backlash_case(1)
     new = backlash_rule(case.loop.process, case.loop.controller)
     f = predict(case.loop, new, case.load, corners(case.loop))
@@ -59,7 +61,8 @@ def test_forecast_of_the_rule_is_a_cut_in_travel():
 
 
 def test_intervals_cover_the_long_run():
-    """The 90 % interval of the error on a short load covers that of a long one in most of 20 draws."""
+    """The 90 % interval of the error on a short load covers the error on a long load in at least 15 of 20
+    draws."""
     loop = Loop(Fopdt(1.0, 20, 2), Pid(2.0, 20))
     rng = np.random.default_rng(5)
 
@@ -77,8 +80,8 @@ def test_intervals_cover_the_long_run():
 
 
 def test_intervals_cover_the_next_record():
-    """Of 40 pairs of records of one slow load the 90 % interval from the first holds the change in the second in at
-    least 34, though a record holds only some twenty of its moves."""
+    """The 90 % interval from one record covers the change in the next record in at least 34 of 40 pairs. The
+    load is slow: each record has only about twenty load moves."""
     loop, rng, hits = Loop(Fopdt(1.0, 20, 2), Pid(2.0, 20)), np.random.default_rng(6), 0
     new = replace(loop.controller, kp=1.0)
     for _ in range(40):
@@ -90,14 +93,15 @@ def test_intervals_cover_the_next_record():
 
 
 def test_short_load_is_refused():
-    """A load of too few scans is an error that says how many are needed."""
+    """A load with too few scans is an error that states how many scans are needed."""
     case = backlash_case(0)
     with pytest.raises(ValueError, match="needs 120 scans of load, has 50"):
         predict(case.loop, case.loop.controller, case.load[:50])
 
 
-def test_quiet_load_does_not_hide_a_cycle():
-    """Under a load too small to move the stem from rest a loop that cycles is still forecast to cycle."""
+def test_quiet_load_does_not_hide_an_oscillation():
+    """Under a load that is too small to move the stem from rest, an oscillating loop is still forecast to
+    oscillate."""
     loop = Loop(Fopdt(80, 200, 1), Pid(1.0, 10.0), Backlash(1.0))
     quiet = 0.002 * np.random.default_rng(0).normal(size=4000)
     f = predict(loop, Pid(1.0, 220.0), quiet)
@@ -107,8 +111,9 @@ def test_quiet_load_does_not_hide_a_cycle():
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_digits_that_nobody_knows_change_no_forecast(seed):
-    """A stem that sticks carries a rounding error on; another last digit of load or process is forecast alike."""
+def test_rounding_errors_change_no_forecast(seed):
+    """A sticking stem amplifies rounding errors, but a change in the last digit of load, process or valve does
+    not change the forecast."""
     case = stick_case(seed)
     new = replace(case.loop.controller, kp=0.6 * case.loop.controller.kp)
     process, valve, near = case.loop.process, case.loop.valve, 1 + 1e-11
@@ -123,10 +128,11 @@ def test_digits_that_nobody_knows_change_no_forecast(seed):
         assert (again.before, again.after) == (once.before, once.after)
 
 
-def changed_while_it_cycles(loop, new, load):
-    """Stem travel [%] under new settings of a loop that cycles under the present ones first, with the same load.
+def changed_during_oscillation(loop, new, load):
+    """Stem travel [%] under new settings after the loop has oscillated under the present settings, with the
+    same load.
 
-    In plain Python: a PI in position form, a stem that rests after each slip, a lag behind a pipe.
+    In plain Python: a PI controller in position form, a stem that rests after each slip, and a FOPDT process.
     """
     p, valve = loop.process, loop.valve
     away, rest = 0.5 * (valve.stickband + valve.slip_jump), 0.5 * (valve.stickband - valve.slip_jump)
@@ -148,17 +154,18 @@ def changed_while_it_cycles(loop, new, load):
     return travel
 
 
-def test_a_sticking_stem_that_cycles_goes_on():
-    """A loop that sticks rests if it begins at rest, and cycles on if it cycled. New settings are forecast for the
-    cycling loop, within 40 %: the period depends on where the stem's jumps are relative to the load."""
+def test_a_sticking_stem_that_oscillates_continues():
+    """A sticking loop rests if it starts at rest, and oscillates if it oscillated before. The forecast for the
+    oscillating loop has the travel within 40 %. The period depends on where the stem's jumps are relative to
+    the load."""
     loop = Loop(Fopdt(1.23, 65.0, 11.0), Pid(2.3, 70.6), Stiction(1.29, 0.56))
     new = replace(loop, controller=Pid(1.97, 138.0))
-    came, forecast = [], []
+    simulated, forecast = [], []
     for seed in range(3):
         noise = 0.015 * np.random.default_rng(seed).standard_normal(12_000)
-        came.append(changed_while_it_cycles(loop, new.controller, noise))
+        simulated.append(changed_during_oscillation(loop, new.controller, noise))
         forecast.append(float(np.abs(np.diff(settled(run(new, noise)).stem)).sum()))
         rested = closed_loop(new, np.zeros(noise.size), noise, op_start=50.0).stem
         assert float(np.ptp(rested)) == 0.0
-    assert min(came) > 20.0
-    assert np.mean(forecast) == pytest.approx(np.mean(came), rel=0.4)
+    assert min(simulated) > 20.0
+    assert np.mean(forecast) == pytest.approx(np.mean(simulated), rel=0.4)

@@ -1,4 +1,4 @@
-"""Maps against the source study's table and against the balance solved point by point."""
+"""Maps against the source study's table and against the harmonic balance of single points."""
 
 from dataclasses import replace
 
@@ -33,14 +33,14 @@ TABLE = {
 
 @pytest.mark.parametrize("ratio", TABLE)
 def test_largest_integral_time_that_cycles(ratio):
-    """The largest Ti/T with a limit cycle (continuous, play) is the table's within its last digit's unit."""
+    """The largest Ti/T with a limit cycle (continuous, backlash) agrees with the study's table within 0.01."""
     found = [largest_cycling_ratio(Fopdt(1, ratio, 1), g) for g in (0.5, 1.0, 1.5)]
     assert found == pytest.approx(TABLE[ratio], abs=0.01)
 
 
 @pytest.mark.parametrize(("ratio", "gain", "ti"), [(2, 1.0, 0.336), (10, 0.5, 0.336), (200, 1.5, 0.836)])
 def test_cycles_just_beyond_the_table(ratio, gain, ti):
-    """Where we find 0.01 more than the table, the balance is solved to 1e-9 by the closed form alone."""
+    """Where the largest ratio is 0.01 above the table, the closed form alone solves the balance to 1e-9."""
     kp = gain * ratio / 2.5
 
     def miss(x):
@@ -59,7 +59,7 @@ def test_cycles_just_beyond_the_table(ratio, gain, ti):
 
 
 def test_nominal_tuning_begins_to_cycle_between_ten_and_twenty():
-    """Nominal tuning rests at T/L = 10 and cycles at 20."""
+    """A loop with nominal tuning rests at T/L = 10 and has a limit cycle at T/L = 20."""
     at = {r: largest_cycling_ratio(Fopdt(1, r, 1)) * r for r in (10, 20)}
     assert at[10] < min(10, 10)
     assert at[20] > min(20, 10)
@@ -68,7 +68,7 @@ def test_nominal_tuning_begins_to_cycle_between_ten_and_twenty():
 @pytest.mark.parametrize("valve", [Backlash(1.0), Stiction(1.0, 1.0), Stiction(1.0, 0.4)])
 @pytest.mark.parametrize("scan", [0.0, 1.0])
 def test_map_agrees_with_the_balance_point_by_point(valve, scan):
-    """Every cell has the period, the travel and the rest that the balance gives for that cell alone."""
+    """Every cell has the period, the travel and the rest of the harmonic balance for this cell alone."""
     kp, ti = np.array([0.3, 0.7, 1.4]), np.array([5.0, 20.0, 120.0, 250.0])
     loop = replace(LEVEL, valve=valve, controller=Pid(1, 10, scan_s=scan))
     m = travel_map(loop, kp, ti)
@@ -84,16 +84,17 @@ def test_map_agrees_with_the_balance_point_by_point(valve, scan):
                 assert m.travel[i, j] == pytest.approx(b.op_amplitude / b.period_s, rel=5e-3)
 
 
-def test_map_of_the_level_loop_tells_the_study_s_story():
-    """Travel falls with longer Ti until the loop rests; the gain matters little (Figure 5)."""
+def test_map_of_the_level_loop_agrees_with_the_study():
+    """Travel decreases with longer Ti until the loop rests; the loop rests at the same Ti for both gains
+    (Figure 5)."""
     m = travel_map(LEVEL, np.array([0.5, 1.0]), np.array([5.0, 10.0, 50.0, 100.0, 190.0]))
     assert np.all(np.diff(m.travel, axis=0) <= 0)
     assert m.rests[-1].all()
     assert not m.rests[:4].any()
 
 
-def test_map_of_the_flow_loop_with_stick_slip_tells_the_study_s_story():
-    """Smaller gain and longer Ti cut the travel, and nothing is called rest (Figure 7)."""
+def test_map_of_the_flow_loop_with_stick_slip_agrees_with_the_study():
+    """A smaller gain and a longer Ti reduce the travel, and no cell is at rest (Figure 7)."""
     loop = Loop(Fopdt(1, 2, 1), Pid(0.8, 2, scan_s=0), Stiction(1, 1))
     m = travel_map(loop, np.array([0.2, 0.4, 0.8]), np.array([0.8, 1.2, 2.0]))
     assert not travel_map(loop, np.array([0.2, 0.8]), np.array([2.0, 8.0])).rests.any()
@@ -103,7 +104,8 @@ def test_map_of_the_flow_loop_with_stick_slip_tells_the_study_s_story():
 
 @pytest.mark.parametrize("ti", [1.0, 2.0, 4.0, 8.0])
 def test_stick_slip_cycles_in_simulation_even_without_a_balance(ti):
-    """On the flow loop stick-slip cycles at every integral time, also where the balance has no solution."""
+    """On the flow loop, stick-slip has a limit cycle at every integral time, also where the balance has no
+    solution."""
     loop = Loop(Fopdt(1, 2, 1), Pid(0.2, ti, scan_s=0), Stiction(1, 1))
     assert confirm(loop).cycle is not None
 
@@ -111,7 +113,7 @@ def test_stick_slip_cycles_in_simulation_even_without_a_balance(ti):
 @settings(max_examples=40, deadline=None)
 @given(st.floats(1, 300), st.floats(0.2, 1.5), st.floats(0.02, 2.0), st.integers(0, 2), st.booleans())
 def test_loeb_and_the_slope_of_the_gain_agree(ratio, gain, ti, which, integrating):
-    """A solution is stable by Loeb's criterion just where the gain that closes the balance rises."""
+    """A solution is stable by Loeb's criterion exactly where the gain that solves the balance rises."""
     process = Integrator(1 / ratio, 1) if integrating else Fopdt(1, ratio, 1)
     valve = (Backlash(1.0), Stiction(1.0, 1.0), Stiction(1.0, 0.4))[which]
     loop = Loop(process, Pid(gain * ratio / 2.5, ti * ratio, scan_s=0.5), valve)
@@ -122,8 +124,8 @@ def test_loeb_and_the_slope_of_the_gain_agree(ratio, gain, ti, which, integratin
 
 
 def by_loeb(loop: Loop, b: Balance) -> bool:
-    """Whether with A a little larger the oscillation decays: from 1 + N(A) L(s) = 0, ds/dA is -i (dlnN/dA) /
-    (dlnL/dw), whose real part must be negative (Atherton 1982)."""
+    """Whether the oscillation decays if A is slightly larger. From 1 + N(A) L(s) = 0 follows ds/dA = -i
+    (dlnN/dA) / (dlnL/dw); its real part must be negative (Atherton 1982)."""
     near = np.array([1 - 1e-6, 1 + 1e-6])
     linear = loop_response(loop, 2 * np.pi / b.period_s * near)
     valve = describing_function(loop.valve, b.op_amplitude * near, max(b.jumps, 1))
@@ -132,7 +134,7 @@ def by_loeb(loop: Loop, b: Balance) -> bool:
 
 
 def test_curves_meet_at_the_crossing():
-    """N(A) and -1/(G C) pass through the same point at the crossing (Figure 3)."""
+    """N(A) and -1/(G C) have the same value at the crossing (Figure 3)."""
     c = curves(LEVEL)
     b = c.crossings[0]
     n = np.interp(b.op_amplitude, c.amplitude, c.valve)
@@ -141,13 +143,13 @@ def test_curves_meet_at_the_crossing():
 
 
 def test_negative_gains_give_the_same_map():
-    """A falling process with a direct-acting controller has the map of its mirror image."""
+    """A process of negative gain with a direct-acting controller has the map of its mirror image."""
     kp, ti = np.array([0.5, 1.0]), np.array([10.0, 300.0])
     mirror = Loop(Fopdt(-80, 200, 1), Pid(-1, 10, scan_s=0), Backlash(1.0))
     assert np.array_equal(travel_map(mirror, -kp, ti).travel, travel_map(LEVEL, kp, ti).travel)
 
 
 def test_rest_of_the_map_is_rest_in_simulation():
-    """Where the map says that the loop rests well away from the border, simulation finds no cycle."""
+    """Where the map has no limit cycle, far from the border, the simulation has none either."""
     for kp in (0.5, 1.0, 1.5):
         assert confirm(replace(LEVEL, controller=Pid(kp, 220, scan_s=1))).cycle is None

@@ -23,7 +23,8 @@ def at_gain(loop: Loop, kp: float) -> Loop:
 
 
 def test_continuous_harmonic_balance_of_the_study():
-    """By describing function: 41.14 s, PV 0.565, OP 0.675, and at half gain 57.1 s, 1.112."""
+    """The describing function gives a period of 41.14 s and amplitudes of PV 0.565 and OP 0.675. At half the
+    gain it gives 57.1 s and PV 1.112."""
     b = predicted_cycle(LEVEL)
     assert b.period_s == pytest.approx(41.14, abs=0.01)
     assert b.pv_amplitude == pytest.approx(0.565, abs=5e-4)
@@ -34,7 +35,8 @@ def test_continuous_harmonic_balance_of_the_study():
 
 
 def test_half_a_scan_as_dead_time():
-    """With L + 0.5 s the figures are 36.84 s, 0.617, OP 0.715, and 53.9 s, 1.195 at half gain."""
+    """With L + 0.5 s the figures are 36.84 s, PV 0.617 and OP 0.715; at half the gain they are 53.9 s and PV
+    1.195."""
     loop = replace(LEVEL, process=Fopdt(80, 200, 1.5))
     b, half = predicted_cycle(loop), predicted_cycle(at_gain(loop, 0.5))
     assert b.period_s == pytest.approx(36.84, abs=0.005)
@@ -45,7 +47,7 @@ def test_half_a_scan_as_dead_time():
 
 
 def test_exact_scan_is_nearer_to_simulation_than_half_a_scan_of_dead_time():
-    """With the scan exact the predicted period is nearer to the simulated 38.0 s than with L + 0.5 s."""
+    """With the exact scan the predicted period is nearer to the simulated 38.0 s than with L + 0.5 s."""
     exact = predicted_cycle(SCANNED).period_s
     rough = predicted_cycle(replace(LEVEL, process=Fopdt(80, 200, 1.5))).period_s
     assert abs(exact - 38.0) < abs(rough - 38.0)
@@ -53,7 +55,7 @@ def test_exact_scan_is_nearer_to_simulation_than_half_a_scan_of_dead_time():
 
 
 def test_second_solution_is_no_limit_cycle():
-    """The solution near 1.3e6 s with A close to d is found and told to be unstable."""
+    """The solution near 1.3e6 s with A close to d is found and reported as unstable."""
     fast, slow = harmonic_balance(LEVEL)
     assert fast.stable
     assert not slow.stable
@@ -62,7 +64,8 @@ def test_second_solution_is_no_limit_cycle():
 
 
 def test_simulation_confirms_figure_1():
-    """Simulated at 1 s scan the loop cycles with 38.0 s and 0.600, and 88.5 % more at half gain."""
+    """Simulated at a scan of 1 s, the loop oscillates with 38.0 s and PV 0.600; at half the gain the amplitude
+    is 88.5 % larger."""
     c = confirm(SCANNED)
     assert c.settled
     assert c.cycle.period_s == pytest.approx(38.0, abs=0.05)
@@ -72,32 +75,33 @@ def test_simulation_confirms_figure_1():
 
 
 def test_simulated_continuous_controller():
-    """With a nearly continuous controller the simulated cycle has 48.9 s and 0.57."""
+    """With a nearly continuous controller the simulated limit cycle has a period of 48.9 s and PV 0.57."""
     c = confirm(LEVEL).cycle
     assert c.period_s == pytest.approx(48.9, abs=0.05)
     assert c.pv_amplitude == pytest.approx(0.569, abs=3e-3)
 
 
-def test_long_integral_time_ends_the_cycle():
-    """At Ti = T = 200 s neither prediction nor simulation finds a cycle, and at 10 s both do."""
+def test_long_integral_time_ends_the_limit_cycle():
+    """At Ti = T = 200 s neither prediction nor simulation has a limit cycle."""
     long = replace(SCANNED, controller=Pid(1, 200))
     assert harmonic_balance(long) == ()
     assert confirm(long).cycle is None
     assert confirm(long).settled
 
 
-def test_nominal_flow_loop_does_not_cycle_with_play():
-    """The study's flow loop (T/L = 2) at nominal tuning rests with play and cycles with stick-slip."""
+def test_nominal_flow_loop_has_no_limit_cycle_with_backlash():
+    """The study's flow loop (T/L = 2) at nominal tuning rests with backlash and has a limit cycle with
+    stick-slip."""
     flow = Loop(Fopdt(1, 10, 5), Pid(0.8, 10, scan_s=0), Backlash(1.0))
     assert predicted_cycle(flow) is None
     assert confirm(flow).cycle is None
-    stuck = replace(flow, valve=Stiction(1.0, 1.0))
-    assert predicted_cycle(stuck) is not None
-    assert confirm(stuck).cycle is not None
+    sticking = replace(flow, valve=Stiction(1.0, 1.0))
+    assert predicted_cycle(sticking) is not None
+    assert confirm(sticking).cycle is not None
 
 
-def test_healthy_valve_has_no_limit_cycle():
-    """Without play or stick-slip there is nothing to balance."""
+def test_ideal_valve_has_no_limit_cycle():
+    """Without backlash or stick-slip the harmonic balance has no solution and the simulation no limit cycle."""
     for valve in (None, Backlash(0.0)):
         assert harmonic_balance(replace(LEVEL, valve=valve)) == ()
         assert confirm(replace(LEVEL, valve=valve)).cycle is None
@@ -105,8 +109,9 @@ def test_healthy_valve_has_no_limit_cycle():
 
 @settings(max_examples=25, deadline=None)
 @given(st.floats(0.5, 2.0), st.floats(5, 60), st.floats(0.2, 5.0))
-def test_integrator_with_play_always_cycles_under_pi(gain, ti, width):
-    """On an integrating process play cycles at whatever gain and integral time, as simulated."""
+def test_integrator_with_backlash_always_has_a_limit_cycle_under_pi(gain, ti, width):
+    """On an integrating process, backlash has a limit cycle at every gain and integral time, also in
+    simulation."""
     loop = Loop(Integrator(0.05, 2.0), Pid(gain * 3, ti + 10 / gain), Backlash(width))
     assert predicted_cycle(loop) is not None
     assert confirm(loop).cycle is not None
@@ -114,8 +119,9 @@ def test_integrator_with_play_always_cycles_under_pi(gain, ti, width):
 
 @settings(max_examples=25, deadline=None)
 @given(st.floats(0.1, 10.0), st.floats(0.1, 10.0), st.sampled_from([1, -1]))
-def test_amplitude_scales_with_play_and_not_with_sign_or_span(width, span, sign):
-    """Twice the play is twice the cycle at the same period; PV's scale and the sign change nothing."""
+def test_amplitude_scales_with_backlash_and_not_with_sign_or_span(width, span, sign):
+    """Twice the backlash gives twice the amplitude at the same period. The scale of PV and the sign do not
+    change the limit cycle."""
     base = predicted_cycle(SCANNED)
     loop = Loop(Fopdt(sign * span * 80, 200, 1), Pid(sign / span, 10), Backlash(width))
     b = predicted_cycle(loop)
@@ -127,7 +133,7 @@ def test_amplitude_scales_with_play_and_not_with_sign_or_span(width, span, sign)
 @settings(max_examples=25, deadline=None)
 @given(st.floats(20, 200), st.floats(0.5, 1.5), st.floats(0.05, 0.3))
 def test_prediction_is_near_simulation_on_lag_loops(time_constant, gain, share):
-    """Where play cycles clearly, period and amplitude are predicted within 35 %."""
+    """If backlash causes a clear limit cycle, period and amplitude are predicted within 35 %."""
     process = Fopdt(1.0, time_constant, time_constant / 50)
     delay = process.dead_time_s + 0.5
     loop = Loop(process, Pid(gain * time_constant / (2.5 * delay), share * time_constant), Backlash(1.0))

@@ -1,4 +1,4 @@
-"""Rules against the source study's figures."""
+"""Tuning rules against the source study's figures."""
 
 import math
 
@@ -20,30 +20,30 @@ def test_flow_loop_takes_its_time_constant():
 
 
 def test_integrator_is_the_limit_of_a_slow_lag():
-    """A lag of endless time constant at the same slope gives the integrator's settings."""
+    """A lag with a long time constant and the same slope gets the settings of the integrator."""
     lag, ramp = simc(Fopdt(400, 1000, 1)), simc(Integrator(0.4, 1))
     assert (lag.kp, lag.ti_s) == pytest.approx((ramp.kp, ramp.ti_s))
 
 
 def test_gain_takes_the_sign_of_the_process():
-    """A falling process gets a direct-acting controller."""
+    """A process of negative gain gets a direct-acting controller."""
     assert simc(Fopdt(-2, 20, 1)).kp == -simc(Fopdt(2, 20, 1)).kp
 
 
 def test_half_the_scan_is_dead_time():
-    """Half a scan adds to the dead time; a process without any keeps a finite gain."""
+    """Half a scan is added to the dead time. A process without dead time gets a finite gain."""
     assert effective_delay(Fopdt(1, 10, 2), 1.0) == 2.5
     assert math.isfinite(simc(Fopdt(1, 10, 0)).kp)
 
 
 def test_no_gain_is_an_error():
-    """A process that does not answer cannot be tuned, and the error says what was seen."""
+    """A process of gain zero cannot be tuned, and the error states the slope."""
     with pytest.raises(ValueError, match="slope 0"):
         simc(Integrator(0.0, 1))
 
 
-def test_rule_for_play():
-    """Ti rises to the time constant at the same gain; a longer Ti stays; an integrator is left alone."""
+def test_rule_for_backlash():
+    """Ti rises to the time constant at the same gain. A longer Ti and an integrator stay unchanged."""
     process = Fopdt(80, 200, 1)
     assert backlash_rule(process, Pid(1, 10)) == Pid(1, 200)
     assert backlash_rule(process, Pid(1, 300)) == Pid(1, 300)

@@ -1,4 +1,5 @@
-"""Settings between which an engineer may choose: none is shown that another beats, and the price holds everywhere."""
+"""Settings from which an engineer may choose: none is dominated by another, and their limits hold on every
+loop."""
 
 from dataclasses import replace
 
@@ -21,7 +22,7 @@ from tuning.trade import trade
 
 @pytest.fixture(scope="module")
 def found():
-    """Benches and trades of three loops each with play, stick-slip and play on an integrator."""
+    """Search tables and trade-offs of three loops each with backlash, stick-slip and backlash on an integrator."""
     out = []
     for make in (backlash_case, stick_case, level_case):
         for seed in range(3):
@@ -31,8 +32,8 @@ def found():
     return out
 
 
-def test_of_two_settings_on_the_curve_neither_beats_the_other(found):
-    """Along the curve travel rises and error falls, and each point is robust."""
+def test_no_settings_on_the_curve_dominate_others(found):
+    """Along the curve travel rises and error decreases, and each point is robust."""
     for table, t in found:
         travel, error = (np.array([getattr(c, name) for c in t.curve]) for name in ("travel", "error"))
         assert np.all(np.diff(travel) >= 0)
@@ -43,8 +44,9 @@ def test_of_two_settings_on_the_curve_neither_beats_the_other(found):
     assert np.median([len(t.curve) for _, t in found]) >= 3
 
 
-def test_what_is_chosen_keeps_its_price_on_every_loop(found):
-    """Simulated one by one, the calmer valve costs at most a quarter more error, the smaller error no more travel."""
+def test_the_choices_keep_their_limits_on_every_loop(found):
+    """Simulated one by one, the choice with less travel has at most 25 % more error. The choice with less error
+    has no more travel than allowed."""
     chosen = 0
     for table, t in found:
         for name, c in t.chosen.items():
@@ -63,7 +65,7 @@ def test_what_is_chosen_keeps_its_price_on_every_loop(found):
 
 
 def test_a_repaired_valve_is_the_process_alone():
-    """What a repair would bring is a simulation in which the stem is OP."""
+    """The forecast for a repaired valve is a simulation in which the stem equals OP."""
     loop = Loop(Fopdt(1.2, 30.0, 3.0), Pid(0.4, 60.0), Backlash(3.0))
     load = 0.3 * np.sin(np.arange(4000) / 300.0)
     (free,) = tried(replace(loop, valve=None), load, {"free": loop.controller})
@@ -73,8 +75,8 @@ def test_a_repaired_valve_is_the_process_alone():
     assert free.error == pytest.approx(whole.average_absolute_error, rel=1e-6)
 
 
-def test_a_slow_lag_behind_a_play_is_tuned_as_an_integrator():
-    """Where load rejection forbids an integral time as long as the lag, shorter ones calm the valve."""
+def test_a_slow_lag_with_backlash_is_tuned_as_an_integrator():
+    """If load rejection forbids an integral time as long as the lag, a shorter one reduces travel and error."""
     loop = Loop(Fopdt(44.2, 861.0, 3.5), Pid(0.6, 40.0), Backlash(3.0))
     rng = np.random.default_rng(2)
     load = 2.0 * np.sin(np.arange(9000) / 900.0) + 0.02 * rng.standard_normal(9000)
@@ -89,8 +91,9 @@ def test_a_slow_lag_behind_a_play_is_tuned_as_an_integrator():
 
 
 @pytest.mark.parametrize("td_s", [0.0, 5.0])
-def test_a_derivative_that_stays_is_said_to(td_s):
-    """The table of settings of a loop with a derivative says that it stays, and all its settings have it."""
+def test_a_derivative_that_stays_is_reported(td_s):
+    """The table of settings of a loop with a derivative states that the derivative stays, and all its settings
+    have it."""
     spec = LoopSpec("L", kp=0.4, ti=60.0, td=td_s, pv_lo=0.0, pv_hi=100.0)
     loop = Loop(Fopdt(1.2, 30.0, 3.0), Pid(0.4, 60.0, td_s), Backlash(3.0))
     load = 0.3 * np.sin(np.arange(4000) / 300.0)
@@ -99,8 +102,8 @@ def test_a_derivative_that_stays_is_said_to(td_s):
     assert ("derivative" in page.table(found, spec, "%").note) == (td_s > 0.0)
 
 
-def test_a_stem_that_rests_has_nothing_to_trade():
-    """Of a loop whose stem rests under its load the page is drawn, with no choice, no price and no repair."""
+def test_a_stem_that_rests_has_no_choices():
+    """The page of a loop whose stem rests under its load is drawn without choices, cost and repair."""
     spec = LoopSpec("L", kp=0.4, ti=60.0, pv_lo=0.0, pv_hi=100.0)
     loop = Loop(Fopdt(1.2, 30.0, 3.0), Pid(0.4, 60.0), Stiction(40.0, 20.0))
     found = compared(loop, 0.01 * np.sin(np.arange(4000) / 300.0), None, 120.0, 100.0, LIMITS)
@@ -111,9 +114,9 @@ def test_a_stem_that_rests_has_nothing_to_trade():
     assert page.settings_page("L", "2026-03-02", found, spec).sections
 
 
-def test_a_derivative_is_offered_where_it_pays_alone():
-    """Behind play it takes a tenth off the error for no more travel, simulated anew; under noise, and to a loop that
-    has one, none is offered."""
+def test_a_derivative_is_offered_only_where_it_reduces_the_error():
+    """With backlash a derivative reduces the simulated error by more than 10 % without more travel than
+    allowed. It is not offered under noise, or to a loop that has a derivative."""
     rng = np.random.default_rng(2)
     walk = np.cumsum(rng.normal(0.0, 0.02, 20_000))
     load = walk - np.convolve(walk, np.ones(2000) / 2000, "same")
