@@ -1,4 +1,5 @@
-"""A second way from OP to PV: the stem as a state machine, then the difference equation of the held process."""
+"""A separate simulation from OP to PV: the stem as a state machine, then the difference equation of the
+process."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from identification.simulation.valve import stem_position
 
 
 def pv_of(process: Process, valve: Valve, op: Floats, dt_s: float) -> Floats:
-    """PV's deviation [% PV], shape (n,), from rest with the stem at its first position."""
+    """Deviation of PV from rest [% PV], shape (n,), with the stem at its first position."""
     stem = stem_position(op, valve)
     d = discretize(process, dt_s)
     return respond(stem - stem[0], d)

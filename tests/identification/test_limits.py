@@ -17,7 +17,7 @@ from identification.limits import LIMITS, ExplainLimits
 from identification.mismatch.answer import answer
 from identification.mismatch.diagnosis import explain
 from identification.mismatch.recording import Recording
-from tests.identification.hand_made import Plant, recording
+from tests.identification.plain_loop import Plant, recording
 
 ROOT = Path(__file__).parents[2]
 
@@ -54,7 +54,7 @@ def test_the_recorder_takes_its_limits():
 
 def test_the_controllers_check_takes_its_limits():
     """Settings a fifth off are named; not where twice the stated setting is still believed."""
-    s = recording(Plant(), 6, told=1.25)
+    s = recording(Plant(), 6, kp_factor=1.25)
     assert under(s, "controller") == "controller-settings"
     assert under(s, "controller", setting=np.log(2.0)) != "controller-settings"
 

@@ -1,4 +1,5 @@
-"""A stated law beside that of a record, for controllers with what no list states, made without the package's law."""
+"""A stated control law compared with the recorded one, for controllers with terms that loops.csv does not
+state."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ TRUE = Pid(2.0, 80.0)
 def recorded(
     acting, every: int = 1, rate: float = np.inf, kp: float = 2.0, weight: float = 1.0
 ) -> LoopRecord:
-    """A lag of 60 s, dead time 8 s, under a load that walks, closed by a PI; `acting` is what of e counts."""
+    """A lag of 60 s with dead time 8 s under a random-walk load, controlled by a PI; `acting` changes the error
+    e."""
     rng = np.random.default_rng(6)
     load = np.cumsum(rng.standard_normal(N)) * 0.2
     load -= np.linspace(0.0, load[-1], N)
@@ -39,12 +41,12 @@ def recorded(
 
 
 def gapped(e: float) -> float:
-    """An error without what is inside of 0.4 %."""
+    """An error with a gap of 0.4 %."""
     return np.sign(e) * max(abs(e) - 0.4, 0.0)
 
 
 def compared(record: LoopRecord, stated: Pid) -> LawsCompared:
-    """What is found on the loop's own time scale."""
+    """The comparison on the loop's own time scale."""
     found = compare_laws(record, 320.0, stated)
     assert found is not None
     return found
@@ -61,22 +63,23 @@ def compared(record: LoopRecord, stated: Pid) -> LawsCompared:
     ],
     ids=["gap", "squared", "weight", "rate"],
 )
-def test_true_settings_agree_whatever_no_list_states(acting, more, every):
-    """Gain and integral time stated as they are agree with the record; what else the law has is not stated."""
+def test_true_settings_agree_with_any_unstated_term(acting, more, every):
+    """True gain and integral time agree with the record if the other terms of the control law are not stated."""
     assert compared(recorded(acting, every, **more), replace(TRUE, kp=more.get("kp", 2.0))).agree
 
 
 @pytest.mark.parametrize("smooth", [4.0, 5.0, 10.0, 17.0, 30.0])
-def test_a_filter_of_pv_that_no_list_states_is_no_other_setting(smooth):
-    """True settings agree with a record in which the controller saw PV through a first-order filter, also where
-    other gains with a shorter filter leave less than a hundredth of OP's variance."""
+def test_an_unstated_filter_of_pv_is_no_other_setting(smooth):
+    """True settings agree with the record of a controller that acts on PV behind a first-order filter. The
+    filter is recovered within 12 %. Other gains with a shorter filter would leave less than 1 % of OP's
+    variance."""
     seen = compared(behind_a_filter(smooth), Pid(1.0, 40.0, scan_s=1.0))
     assert seen.agree
     assert seen.found.pv_filter_s == pytest.approx(smooth, rel=0.12)
 
 
 def behind_a_filter(smooth: float) -> LoopRecord:
-    """A lag of 30 s in coarse noise under a load that walks, closed by a PI behind a filter of PV [s]."""
+    """A lag of 30 s with coarse noise under a random-walk load, controlled by a PI behind a filter of PV [s]."""
     rng = np.random.default_rng(8)
     load = np.cumsum(rng.standard_normal(N)) * 0.1
     load -= np.linspace(0.0, load[-1], N)
@@ -91,7 +94,7 @@ def behind_a_filter(smooth: float) -> LoopRecord:
 
 
 def test_the_gap_is_found_and_the_square_named():
-    """The gap is found within a tenth, and a squared error by its name."""
+    """A gap is recovered within 10 %, and a squared error is reported by its name."""
     assert compared(recorded(gapped), TRUE).found.gap == pytest.approx(0.4, rel=0.1)
     squared = compared(recorded(lambda e: e * abs(e) / 100, kp=150.0), replace(TRUE, kp=150.0))
     assert squared.found.error_form is ErrorForm.SQUARED
@@ -101,8 +104,9 @@ def test_the_gap_is_found_and_the_square_named():
 @pytest.mark.parametrize(
     "stated", [replace(TRUE, ti_s=80.0 / 60.0), replace(TRUE, ti_s=60.0 / 80.0), Pid(50.0, 80.0)]
 )
-def test_units_mistaken_do_not_agree(stated, every):
-    """Minutes or repeats taken for seconds, and a band for a gain, do not agree; the true law is found."""
+def test_wrong_units_do_not_agree(stated, every):
+    """Minutes or repeats instead of seconds, and a band instead of a gain, do not agree; the true law is
+    recovered within 25 %."""
     seen = compared(recorded(lambda e: e, every), stated)
     assert not seen.agree
     assert seen.found.kp == pytest.approx(2.0, rel=0.25)
@@ -110,7 +114,7 @@ def test_units_mistaken_do_not_agree(stated, every):
 
 
 def test_integral_alone_is_found_as_such():
-    """A controller of integral alone is found without a gain, with the time that OP takes for its error."""
+    """A controller with integral action alone is found without a gain, and its integral time within 1 %."""
     rng = np.random.default_rng(3)
     pv = 50.0 + np.convolve(rng.standard_normal(N), np.ones(60) / 60, mode="same")
     op = 50.0 + np.cumsum(50.0 - pv) / 40.0
@@ -120,8 +124,8 @@ def test_integral_alone_is_found_as_such():
     assert (found.kp, found.ti_s) == pytest.approx((0.0, 40.0), rel=0.01)
 
 
-def test_a_rate_limit_is_seen_and_a_sine_has_none():
-    """Moves that pile up at the fastest are a limit of rate; those of a sine and of noise are not."""
+def test_a_rate_limit_is_found_and_a_sine_has_none():
+    """A signal with many moves at its highest rate has a rate limit; a sine and noise have none."""
     t = np.arange(N)
     assert not fastest(50 + 5 * np.sin(t / 50)).any()
     assert not fastest(np.round(np.cumsum(np.random.default_rng(1).standard_normal(N)), 1)).any()
@@ -133,15 +137,16 @@ def test_a_rate_limit_is_seen_and_a_sine_has_none():
     [({"rate": 0.05}, "op_rate", 0.05), ({"weight": 0.0}, "sp_weight", 0.0), ({}, "op_rate", np.inf)],
     ids=["rate", "weight", "none"],
 )
-def test_what_the_record_shows_beside_true_settings_is_recognized(more, column, true):
-    """A limit of OP's rate and a gain without the set point are recognized, and neither where there is none."""
+def test_other_terms_are_recognized_with_true_settings(more, column, true):
+    """A rate limit of OP and a gain without the set point are recognized, and none is reported where there is
+    none."""
     found = compared(recorded(lambda e: e, **more), TRUE)
     assert found.agree
     assert getattr(found.found, column) == pytest.approx(true, rel=0.02)
 
 
 def test_a_filter_and_a_limit_are_recognized():
-    """A filter of PV of 7 s is told within a sixth, and a limit of OP at 51 % as it is."""
+    """A filter of PV of 7 s is recovered within a sixth, and a limit of OP at 51 % exactly."""
     rng = np.random.default_rng(4)
     load = np.cumsum(rng.standard_normal(N)) * 0.2
     load -= np.linspace(0.0, load[-1], N)

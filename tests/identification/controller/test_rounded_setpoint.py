@@ -1,4 +1,4 @@
-"""A stated law stays the law where the set point of the record is off that of the controller."""
+"""A stated control law agrees with the record if the recorded set point differs from that of the controller."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from identification.record import LoopRecord
 
 STATED = Pid(6.4, 27.0, scan_s=1.0)
 OFF = [-0.018, -0.018, -0.018, 0.003, 0.003, 0.003, 0.02, 0.02]
-"""What the set point of the record is off that of the controller, by hours [%]."""
+"""Difference between the recorded set point and that of the controller, by hours [%]."""
 
 
 def loop_with_sp_off_its_record(off_by_hour: list[float]) -> LoopRecord:
-    """A lag of 46 s and 4 s of dead time under PI, whose set point differs by hours from the recorded one [%]."""
+    """A lag of 46 s and 4 s of dead time under PI control. Its set point differs from the recorded one by hours
+    [%]."""
     n, rng = 3600 * len(off_by_hour), np.random.default_rng(3)
     sp, load = np.repeat(off_by_hour, 3600), np.cumsum(rng.normal(0.0, 0.05, n))
     pv, op, y, total = np.zeros(n), np.zeros(n), 0.0, 0.0
@@ -28,16 +29,17 @@ def loop_with_sp_off_its_record(off_by_hour: list[float]) -> LoopRecord:
     return LoopRecord("L", 0.0, 1.0, np.full(n, 50.0), 50.0 + pv, 50.0 + op, np.zeros(n, bool))
 
 
-def test_an_error_of_the_recorded_set_point_that_stays_is_no_other_law():
-    """Of a set point that its record rounds, the stated law is still that of the record."""
+def test_a_constant_error_of_the_recorded_set_point_is_no_other_law():
+    """The stated control law agrees with a record whose set point is rounded."""
     record = loop_with_sp_off_its_record(OFF)
     seen = compare_laws(record, 17.0, STATED)
     assert seen is not None
     assert seen.agree
 
 
-def test_a_wrong_integral_time_is_still_seen():
-    """Of the same loop, an integral time stated six times too long is another law than the record's."""
+def test_a_wrong_integral_time_is_still_found():
+    """In the same loop, an integral time that is stated six times too long does not agree, and the true one is
+    recovered within 25 %."""
     record = loop_with_sp_off_its_record(OFF)
     seen = compare_laws(record, 17.0, Pid(6.4, 162.0, scan_s=1.0))
     assert seen is not None

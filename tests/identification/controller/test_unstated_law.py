@@ -1,4 +1,4 @@
-"""A controller of which nothing is stated, recovered from SP, PV and OP."""
+"""A controller without stated settings, recovered from SP, PV and OP."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from identification.controller.pi_regression import Trends, unstated_law
 
 
 def day(kp: float, ti: float, seed: int, n: int = 6000) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """SP, PV and OP, shape (n,) each, of a lag under a PI controller with limits, stepped in plain Python.
+    """SP, PV and OP, each shape (n,), of a lag under a PI controller with limits, simulated in plain Python.
 
-    SP goes up and down as day and night do, a load wanders, PV is rounded to .1 and OP to .05; ti in samples.
+    SP alternates between two levels, the load varies slowly, PV is rounded to 0.1 and OP to 0.01; ti in
+    samples.
     """
     rng = np.random.default_rng(seed)
     sp = np.where(np.arange(n) % 2000 < 1000, 55.0, 45.0)
@@ -30,8 +31,8 @@ def day(kp: float, ti: float, seed: int, n: int = 6000) -> tuple[np.ndarray, np.
 @pytest.mark.parametrize(
     ("kp", "ti"), [(2.0, 24.0), (0.8, 12.0), (4.0, 60.0), (-1.5, 30.0), (0.5, 200.0), (1.0, 9.0)]
 )
-def test_settings_come_back_within_a_twentieth(kp: float, ti: float) -> None:
-    """Kp and Ti are found within 5 %, of either sign, from an integral time of nine samples to two hundred."""
+def test_settings_are_recovered_within_a_twentieth(kp: float, ti: float) -> None:
+    """Kp and Ti are recovered within 5 % for both signs, with integral times from nine to two hundred samples."""
     sp, pv, op = day(kp, ti, 7)
     found = unstated_law(Trends(sp, pv, op, (op > 0.05) & (op < 99.95)))
     assert found is not None
@@ -40,8 +41,8 @@ def test_settings_come_back_within_a_twentieth(kp: float, ti: float) -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
-def test_a_script_obeys_no_law(seed: int) -> None:
-    """Where OP is moved by a script no settings are told, with PV that answers it or with none."""
+def test_a_script_follows_no_law(seed: int) -> None:
+    """If a script moves OP, no settings are reported, whether PV responds or not."""
     sp, pv, _ = day(2.0, 24.0, seed)
     rng = np.random.default_rng(seed)
     op = np.repeat(50.0 + 10.0 * rng.standard_normal(pv.size // 100), 100)

@@ -1,4 +1,5 @@
-"""Backlash beside a periodic load: on loops of benchmarks/world, whose simulator shares no code with the packages."""
+"""Backlash in addition to a periodic load, on loops of benchmarks/world. Their simulator shares no code with
+the packages."""
 
 from __future__ import annotations
 
@@ -24,10 +25,11 @@ WIDTH = 2.0
 def _trends(
     valve: Valve, seed: int, top: float = 1.0, size: float = 1.2, slow: float = 0.0
 ) -> tuple[Floats, Floats]:
-    """PV and OP of a loop under a sine of a size [% OP], cut off at `top` of its amplitude, and loads that wander."""
+    """PV and OP of a loop under a sine of a size [% OP], cut off at `top` of its amplitude, and slowly varying
+    loads."""
     rng, n = np.random.default_rng(seed), HOURS * 3600
-    wave = np.clip(np.sin(2 * math.pi * np.arange(n) / PERIOD_S), -top, top) / top
-    load = size * wave + size / 4.0 * wander(rng, n, 600.0, 1.0) + slow * wander(rng, n, 7200.0, 1.0)
+    sine = np.clip(np.sin(2 * math.pi * np.arange(n) / PERIOD_S), -top, top) / top
+    load = size * sine + size / 4.0 * wander(rng, n, 600.0, 1.0) + slow * wander(rng, n, 7200.0, 1.0)
     noise = 0.03 * rng.standard_normal(n)
     t = simulate(PROCESS, LAW, valve, np.full(n, 50.0), load, np.zeros(n), noise)
     return t.pv, t.op
@@ -41,7 +43,7 @@ def _found(trends: tuple[Floats, Floats]) -> BesideLine:
 
 
 def test_backlash_under_a_sine_is_found_with_its_width():
-    """Behind a valve with backlash under a sine, the joint model finds width and process gain within 10 %."""
+    """Backlash under a sine is recovered by the joint model with width and process gain within 10 %."""
     found = _found(_trends(Valve(BACKLASH, WIDTH), 3))
     assert found.evidence > 75.0
     assert found.play.valve.stickband == pytest.approx(WIDTH, rel=0.1)
@@ -50,8 +52,8 @@ def test_backlash_under_a_sine_is_found_with_its_width():
 
 @pytest.mark.parametrize("seed", [3, 4])
 def test_backlash_that_the_cycle_does_not_cross_is_found_by_slower_moves(seed):
-    """Where OP swings by half of the backlash in a cycle, slower moves that cross it show its width within 10 %, and
-    the process gain, which the cycle does not show."""
+    """Backlash of twice the OP range of a period is recovered within 10 % from slower moves that cross it.
+    These moves also give the process gain, which the oscillation does not show."""
     pv, op = _trends(Valve(BACKLASH, 2 * WIDTH), seed, size=0.3, slow=1.2)
     smooth = block_means(op, BLOCK)
     swings = np.ptp(smooth.reshape(-1, int(PERIOD_S) // BLOCK), axis=1)
@@ -64,14 +66,16 @@ def test_backlash_that_the_cycle_does_not_cross_is_found_by_slower_moves(seed):
 
 @pytest.mark.parametrize("top", [1.0, 0.5])
 @pytest.mark.parametrize("seed", [3, 4, 5])
-def test_a_sound_valve_has_no_evidence(top, seed):
-    """A sound valve under a sine, or one that is cut off and so has harmonics as a worn valve does, is not worn."""
+def test_an_ideal_valve_has_no_evidence_of_backlash(top, seed):
+    """An ideal valve has no evidence of backlash under a sine, or under a clipped sine, which has harmonics as
+    backlash has."""
     found = _found(_trends(Valve(), seed, top))
     assert found.evidence < 25.0
 
 
 def test_whitening_inverts_a_load_with_lines():
-    """White noise through the load model by scipy, with a line and two harmonics, is white again after the kernel."""
+    """A load of filtered white noise with a line and two harmonics is white again after the kernel (filters by
+    scipy)."""
     white = np.random.default_rng(1).standard_normal(3000)
     white[:50] = 0.0
     p, s, z1, z2 = 0.9, 0.99, 0.3, 0.1

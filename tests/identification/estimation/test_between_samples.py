@@ -1,4 +1,4 @@
-"""OP between two rows of a record: sizes of a play recorded slowly, by plants of another simulator."""
+"""OP between two rows of a record: width of a backlash recorded slowly, on plants of another simulator."""
 
 from __future__ import annotations
 
@@ -32,20 +32,21 @@ from identification.simulation.pi import per_scan
 from identification.simulation.valve import IDEAL, sticking
 
 
-def worn(process: Process, controller: Controller, width: float, seed: int) -> Drawn:
-    """A loop whose valve has play."""
+def with_backlash(process: Process, controller: Controller, width: float, seed: int) -> Drawn:
+    """A loop whose valve has backlash."""
     return Drawn("T", "backlash", process, controller, Valve(BACKLASH, width), seed, 0.0, 0.0, 1.0, 0.0)
 
 
-WORN = (
-    worn(Process(1.2, 150.0, 0.0, 15.0), Controller(3.5, 40.0), 3.0, 24),
-    worn(Process(2.0, 90.0, 0.0, 8.0), Controller(2.2, 40.0), 2.0, 31),
-    worn(Process(0.8, 300.0, 0.0, 20.0), Controller(6.0, 90.0), 4.0, 32),
+BACKLASH_LOOPS = (
+    with_backlash(Process(1.2, 150.0, 0.0, 15.0), Controller(3.5, 40.0), 3.0, 24),
+    with_backlash(Process(2.0, 90.0, 0.0, 8.0), Controller(2.2, 40.0), 2.0, 31),
+    with_backlash(Process(0.8, 300.0, 0.0, 20.0), Controller(6.0, 90.0), 4.0, 32),
 )
 
 
 def measured(d: Drawn, every: int, scan_s: float) -> Measured:
-    """What is measured of sixteen hours of a loop of which one row in so many is kept, its scan stated so."""
+    """The measurements from sixteen hours of a loop. The record keeps one row in `every`, and the scan is
+    stated."""
     r = recorded(run(d, hours=16), f"every {every} s", 1)
     bad = np.zeros(r["pv"].size, dtype=bool)
     record = LoopRecord("T", 0.0, d.controller.scan_s * every, r["sp"], r["pv"], r["op"], bad)
@@ -54,25 +55,25 @@ def measured(d: Drawn, every: int, scan_s: float) -> Measured:
     return measure(record, found, pid, Config().cause)
 
 
-@pytest.mark.parametrize("drawn", WORN, ids=lambda d: f"{d.valve.band} %")
+@pytest.mark.parametrize("drawn", BACKLASH_LOOPS, ids=lambda d: f"{d.valve.band} %")
 def test_a_width_recorded_every_ten_seconds_is_that_of_the_valve(drawn: Drawn) -> None:
-    """Of a controller that scans every second, one row in ten tells the play's width within 15 %."""
+    """With one row in ten of a controller that scans every second, the backlash is recovered within 15 %."""
     m = measured(drawn, 10, 1.0)
     assert m.window.blocks.steps == 10
     assert m.play.valve.stickband == pytest.approx(drawn.valve.band, rel=0.15)
 
 
 def test_a_controller_no_faster_than_its_record_holds_op_between_rows() -> None:
-    """Of a controller that scans every ten seconds, stated to scan every second, OP is held between rows: the rows'
-    own fit is the likelier one, and its width is the valve's."""
-    d = replace(WORN[0], controller=replace(WORN[0].controller, scan_s=10.0))
+    """If a controller scans every ten seconds but a scan of one second is stated, the fit that holds OP between
+    rows is likelier. Its width is that of the valve within 15 %."""
+    d = replace(BACKLASH_LOOPS[0], controller=replace(BACKLASH_LOOPS[0].controller, scan_s=10.0))
     m = measured(d, 1, 1.0)
     assert m.window.blocks.steps == 1
     assert m.play.valve.stickband == pytest.approx(d.valve.band, rel=0.15)
 
 
 def rows_of(n: int = 400) -> Rows:
-    """PV that wanders with noise, and OP of its controller."""
+    """A slowly varying PV with noise, and OP of its controller."""
     rng = np.random.default_rng(3)
     pv = 50.0 + np.cumsum(0.1 * rng.standard_normal(n)) + 0.2 * rng.standard_normal(n)
     op = 50.0 - 2.0 * (pv - pv.mean()) + np.cumsum(0.05 * (50.0 - pv))
@@ -90,7 +91,7 @@ def test_op_is_the_recorded_one_at_each_row() -> None:
 
 
 def test_no_row_is_used_before_its_time() -> None:
-    """A row that is changed changes no OP before it."""
+    """A change of one row does not change any OP before this row."""
     rows = rows_of()
     loop = LoopAtScan(per_scan(Pid(2.0, 60.0), 1.0), IDEAL, unit_lag(80.0, 12.0, 1.0), 1.0)
     noise = np.random.default_rng(1).standard_normal((rows.pv.size, 10))
@@ -100,9 +101,10 @@ def test_no_row_is_used_before_its_time() -> None:
     assert not np.array_equal(before[200:], after[200:])
 
 
-def test_noise_is_taken_off_a_load_that_walks() -> None:
-    """Of a random walk under white noise as large as 5 of its steps less than half the noise's variance is left: both
-    filters of the optimal smoother leave more than the mean of the two (Kalman; theory gives a gain of .18)."""
+def test_noise_is_removed_from_a_random_walk() -> None:
+    """The smoother removes more than 80 % of the variance of white noise that is five times as large as the
+    steps of a random walk. The mean of the two filters of the optimal smoother is better than each of them
+    (Kalman; theory gives a gain of 0.18)."""
     rng = np.random.default_rng(5)
     walk = np.cumsum(0.2 * rng.standard_normal(4000))
     seen = walk + rng.standard_normal(walk.size)
@@ -110,7 +112,8 @@ def test_noise_is_taken_off_a_load_that_walks() -> None:
 
 
 def test_scans_are_counted_where_the_controller_is_faster() -> None:
-    """A scan of 1 s has ten in a row of 10 s; one of 10 s, an unknown law and a continuous one have one."""
+    """A row of 10 s has ten scans of 1 s, and one scan for a scan of 10 s, an unknown controller and a
+    continuous one."""
     counts = [
         scans_per_row(x, 10.0) for x in (Pid(1.0, 9.0), Pid(1.0, 9.0, scan_s=10.0), None, Pid(1, 9, scan_s=0))
     ]

@@ -1,4 +1,4 @@
-"""The noise model and what outliers count, against filters and laws known elsewhere."""
+"""The noise model and the weights of outliers, against filters and closed forms from other sources."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from identification.signals.robust import OUTLIER, clipped_gain, robust_weights
 
 
 def test_single_lags_whiten_as_a_filter_does():
-    """Innovations under single lags are those of the FIR filter 1 - ar1 q^-1 - ..., to the last bits."""
+    """Innovations with single lags equal those of the FIR filter 1 - ar1 q^-1 - ..., within 1e-12."""
     rng = np.random.default_rng(1)
     x, ar = rng.normal(size=300).cumsum(), np.array([1.2, -0.5, 0.1])
     expected = lfilter(np.concatenate(([1.0], -ar)), [1.0], x)
@@ -27,7 +27,7 @@ def test_single_lags_whiten_as_a_filter_does():
 
 
 def test_widening_lags_whiten_as_their_single_lags_do():
-    """A group of lags acts as its single lags with the coefficient shared out evenly."""
+    """A group of lags equals its single lags with evenly divided coefficients."""
     rng = np.random.default_rng(2)
     x = rng.normal(size=4000).cumsum()
     edges = edges_for(np.ones(x.size, dtype=bool))
@@ -38,8 +38,8 @@ def test_widening_lags_whiten_as_their_single_lags_do():
     np.testing.assert_allclose(grouped[reach:], single[reach:], rtol=0, atol=1e-8)
 
 
-def test_the_lag_means_carry_the_same_model():
-    """A residual less its noise model over the lag means is its innovation, judged where all lags are there."""
+def test_the_lag_means_give_the_same_innovations():
+    """A residual minus its noise model over the lag means is its innovation, at all samples that have all lags."""
     rng = np.random.default_rng(3)
     x = lfilter([1.0], [1.0, -0.9], rng.normal(size=5000))
     usable = np.ones(x.size, dtype=bool)
@@ -53,8 +53,8 @@ def test_the_lag_means_carry_the_same_model():
     assert float(np.var((x - ar @ columns)[counts])) == pytest.approx(1.0, rel=0.06)
 
 
-def test_a_first_noise_model_knows_the_process_apart():
-    """Of PV = known noise + response to OP, the first noise model returns the noise's own constants."""
+def test_a_first_noise_model_separates_noise_and_process():
+    """For PV = known noise + response to OP, the first noise model returns the constants of the noise."""
     rng = np.random.default_rng(4)
     u = rng.normal(size=20_000)
     past = np.concatenate(([0.0], u[:-1]))
@@ -63,8 +63,9 @@ def test_a_first_noise_model_knows_the_process_apart():
     np.testing.assert_allclose(found, [1.1, -0.3, 0.0, 0.0], atol=0.02)
 
 
-def test_one_spike_decides_nothing():
-    """A single huge innovation moves neither the gain in likelihood nor a weighted mean by more than its bound."""
+def test_one_spike_has_a_bounded_weight():
+    """A single very large innovation changes the gain in likelihood and a weighted mean by no more than its
+    bound."""
     rng = np.random.default_rng(5)
     mine = rng.normal(size=5000)
     other = mine.copy()
@@ -76,7 +77,7 @@ def test_one_spike_decides_nothing():
 
 
 def test_gaussian_innovations_count_in_full():
-    """Where innovations are Gaussian, clipping changes the gain of one scale over another by some 1 %."""
+    """For Gaussian innovations, clipping changes the gain in likelihood of one scale over another by about 1 %."""
     rng = np.random.default_rng(6)
     mine = rng.normal(size=100_000)
     exact = (1.2**2 - 1.0) * float(np.sum(mine**2)) / 2

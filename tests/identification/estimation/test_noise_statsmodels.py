@@ -14,7 +14,7 @@ POLES = np.array([1.2, -0.5, 0.1, 0.05])
 
 
 def coloured(seed: int) -> np.ndarray:
-    """An autoregression of the fourth order, shape (4000,)."""
+    """An autoregression of fourth order, shape (4000,)."""
     rng = np.random.default_rng(seed)
     x = np.zeros(N)
     for k in range(ORDER, N):
@@ -24,7 +24,7 @@ def coloured(seed: int) -> np.ndarray:
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_free_model_is_that_of_statsmodels(seed: int) -> None:
-    """Lags of PV and of an input by least squares, as AutoReg with the input's lags: within .002."""
+    """The coefficients of PV agree with AutoReg with the input's lags within 0.002."""
     u = np.random.default_rng(seed + 10).standard_normal(N)
     y = coloured(seed) + np.convolve(u, [0.0, 0.5, 0.3])[:N]
     past = np.column_stack([np.roll(u, i + 1) for i in range(ORDER)])
@@ -35,8 +35,8 @@ def test_the_free_model_is_that_of_statsmodels(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_single_lags_are_an_autoregression_with_white_innovations(seed: int) -> None:
-    """The noise model of single lags is that of AutoReg without a constant, and its innovations pass the test of
-    Ljung and Box, which the coloured series fails."""
+    """The noise model of single lags equals AutoReg without a constant. Its innovations pass the test of Ljung
+    and Box, which the coloured series fails."""
     x, edges = coloured(seed), np.arange(ORDER + 1)
     columns = lag_means(x, edges)
     ar, _ = fitted(columns[:, ORDER:], x[ORDER:])

@@ -24,15 +24,15 @@ from identification.simulation.valve_chain import friction_of, with_friction
 
 GAIN, LAG, DEAD, BAND, N = 1.3, 20.0, 4.0, 2.0, 4000
 FIRST = 420
-"""Samples left out: from then on OP has turned, and where the stem stood first does not matter."""
+"""Number of samples left out. After them OP has reversed, and the first position of the stem has no effect."""
 FORGOTTEN = 40 * int(LAG)
-"""Samples after which nothing of a lag's first value is left in sixteen digits."""
+"""Number of samples after which the first value of a lag has no effect in sixteen digits."""
 
 
-def cycled(seed: int) -> tuple[Floats, Floats]:
-    """PV and OP, each (n,), of a lag behind play under PI control and set point steps, in plain Python.
+def oscillating(seed: int) -> tuple[Floats, Floats]:
+    """PV and OP, each (n,), of a lag with backlash under PI control and set-point steps, in plain Python.
 
-    Noise is of the first order, which both noise models hold: single lags, and means of ever more of them.
+    The noise is of first order. Both noise models contain it: single lags, and means of groups of lags.
     """
     rng = np.random.default_rng(seed)
     stem, x, total, noise = 50.0, 0.0, 50.0, 0.0
@@ -52,8 +52,9 @@ def cycled(seed: int) -> tuple[Floats, Floats]:
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
 def test_both_fits_find_the_same_constants(seed: int) -> None:
-    """From one start, a tenth off, constants agree within their own deviations, and these agree within 30 %."""
-    pv, op = cycled(seed)
+    """From one start that is 10 % off, the constants agree within their deviations, and the deviations agree
+    within 30 %."""
+    pv, op = oscillating(seed)
     good = np.ones(N, dtype=bool)
     window = in_blocks(pv, op, good, 1.0)
     begun = start_at(window, 1.1 * GAIN, (0.9 * LAG, DEAD), StemLaw(BAND / 2, BAND / 2, 0.0), generic_noise())
@@ -62,18 +63,20 @@ def test_both_fits_find_the_same_constants(seed: int) -> None:
 
     any_fit = descend_any(window, Model((EFFECTS["backlash"].variants[0],), begun.model.c), 40)
     found = any_fit.model.c
-    told = {param.slot: d for param, d in zip(any_fit.model.params, deviations(window, any_fit), strict=True)}
+    deviation = {
+        param.slot: d for param, d in zip(any_fit.model.params, deviations(window, any_fit), strict=True)
+    }
 
     pairs = (
-        (math.log(one.time_constant_s), math.log(found[Slot.T]), spread[0], told[Slot.T]),
-        (one.dead_time_s, found[Slot.L], spread[1], told[Slot.L]),
+        (math.log(one.time_constant_s), math.log(found[Slot.T]), spread[0], deviation[Slot.T]),
+        (one.dead_time_s, found[Slot.L], spread[1], deviation[Slot.L]),
         (
             math.log(one.valve.stickband),
             math.log(found[Slot.STICKBAND]),
             spread[2] / one.valve.stickband,
-            told[Slot.STICKBAND],
+            deviation[Slot.STICKBAND],
         ),
-        (one.gain, found[Slot.K], spread[3], told[Slot.K]),
+        (one.gain, found[Slot.K], spread[3], deviation[Slot.K]),
     )
     for mine, yours, my_spread, your_spread in pairs:
         assert abs(mine - yours) < min(my_spread, your_spread)
@@ -82,22 +85,23 @@ def test_both_fits_find_the_same_constants(seed: int) -> None:
 
 @pytest.mark.parametrize("law", [IDEAL, sticking(BAND, 0.0), sticking(BAND, 0.6), sticking(BAND, 0.6, HALTS)])
 @pytest.mark.parametrize("dead_s", [0.0, 4.0, 4.3])
-def test_the_kernel_leaves_what_the_simulator_leaves(law: StemLaw, dead_s: float) -> None:
-    """The residual of a lag behind a valve is PV less the whole simulator's response, but for a constant, once what
-    PV was at first is forgotten."""
-    pv, op = cycled(6)
+def test_the_kernel_has_the_residual_of_the_simulator(law: StemLaw, dead_s: float) -> None:
+    """The residual of a lag with a valve is PV minus the response of the simulator, except for a constant,
+    after the first value of PV has no effect."""
+    pv, op = oscillating(6)
     window = in_blocks(pv, op, np.ones(N, dtype=bool), 1.0)
     fit = start_at(window, GAIN, (LAG, dead_s), law, generic_noise())
     inputs = ModelInputs(op, 1.0, float(op.mean()), 0.0, (0.0, 100.0))
     c = as_parameters(fit.process, law.valve)
     if law.breakaway > 0.0:
         c[Slot.PLACE] = (first_slip(op, law) - op[0]) / law.breakaway
-    left = residual(fit) - (pv - simulate(inputs, c))
-    assert float(np.ptp(left[FORGOTTEN:])) < 1e-9
+    difference = residual(fit) - (pv - simulate(inputs, c))
+    assert float(np.ptp(difference[FORGOTTEN:])) < 1e-9
 
 
-def test_where_a_stem_stood_first_is_not_carried_to_another_recording() -> None:
-    """A saved model leaves out where the stem and PV stood first: both belong to the recording that was fitted."""
+def test_first_positions_are_not_saved_with_the_model() -> None:
+    """A saved model leaves out the first positions of the stem and of PV, because both belong to the fitted
+    recording."""
     op = np.linspace(40.0, 60.0, 50)
     c = neutral()
     c[Slot.K], c[Slot.STICKBAND], c[Slot.PLACE], c[Slot.START] = 1.2, 2.0, -1.0, 3.0
@@ -108,8 +112,8 @@ def test_where_a_stem_stood_first_is_not_carried_to_another_recording() -> None:
 
 
 def test_a_constant_has_a_smaller_deviation_where_another_is_held() -> None:
-    """With the time constant held its deviation is zero and that of the gain is smaller: the two go together."""
-    pv, op = cycled(7)
+    """With a fixed time constant, its deviation is zero and the deviation of the correlated gain is smaller."""
+    pv, op = oscillating(7)
     p = in_blocks(pv, op, np.ones(N, dtype=bool), 1.0)
     fit = descend_any(
         p, Model((), as_parameters(start_at(p, GAIN, (LAG, DEAD), IDEAL, generic_noise()).process)), 20
@@ -125,5 +129,6 @@ def test_a_constant_has_a_smaller_deviation_where_another_is_held() -> None:
     [IDEAL, sticking(2.0, 0.0), sticking(2.0, 1.0, HALTS), sticking(3.0, 0.4, 0.0), sticking(3.0, 0.4, 0.3)],
 )
 def test_a_model_keeps_a_valve(law: StemLaw) -> None:
-    """A valve written into a model's constants is read from them, with the reversal that a sliding stem ignores."""
+    """A valve that is written into a model's constants is read back unchanged, including the reversal that a
+    sliding stem ignores."""
     assert friction_of(with_friction(neutral(), law)) == pytest.approx(law)

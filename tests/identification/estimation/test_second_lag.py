@@ -1,4 +1,4 @@
-"""A second lag of the process is no backlash, and backlash is no second lag."""
+"""A second lag of the process is not reported as backlash, and backlash is not reported as a second lag."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ N, LAG_S, SECOND_S, DEAD = 20_000, 120.0, 6.0, 4
 
 
 def behind(op: np.ndarray, second_s: float) -> np.ndarray:
-    """PV [%], shape (N,), of two lags and a dead time behind OP, with noise."""
+    """PV [%], shape (N,), of two lags and a dead time as a response to OP, with noise."""
     out = np.concatenate((np.zeros(DEAD), op[:-DEAD]))
     for lag_s in (LAG_S, second_s):
         kept = math.exp(-1.0 / lag_s) if lag_s else 0.0
@@ -35,13 +35,14 @@ def behind(op: np.ndarray, second_s: float) -> np.ndarray:
     return 1.5 * out + 0.005 * np.random.default_rng(2).standard_normal(N)
 
 
-def gains(second_s: float, play: float = 0.0) -> tuple[float, float]:
-    """What a second lag and backlash explain [nat] of a PV driven by a random OP, whose stem has some backlash."""
+def gains(second_s: float, width: float = 0.0) -> tuple[float, float]:
+    """Evidence [nat] for a second lag and for backlash, from a PV under a random OP whose stem has some
+    backlash."""
     op = np.cumsum(0.2 * np.random.default_rng(1).standard_normal(N))
     op -= np.linspace(op[0], op[-1], N)
     stem, moved = op.copy(), op[0]
     for k in range(N):
-        moved = min(max(moved, op[k] - 0.5 * play), op[k] + 0.5 * play)
+        moved = min(max(moved, op[k] - 0.5 * width), op[k] + 0.5 * width)
         stem[k] = moved
     block = 10
     y = behind(stem, second_s).reshape(-1, block).mean(axis=1)
@@ -51,7 +52,8 @@ def gains(second_s: float, play: float = 0.0) -> tuple[float, float]:
 
 
 def test_a_second_lag_explains_more_than_backlash_where_there_is_one() -> None:
-    """A second lag of .6 of a block is found as such, and backlash explains less; of a single lag both are silent."""
+    """A second lag of 0.6 of a block is found and explains more than backlash. With a single lag neither has
+    evidence."""
     lag, backlash = gains(SECOND_S)
     assert lag > 50.0
     assert lag > backlash
@@ -59,16 +61,16 @@ def test_a_second_lag_explains_more_than_backlash_where_there_is_one() -> None:
 
 
 def test_backlash_explains_more_than_a_second_lag_where_there_is_some() -> None:
-    """Behind a stem with backlash a second lag explains less than a third of what backlash does."""
-    lag, backlash = gains(0.0, play=2.0)
+    """With backlash, a second lag explains less than a third of what backlash explains."""
+    lag, backlash = gains(0.0, width=2.0)
     assert backlash > 100.0
     assert lag < backlash / 3.0
 
 
 @pytest.mark.parametrize("seed", [661, 662])
-def test_no_sound_valve_is_blamed_under_a_master(seed: int) -> None:
-    """The set point of a master moves OP at each scan; backlash takes that out of OP as a second lag does. Of four
-    loops without a fault none has a worn valve."""
+def test_no_fault_free_valve_is_blamed_under_a_master(seed: int) -> None:
+    """None of four fault-free loops under a master is reported with backlash. The master's set point moves OP
+    at each scan, and backlash removes these moves as a second lag does."""
     config = Config()
     for d in drawn(seed, 4, ("healthy",)):
         spec = spec_of(d)

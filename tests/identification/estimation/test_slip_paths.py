@@ -1,4 +1,5 @@
-"""Stems told slip by slip: the beam against every path there is, friction that scatters, and play, which has none."""
+"""Stems reconstructed slip by slip: the beam search against all paths, friction that scatters, and backlash,
+which has no slips."""
 
 from __future__ import annotations
 
@@ -31,14 +32,14 @@ BREAKAWAY, SLIDING, NOISE = 1.0, 0.2, 0.02
 
 
 def chance_of(op: Floats, slips: tuple[int, ...], start: float) -> tuple[float, Floats]:
-    """Log probability of slips at some samples, and the stem, written out by the normal distribution of scipy."""
+    """Log probability of slips at some samples, and the stem, computed with the normal distribution of scipy."""
     scatter = SCATTER * BREAKAWAY
     stem, out, farthest, total = start, np.empty(op.size), {True: 0.0, False: 0.0}, 0.0
     for k, u in enumerate(op):
         up, far = u > stem, abs(u - stem)
         if k > 0 and far > BREAKAWAY * (1 - 3.5 * SCATTER) and far > farthest[up]:
-            borne = norm.sf(farthest[up], BREAKAWAY, scatter)
-            stays = norm.sf(far, BREAKAWAY, scatter) / borne
+            survived = norm.sf(farthest[up], BREAKAWAY, scatter)
+            stays = norm.sf(far, BREAKAWAY, scatter) / survived
             if k in slips:
                 total += math.log(max(1.0 - stays, 1e-300))
                 stem, farthest = u - math.copysign(SLIDING, u - stem), {True: 0.0, False: 0.0}
@@ -60,8 +61,9 @@ def responded(stem: Floats) -> Floats:
     return pv
 
 
-def test_the_path_is_the_best_of_all_there_are():
-    """On a short record the path told is the most probable of all with up to four slips, its probability too."""
+def test_the_path_is_the_most_probable_of_all():
+    """On a short record the reconstructed path is the most probable of all paths with up to four slips, and so
+    is its score."""
     rng = np.random.default_rng(3)
     op = 1.25 * np.sin(np.arange(26) * 0.5)
     start = op[0] - BREAKAWAY
@@ -83,13 +85,14 @@ def test_the_path_is_the_best_of_all_there_are():
     counts = np.arange(op.size) > 0
     noise = Noise(np.zeros(1), NOISE**2)
     found, score = decoded(op, pv, counts, r, noise, SlipDistances(BREAKAWAY, SLIDING, 1000), 200)
-    assert score >= best - 1e-6  # it may begin at other places too
+    assert score >= best - 1e-6  # the search also allows other first positions
     np.testing.assert_allclose(np.flatnonzero(np.diff(found)), np.flatnonzero(np.diff(stem)))
     np.testing.assert_allclose(found[5:], stem[5:], atol=1e-12)
 
 
 def test_chance_of_slips_is_that_of_a_normal_threshold():
-    """The chance of letting go between two distances is the normal one, and a path's is the product of its own."""
+    """The probability of a slip between two distances is the normal one, and that of a path is the product of
+    these."""
     at = np.linspace(0.85, 1.2, 8)
     for farthest, far in itertools.pairwise(at):
         wanted = 1.0 - norm.sf(far, 1.0, SCATTER) / norm.sf(farthest, 1.0, SCATTER)
@@ -105,8 +108,8 @@ def test_chance_of_slips_is_that_of_a_normal_threshold():
     assert log_chance(op, path, BREAKAWAY) == pytest.approx(total, abs=1e-6)
 
 
-def test_a_stem_does_not_park():
-    """A stem that rests longer than it may costs as much each time, so one that moves is told instead."""
+def test_a_stem_that_rests_too_long_is_penalised():
+    """A stem that rests longer than allowed has a fixed penalty each time, so a path that moves is preferred."""
     op = 1.05 * np.sin(np.arange(200) * 0.1)
     r = Response(Lag(POLE, 1 - POLE, 0.0, DELAY), GAIN, np.zeros(op.size))
     every, noise = np.ones(op.size, dtype=bool), Noise(np.zeros(1), 1.0)
@@ -116,10 +119,10 @@ def test_a_stem_does_not_park():
     assert free - held < 6 * STUCK
 
 
-def cycled(scatter: float, seed: int, n: int = 4000) -> tuple[Floats, Floats]:
-    """PV and OP, each (n,), of a vessel that integrates behind a stem that lets go at 1.5 %, give or take a share.
+def oscillating(scatter: float, seed: int, n: int = 4000) -> tuple[Floats, Floats]:
+    """PV and OP, each (n,), of an integrating vessel with a stem that slips at 1.5 %, with a relative scatter.
 
-    Play where the share is 0. Stepped in plain Python; no line of the simulator is in it.
+    Backlash where the scatter is 0. In plain Python, without code of the simulator.
     """
     rng = np.random.default_rng(seed)
     slope, dead, kp, ti = 0.1, 3, 0.8, 40.0
@@ -140,23 +143,23 @@ def cycled(scatter: float, seed: int, n: int = 4000) -> tuple[Floats, Floats]:
     return np.round(pv_out, 2), np.round(op_out, 2)
 
 
-def asked(scatter: float, seed: int):
-    """Problem, play and path of such a loop, its first quarter left out."""
-    pv, op = (x[1000:] for x in cycled(scatter, seed))
+def fitted(scatter: float, seed: int):
+    """The fits of backlash and of a slip path for such a loop, without its first quarter."""
+    pv, op = (x[1000:] for x in oscillating(scatter, seed))
     window = in_blocks(pv, np.ascontiguousarray(op), np.ones(pv.size, dtype=bool), 1.0)
     crossings = int((np.diff(np.sign(op - op.mean())) != 0).sum())
     period = 2.0 * op.size / max(crossings, 1)
     period = max(period, 40.0)
-    play = fit_play(fit_linear(window, period), period)
-    return play, fit_irregular(play, generic_noise(), period)
+    backlash = fit_play(fit_linear(window, period), period)
+    return backlash, fit_irregular(backlash, generic_noise(), period)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_friction_that_scatters_is_told(seed):
-    """Slips at distances that scatter by 5 % give stickband within a tenth, jump within a third, the process too."""
-    play, path = asked(0.05, seed)
+def test_friction_that_scatters_is_recovered(seed):
+    """Slips that scatter by 5 % give the stickband within 10 % and the jump within 35 %, and also the process."""
+    backlash, path = fitted(0.05, seed)
     assert path is not None
-    assert path.worth > play.log_likelihood + 20.0
+    assert path.worth > backlash.log_likelihood + 20.0
     assert path.fit.valve.stickband == pytest.approx(2.2, rel=0.1)
     assert path.fit.valve.slip_jump == pytest.approx(0.8, rel=0.35)
     assert path.fit.dead_time_s == pytest.approx(3.0, abs=1.0)
@@ -164,16 +167,16 @@ def test_friction_that_scatters_is_told(seed):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_play_has_no_slips(seed):
-    """A play, which never jumps, is not told as friction whose slips scatter."""
-    _, path = asked(0.0, seed)
+def test_backlash_has_no_slips(seed):
+    """Backlash, which never jumps, is not reported as friction with scattering slips."""
+    _, path = fitted(0.0, seed)
     assert path is None
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_a_square_pv_of_a_fast_flow_is_no_play(seed):
-    """A flow far faster than its sticking valve's cycle, logged every 10 s, is told as friction within 15 %, whatever
-    gain a play needs to answer so square a PV."""
+def test_a_square_pv_of_a_fast_flow_is_not_backlash(seed):
+    """The friction of a valve in a fast flow loop, logged every 10 s, is recovered within 15 %. A backlash
+    model needs three times the true gain for this PV."""
     rng = np.random.default_rng(seed)
     kp, ti, x, total, stem, load = 0.3, 50.0, 53.0, 50.0, 50.0, 0.0
     pipe, pv_out, op_out = [50.0] * 4, [], []
@@ -191,18 +194,18 @@ def test_a_square_pv_of_a_fast_flow_is_no_play(seed):
         x += (1.0 - math.exp(-1.0 / 12.0)) * (50.0 + 1.1 * (pipe.pop(0) + load - 50.0) - x)
     pv, op = np.array(pv_out[100:]), np.array(op_out[100:])
     window = in_blocks(pv, op, np.ones(pv.size, dtype=bool), 10.0)
-    play = fit_play(fit_linear(window, 300.0), 300.0)
-    assert play.gain > 3.0 * 1.1
-    path = fit_irregular(play, generic_noise(), 300.0)
+    backlash = fit_play(fit_linear(window, 300.0), 300.0)
+    assert backlash.gain > 3.0 * 1.1
+    path = fit_irregular(backlash, generic_noise(), 300.0)
     assert path is not None
-    assert path.worth > play.log_likelihood + 1000.0
+    assert path.worth > backlash.log_likelihood + 1000.0
     assert path.fit.gain == pytest.approx(1.1, rel=0.25)
     assert path.fit.valve.stickband == pytest.approx(6.0, rel=0.15)
 
 
 def test_a_jump_of_nearly_the_stickband_is_recovered():
-    """A stem that jumps by .9 of its stickband has it within 5 % and the gain within a fifth, though a play in its
-    place is two fifths wider and has a gain half as high again."""
+    """A stem that jumps by 0.9 of its stickband has its stickband recovered within 5 % and its gain within 20
+    %. A backlash model is 40 % wider and has a gain 50 % higher."""
     rng = np.random.default_rng(4)
     static, kinetic, kp, ti, n = 5.16, 0.27, 2.6, 10.0, 7200
     stem, x, total, load, pipe, pv, op = 50.0, 2.0, 50.0, 0.0, [50.0] * 4, np.empty(n), np.empty(n)
@@ -215,11 +218,11 @@ def test_a_jump_of_nearly_the_stickband_is_recovered():
             stem = op[k] - math.copysign(kinetic, op[k] - stem)
         pipe.append(stem)
         x += (1.0 - math.exp(-1.0 / 57.0)) * (1.4 * (pipe.pop(0) + load - 50.0) - x)
-    pv, op = pv[1800:], np.ascontiguousarray(op[1800:])  # the cycle has built up
+    pv, op = pv[1800:], np.ascontiguousarray(op[1800:])  # the oscillation has reached its full amplitude
     window = in_blocks(pv, op, np.ones(pv.size, dtype=bool), 1.0)
-    play = fit_play(fit_linear(window, 92.0), 92.0)
-    assert play.valve.stickband > 1.4 * (static + kinetic)
-    assert play.gain > 1.5 * 1.4
-    found = fit_stick_slip(play, 92.0)
+    backlash = fit_play(fit_linear(window, 92.0), 92.0)
+    assert backlash.valve.stickband > 1.4 * (static + kinetic)
+    assert backlash.gain > 1.5 * 1.4
+    found = fit_stick_slip(backlash, 92.0)
     assert found.valve.stickband == pytest.approx(static + kinetic, rel=0.05)
     assert found.gain == pytest.approx(1.4, rel=0.2)

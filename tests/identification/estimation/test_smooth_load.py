@@ -1,4 +1,4 @@
-"""What resonates, the loop or its load: on loops of benchmarks/world, whose simulator shares no code with the
+"""Whether the loop or its load resonates, on loops of benchmarks/world. Their simulator shares no code with the
 packages."""
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ def _law(d: Drawn, period_s: float) -> tuple[Pid, complex]:
 
 
 def test_a_tight_loop_is_identified_without_set_point_moves():
-    """Under a smooth load slope and dead time of a ringing loop are recovered within 15 %, and Ms says that it
-    rings."""
+    """Under a smooth load, slope and dead time of a ringing loop are recovered within 15 %, and its Ms is above
+    3."""
     true_ms, period = sensitivity(TIGHT.process, TIGHT.controller)
     window, (pid, law) = _window(TIGHT), _law(TIGHT, period)
     found = fit_smooth(window, period, resonant_starts(window, period, law))
@@ -51,8 +51,8 @@ def test_a_tight_loop_is_identified_without_set_point_moves():
 
 
 def test_a_sine_is_a_line_of_the_load():
-    """Of a well tuned loop under a sine the line of the load explains far more than a smooth load, and keeps
-    its phase."""
+    """In a well tuned loop under a sine, a spectral line of the load explains far more than a smooth load, and
+    keeps its phase."""
     window, (pid, law) = _window(CALM), _law(CALM, 240.0)
     smooth = fit_smooth(window, 240.0, resonant_starts(window, 240.0, law))
     lined = fit_line(window, 240.0, [smooth], [(72.0, 12.0), (480.0, 12.0)])
@@ -64,26 +64,27 @@ def test_a_sine_is_a_line_of_the_load():
 
 
 def test_another_unit_of_pv_scales_the_gain_alone():
-    """PV in another unit scales gain and innovations, and leaves time constant, dead time and load as they are."""
+    """PV in another unit scales gain and innovations, and does not change time constant, dead time and load."""
     one, other = (fit_smooth(_window(TIGHT, s), 100.0, [((100.0, 16.0), None)]) for s in (1.0, 3.0))
     assert other.process.gain == pytest.approx(3.0 * one.process.gain, rel=1e-6)
     assert other.sigma2 == pytest.approx(9.0 * one.sigma2, rel=1e-6)
     assert np.allclose(other.theta, one.theta, rtol=1e-6)
 
 
-def test_holes_are_bridged():
-    """A twentieth of the blocks missing moves slope and dead time by less than a tenth."""
+def test_missing_blocks_hardly_change_the_process():
+    """Missing blocks, one in twenty, change slope and dead time by less than 10 %."""
     whole = _window(TIGHT)
-    holes = np.random.default_rng(3).random(whole.usable.size) < 0.05
-    y = np.interp(np.arange(holes.size), np.flatnonzero(~holes), whole.pv[~holes])
-    thin = in_blocks(y, whole.blocks.op, ~holes, whole.dt_s, whole.blocks.factor)
+    missing = np.random.default_rng(3).random(whole.usable.size) < 0.05
+    y = np.interp(np.arange(missing.size), np.flatnonzero(~missing), whole.pv[~missing])
+    thin = in_blocks(y, whole.blocks.op, ~missing, whole.dt_s, whole.blocks.factor)
     one, other = (fit_smooth(w, 100.0, [((100.0, 16.0), None)]) for w in (whole, thin))
     assert other.process.slope == pytest.approx(one.process.slope, rel=0.1)
     assert other.process.dead_time_s == pytest.approx(one.process.dead_time_s, rel=0.1)
 
 
 def test_the_load_as_an_autoregression_leaves_the_same_innovations():
-    """As a fit of the night, whose noise model has eight lags, it leaves innovations within 5 % of its own."""
+    """A fit of the night with eight lags of the noise model has innovations within 5 % of those of the smooth
+    load."""
     from identification.estimation.gauss_newton import innovations
 
     window = _window(TIGHT)

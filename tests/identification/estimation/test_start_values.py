@@ -1,4 +1,4 @@
-"""The plain process found from routine closed-loop data."""
+"""The baseline process found from routine closed-loop data."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ N = 5000
 
 
 def recorded(seed: int) -> LoopRecord:
-    """A closed loop (gain 1.2, time constant 20 s, dead time 3.4 s) under setpoint steps, load and noise."""
+    """A closed loop (gain 1.2, time constant 20 s, dead time 3.4 s) under set-point steps, load and noise."""
     rng = np.random.default_rng(seed)
     sp = 50 + np.repeat(rng.uniform(-7, 7, N // 150 + 1), 150)[:N]
     slow = np.zeros(N)
@@ -30,8 +30,8 @@ def recorded(seed: int) -> LoopRecord:
     return closed_loop(Loop(Fopdt(1.2, 20.0, 3.4), Pid(1.8, 20.0)), sp, slow + rng.normal(0, 0.08, N))
 
 
-def test_starts_hold_one_near_the_truth() -> None:
-    """Of the two starts one has the gain within a third and the lag plus dead time within a third."""
+def test_one_start_is_near_the_true_process() -> None:
+    """At least one start has the gain, and the lag plus dead time, within a third of the true values."""
     s = recorded(11)
     found = plain_processes(in_blocks(s.pv, s.op, ~s.bad, s.dt_s))
     assert any(
@@ -40,8 +40,8 @@ def test_starts_hold_one_near_the_truth() -> None:
     )
 
 
-def test_plain_loop_is_found_in_closed_loop() -> None:
-    """Gain within 5 %, time constant within 5 % and dead time within a tenth of a sample, load and noise on."""
+def test_baseline_model_is_found_in_closed_loop() -> None:
+    """Gain and time constant are recovered within 5 % and dead time within 0.1 samples, with load and noise."""
     s = recorded(12)
     inputs = ModelInputs(
         s.op, 1.0, float(s.op.mean()), float(s.pv.mean()), (float(s.pv.min()), float(s.pv.max()))

@@ -1,4 +1,4 @@
-"""The profile of widths peaks at the true play, and speaks for none where there is none."""
+"""The profile of widths has its peak at the true backlash, and has no peak where there is no backlash."""
 
 from __future__ import annotations
 
@@ -19,15 +19,16 @@ MOVED = Sketch("load", (1.4, 90.0, 10.0), 0.8, 120.0, sine=2.0, sine_s=840.0)
 
 
 def measured(sketch: Sketch, seed: int, hours: float = 6.0) -> Measured:
-    """What a night measures of a simulated loop."""
+    """The measurements of a night from a simulated loop."""
     record = prepared(simulate(sketch, hours, seed)).record
     found = detect(record, CONFIG.oscillation)
     return measure(record, counting(found), sketch.controller, CONFIG.cause, found.spectrum)
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_it_peaks_at_the_play_that_is_there(seed: int) -> None:
-    """A level with a play of .62 % has its peak there, as high as the search's own evidence, and falls off above."""
+def test_it_peaks_at_the_true_backlash(seed: int) -> None:
+    """A level with a backlash of 0.62 % has its peak there, as high as the evidence of the search within 25 %.
+    The profile falls above."""
     m = measured(LEVEL, seed)
     found = width_profile(m.linear, m.play)
     assert WIDTHS[int(found.argmax())] == pytest.approx(0.62, rel=0.05)
@@ -35,26 +36,28 @@ def test_it_peaks_at_the_play_that_is_there(seed: int) -> None:
     assert found[WIDTHS > 1.1].max() < 0.0
 
 
-@pytest.mark.parametrize("play", [0.66, 0.70, 0.74])
-def test_a_play_between_two_widths_counts_for_both(play: float) -> None:
-    """A play between two widths has its whole evidence at both, so that two nights of one valve agree on one."""
-    m = measured(replace(LEVEL, backlash=play), 3)
+@pytest.mark.parametrize("width", [0.66, 0.70, 0.74])
+def test_backlash_between_two_widths_counts_for_both(width: float) -> None:
+    """Backlash between two widths has its full evidence at both, so that two nights of one valve agree on one
+    width."""
+    m = measured(replace(LEVEL, backlash=width), 3)
     found = width_profile(m.linear, m.play)
-    assert m.play.valve.stickband == pytest.approx(play, rel=0.05)
-    assert found[(play / 1.26 < WIDTHS) & (play * 1.26 > WIDTHS)].min() >= found.max() - 1.0
+    assert m.play.valve.stickband == pytest.approx(width, rel=0.05)
+    assert found[(width / 1.26 < WIDTHS) & (width * 1.26 > WIDTHS)].min() >= found.max() - 1.0
 
 
-def test_it_speaks_for_no_play_of_a_sound_valve() -> None:
-    """Noise, drift and a sinusoidal load bring no width of sixteen records more than chance brings one needless
-    constant of so many, one time in twenty (Wilks 1938, Bonferroni 1936)."""
+def test_it_has_no_evidence_of_backlash_for_an_ideal_valve() -> None:
+    """Under noise, drift and a sinusoidal load, no width of sixteen records has more evidence than one needless
+    constant. The limit is the likelihood ratio at 5 %, corrected for all widths and records (Wilks 1938,
+    Bonferroni 1936)."""
     found = [measured(sketch, seed) for sketch in (QUIET, MOVED) for seed in range(1, 9)]
     most = [width_profile(m.linear, m.play).max() for m in found]
     assert max(most) < 0.5 * chi2.isf(0.05 / (len(found) * WIDTHS.size), 1)
 
 
-def test_widths_that_cannot_show_are_not_told_apart_from_none() -> None:
-    """Plays far narrower than OP's moves leave PV as it is; those of half its range and more would show, and none
-    wider than it differs from the next."""
+def test_widths_that_are_too_small_are_not_distinguished_from_none() -> None:
+    """Backlash far narrower than OP's moves has no evidence for or against it. Widths of more than half of OP's
+    range are excluded, and widths above this range do not differ."""
     m = measured(MOVED, 1)
     found = width_profile(m.linear, m.play)
     assert found[0] == 0.0

@@ -12,7 +12,7 @@ from identification.mismatch.explanation import Explanation, carried_over
 from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.recording import Recording
 from identification.simulation.parameters import Slot
-from tests.identification.scenes import noise, recording
+from tests.identification.recordings import noise, recording
 
 
 def plainly(s: Recording) -> Explanation:

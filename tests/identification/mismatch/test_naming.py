@@ -13,7 +13,7 @@ from identification.mismatch.diagnosis import explain
 from identification.mismatch.recording import Recording
 from identification.models import Integrator, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
-from tests.identification.scenes import PLAY, STICKING, N, noise, recording, setpoints
+from tests.identification.recordings import BACKLASH, STICKING, N, noise, recording, setpoints
 
 pytestmark = pytest.mark.slow
 
@@ -38,7 +38,7 @@ def test_one_outlier_and_a_gap_are_none() -> None:
 
 def test_play_is_named_with_its_width() -> None:
     """Play of 2 % is named and its interval lies within 0.2 % of the truth."""
-    s = recording(5, PLAY)
+    s = recording(5, BACKLASH)
     said = answer(explain(s), s)
     assert said.verdict == "backlash"
     assert said.effects[0].parameters["backlash_pct"].value == pytest.approx(2.0, abs=0.2)
@@ -64,7 +64,7 @@ def test_load_step_is_named_where_it_is() -> None:
 
 def test_compressed_trends_end_at_the_recorder() -> None:
     """Straight segments off any grid are the finding; nothing of the valve is said."""
-    s = recording(8, PLAY)
+    s = recording(8, BACKLASH)
     kept = np.arange(0, N, 9)
     pv = np.interp(np.arange(N), kept, s.pv[kept] + 1e-3 * np.random.default_rng(0).normal(size=kept.size))
     s = replace(s, pv=pv)
@@ -117,7 +117,7 @@ def test_samples_held_over_a_hole_are_not_taken_for_a_load() -> None:
 
 def test_wrong_settings_do_not_hide_the_play() -> None:
     """Of wrongly stated settings and a play in the valve the settings are the verdict, and both are told."""
-    s = recording(12, PLAY)
+    s = recording(12, BACKLASH)
     s = replace(s, stated=StatedSettings(3.0, 20.0))
     said = answer(explain(s), s)
     assert said.verdict == "controller-settings"
@@ -126,7 +126,7 @@ def test_wrong_settings_do_not_hide_the_play() -> None:
 
 def test_samples_missing_all_over_leave_a_verdict() -> None:
     """Play of 2 % is named with its width where one sample in twelve is missing, as from a poll that fails."""
-    s = recording(5, PLAY)
+    s = recording(5, BACKLASH)
     lost = np.random.default_rng(0).random(s.pv.size) < 1 / 12
     held = np.maximum.accumulate(np.where(lost, 0, np.arange(s.pv.size)))
     s = replace(s, pv=s.pv[held], usable=~lost)

@@ -16,7 +16,7 @@ from identification.signals.filters import without_lines
 from identification.simulation.open_loop import as_parameters
 from identification.simulation.parameters import Slot
 from proofs.plain_loop import KINDS, of_recording, of_simulated
-from tests.identification.scenes import recording
+from tests.identification.recordings import recording
 
 FIELD = Path(__file__).parents[4] / "shared" / "recordings" / "field"
 

@@ -8,7 +8,7 @@ import pytest
 from identification.controller.check import Finding
 from identification.mismatch.catalogue import fault
 from identification.mismatch.recording import Recording, least_jump, unlogged
-from tests.identification.scenes import recording
+from tests.identification.recordings import recording
 
 PV = recording(1).pv
 TICKS = np.arange(PV.size, dtype=float)

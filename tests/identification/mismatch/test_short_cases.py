@@ -14,7 +14,7 @@ from identification.mismatch.recording import Recording
 from identification.mismatch.selection import longest_first
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
-from tests.identification.hand_made import Plant, recording
+from tests.identification.plain_loop import Plant, recording
 
 
 def said(s: Recording) -> Answer:
@@ -35,7 +35,7 @@ def test_sound_loop_is_none() -> None:
 
 def test_play_is_named_with_its_width() -> None:
     """Play of 2 % is backlash, its width within a tenth, and the dead time comes back to the true one."""
-    found = said(recording(Plant(play=2.0), 2))
+    found = said(recording(Plant(backlash=2.0), 2))
     assert found.verdict == "backlash"
     assert value(found, "backlash_pct") == pytest.approx(2.0, rel=0.1)
     assert found.moved["dead_time_s"][1] == pytest.approx(3.4, abs=0.4)
@@ -78,14 +78,14 @@ def test_coarse_sensor_is_the_recorders() -> None:
 
 def test_wrong_settings_are_the_controllers() -> None:
     """Where another Kp is stated than runs, the controller is named with the one that runs."""
-    found = said(recording(Plant(), 6, told=1.5))
+    found = said(recording(Plant(), 6, kp_factor=1.5))
     assert (found.verdict, found.block) == ("controller-settings", "controller")
     assert value(found, "kp") == pytest.approx(1.6, rel=0.03)
 
 
 def test_saved_model_carries_to_another_recording() -> None:
     """A model with play, saved and run over another recording, leaves half of what the plain model leaves."""
-    s, later = recording(Plant(play=3.0), 7), recording(Plant(play=3.0), 8)
+    s, later = recording(Plant(backlash=3.0), 7), recording(Plant(backlash=3.0), 8)
     found = explain(s)
     left = []
     for fit in (found.plain, found.best):
@@ -96,7 +96,7 @@ def test_saved_model_carries_to_another_recording() -> None:
 
 def test_names_do_not_hang_on_units() -> None:
     """The same loop recorded at half the span, twice the percent, has the same effect with twice the width."""
-    s = recording(Plant(play=2.0), 9)
+    s = recording(Plant(backlash=2.0), 9)
     twice = replace(
         s, pv=50 + 2 * (s.pv - 50), op=50 + 2 * (s.op - 50), sp=None if s.sp is None else 50 + 2 * (s.sp - 50)
     )

@@ -12,7 +12,7 @@ from identification.mismatch.catalogue import CANDIDATES
 from identification.mismatch.explanation import Explanation, is_stack
 from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.selection import Candidate
-from tests.identification.hand_made import Plant, recording
+from tests.identification.plain_loop import Plant, recording
 
 
 @pytest.mark.parametrize(("count", "stacked"), [(1, False), (2, False), (3, True)])

@@ -26,7 +26,7 @@ from identification.models import Fopdt, Stiction
 from identification.record import Floats
 from identification.simulation.open_loop import as_parameters, simulate
 from identification.simulation.parameters import Slot
-from tests.identification.scenes import PLAY, recording
+from tests.identification.recordings import BACKLASH, recording
 
 N, GAIN, LAG, DEAD, STUCK, JUMP = 4000, 1.5, 20, 4, 3.0, 2.0
 
@@ -171,7 +171,7 @@ def test_constant_at_its_far_end_is_no_finding(name: str, slot: Slot, value: flo
 
 def test_play_that_a_valve_in_good_order_has_is_no_finding() -> None:
     """A play of 2 % is named; of the same recording, with an OP and a play a fortieth as large, no valve's fault."""
-    s = recording(11, PLAY)
+    s = recording(11, BACKLASH)
     assert told(s).verdict == "backlash"
     fine = replace(s, op=50.0 + (s.op - 50.0) / 40.0, stated=StatedSettings(1.8 / 40.0, 20.0))
     assert not {e.name for e in told(fine).effects} & {"backlash", "stiction", "positioner"}
@@ -200,13 +200,13 @@ def test_what_is_seen_ahead_has_to_simulate_as_well_as_a_plain_loop(
 
 def test_idle_effect_goes_again() -> None:
     """An effect taken before the one that makes it idle is given up once that one is there; the other stays."""
-    s = recording(9, PLAY)
+    s = recording(9, BACKLASH)
     inputs = inputs_of(s)
     p = problem(inputs, s.pv - inputs.level, s.usable)
     rows = {name: EFFECTS[name].candidates[0] for name in ("backlash", "gain-drift")}
     fit = descended(p, Model((), as_parameters(Fopdt(1.2, 20.0, 3.4))), 20)
     taken = []
-    for name, value in (("gain-drift", 0.01), ("backlash", PLAY.width)):
+    for name, value in (("gain-drift", 0.01), ("backlash", BACKLASH.width)):
         c = fit.model.c.copy()
         c[rows[name].params[0].slot] = value
         fit = descended(p, Model((*fit.model.added, rows[name]), c), 20)

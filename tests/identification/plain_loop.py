@@ -1,6 +1,6 @@
-"""A loop stepped by hand, in plain Python: no line of the simulator, the valve or the estimator is in it.
+"""A loop simulated in plain Python, without code of the simulator, the valve or the estimator.
 
-Euler steps of a fifth of a scan, a list as the pipe, a state machine as the stem. Slow and obvious.
+Euler steps of a fifth of a scan, a list for the dead time, a state machine for the stem. Slow and simple.
 """
 
 from __future__ import annotations
@@ -18,10 +18,11 @@ SUBSTEPS = 5
 
 @dataclass(frozen=True)
 class Plant:
-    """A loop: process, PI controller, and what may be wrong with it.
+    """A loop: process, PI controller, and its possible faults.
 
-    gain [% PV/% OP], lag_s, dead_s, second_lag_s [s]; kp [% OP/% PV], ti_s [s]; play [% OP], full width; stick, jump
-    [% OP]: stickband and slip jump of a stem that rests after each slip; grid [% PV], step of the sensor.
+    gain [% PV/% OP], lag_s, dead_s, second_lag_s [s]; kp [% OP/% PV], ti_s [s]; backlash [% OP], full width;
+    stick, jump [% OP]: stickband and slip jump of a stem that rests after each slip; grid [% PV], step of the
+    sensor.
     """
 
     gain: float = 1.4
@@ -30,23 +31,23 @@ class Plant:
     second_lag_s: float = 0.0
     kp: float = 1.6
     ti_s: float = 20.0
-    play: float = 0.0
+    backlash: float = 0.0
     stick: float = 0.0
     jump: float = 0.0
     grid: float = 0.0
 
 
 class Stem:
-    """Where the stem stands, told OP by OP."""
+    """The position of the stem, updated with each OP."""
 
     def __init__(self, plant: Plant, op: float) -> None:
         self.plant, self.at = plant, op
 
     def moved(self, op: float) -> float:
-        """The stem after OP has gone there."""
+        """The stem position after OP has moved to a new value."""
         p = self.plant
-        if p.play > 0:
-            self.at = min(max(self.at, op - p.play / 2), op + p.play / 2)
+        if p.backlash > 0:
+            self.at = min(max(self.at, op - p.backlash / 2), op + p.backlash / 2)
         elif p.stick > 0:
             gap = op - self.at
             if abs(gap) > (p.stick + p.jump) / 2:
@@ -83,9 +84,10 @@ def ran(plant: Plant, sp: Floats, load: Floats, noise: Floats) -> tuple[Floats, 
 
 
 def recording(
-    plant: Plant, seed: int, n: int = 2400, load: Floats | None = None, told: float = 1.0
+    plant: Plant, seed: int, n: int = 2400, load: Floats | None = None, kp_factor: float = 1.0
 ) -> Recording:
-    """A recording under set point moves, wandering load and noise; the plant states `told` times the true Kp."""
+    """A recording under set-point moves, a slowly varying load and noise. The stated Kp is `kp_factor` times
+    the true one."""
     rng = np.random.default_rng(seed)
     sp = 50.0 + np.cumsum(np.where(np.arange(n) % 150 == 0, rng.choice((-4.0, 4.0), n), 0.0))
     sp = 50.0 + np.clip(sp - 50.0, -12.0, 12.0)
@@ -93,7 +95,7 @@ def recording(
     for k in range(1, n):
         wander[k] = 0.995 * wander[k - 1] + rng.normal(0, 0.03)
     pv, op = ran(plant, sp, wander + (0.0 if load is None else load), rng.normal(0, 0.04, n))
-    stated = StatedSettings(plant.kp * told, plant.ti_s)
+    stated = StatedSettings(plant.kp * kp_factor, plant.ti_s)
     return Recording(
         sp, np.round(pv, 3), np.round(op, 3), np.ones(n, dtype=bool), 1.0, np.arange(n) * 1.0, stated
     )

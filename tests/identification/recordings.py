@@ -13,7 +13,7 @@ N = 5000
 
 
 def setpoints(seed: int, n: int = N, wait: int = 150) -> np.ndarray:
-    """SP that moves to a new place every `wait` samples [% PV], shape (n,)."""
+    """SP that moves to a new value every `wait` samples [% PV], shape (n,)."""
     rng = np.random.default_rng(seed)
     return 50 + np.repeat(rng.uniform(-7, 7, n // wait + 1), wait)[:n]
 
@@ -29,7 +29,8 @@ def noise(seed: int, n: int = N, load: float = 0.3, white: float = 0.08) -> np.n
 
 
 def recording(seed: int, valve: Valve = None, load: np.ndarray | None = None) -> Recording:
-    """A closed loop with gain 1.2, time constant 20 s and dead time 3.4 s, recorded with 0.01 % resolution."""
+    """A closed loop with gain 1.2, time constant 20 s and dead time 3.4 s, recorded with a resolution of 0.01
+    %."""
     law = Pid(1.8, 20.0)
     n = noise(seed)
     loop = Loop(Fopdt(1.2, 20.0, 3.4), law, valve)
@@ -38,4 +39,4 @@ def recording(seed: int, valve: Valve = None, load: np.ndarray | None = None) ->
     return Recording(r.sp, pv, op, np.ones(N, dtype=bool), 1.0, r.time_s, StatedSettings(law.kp, law.ti_s))
 
 
-PLAY, STICKING = Backlash(2.0), Stiction(2.0, 1.2, Motion.SLIDES)
+BACKLASH, STICKING = Backlash(2.0), Stiction(2.0, 1.2, Motion.SLIDES)
