@@ -1,4 +1,4 @@
-"""The numbers of a method, which are constants of the modules that use them: each is read by something."""
+"""Each number of a method, a constant of the module that uses it, is read."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ PACKAGES = ("identification", "tuning", "analyzer", "reports")
 
 
 def stored(tree: ast.Module) -> set[str]:
-    """Names in capitals that a module sets at its top level."""
+    """Names in capital letters that a module sets at its top level."""
     sets = [n.targets for n in tree.body if isinstance(n, ast.Assign)]
     sets += [[n.target] for n in tree.body if isinstance(n, ast.AnnAssign)]
     names = {n.id for targets in sets for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)}
@@ -27,7 +27,7 @@ def loaded(tree: ast.Module) -> Counter[str]:
 
 
 def test_every_constant_of_a_module_is_read():
-    """A constant that no line of the packages reads decides nothing."""
+    """Every constant of a module is read by a line of the packages."""
     trees = {
         f: ast.parse(f.read_text("utf-8")) for part in PACKAGES for f in sorted((ROOT / part).rglob("*.py"))
     }

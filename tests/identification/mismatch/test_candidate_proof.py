@@ -17,9 +17,10 @@ N = 3000
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.01, -0.05])
-def test_a_load_that_came_later_decides_nothing(slope: float) -> None:
-    """A ramp in the held-out part, as an integrator makes of a load's new level, is a constant under a noise model of
-    differences; the gain of the right process over one of half its gain stays, within a hundredth."""
+def test_a_later_load_does_not_change_the_held_out_gain(slope: float) -> None:
+    """A ramp in the held-out part changes the held-out gain of the right process by at most 1 %. The gain is
+    relative to a process with half the process gain. An integrator makes such a ramp from a load step, and the
+    noise model of differences makes the ramp a constant."""
     rng = np.random.default_rng(5)
     op = 50.0 + np.cumsum(rng.choice([-1.0, 0.0, 0.0, 0.0, 1.0], N))
     inputs = ModelInputs(op, 1.0, float(op.mean()), 50.0, (0.0, 100.0))

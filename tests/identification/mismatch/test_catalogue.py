@@ -1,4 +1,5 @@
-"""The catalogue is whole: every effect acts in the simulator, and is said, drawn and told apart."""
+"""The catalogue is complete: every effect acts in the simulator, has a sentence and a picture, and is
+distinguished."""
 
 from __future__ import annotations
 
@@ -15,9 +16,9 @@ from identification.simulation.parameters import Param, Slot, Variant, neutral
 
 N = 1500
 NAMED_IN_CONTRACT, NEVER_FOUND = 30, 1
-"""Names of the contract's catalogue, and those of them that are answered as alternatives alone (sensor-lag)."""
+"""Number of names in the contract, and number of those that are reported only as alternatives (sensor-lag)."""
 FOUND_BY_CHECK = ("clock-offset", "controller-gap", "controller-logic", "controller-settings")
-"""Names of what the controller's check finds."""
+"""Names of the effects that the check of the controller finds."""
 
 
 def inputs() -> ModelInputs:
@@ -29,7 +30,8 @@ def inputs() -> ModelInputs:
 
 
 def started(variant: Variant) -> Floats:
-    """Parameters of a settling loop with a variant at its first start, sizes that start at nothing at a tenth."""
+    """Parameters of a self-regulating loop with a variant at its first start. Sizes that start at zero are a
+    tenth of their limit."""
     c = neutral()
     c[Slot.K], c[Slot.T], c[Slot.L] = 1.2, 20.0, 4.5
     for slot, value in variant.fixed.items():
@@ -40,8 +42,8 @@ def started(variant: Variant) -> Floats:
     return c
 
 
-def other(c: Floats, p: Param) -> Floats:
-    """The same with one parameter moved by a part of itself."""
+def with_one_changed(c: Floats, p: Param) -> Floats:
+    """The same parameters with one changed by 20 %."""
     out = c.copy()
     out[p.slot] *= 0.8
     return out
@@ -49,26 +51,27 @@ def other(c: Floats, p: Param) -> Floats:
 
 @pytest.mark.parametrize("variant", [*CANDIDATES, *RIVALS], ids=lambda v: f"{v.name} {v.label}".strip())
 def test_every_parameter_acts(variant: Variant) -> None:
-    """What an effect frees changes the simulated PV: one that no kernel knows is not skipped in silence."""
+    """Every free parameter of an effect changes the simulated PV. A parameter that no kernel uses is detected."""
     plain = neutral()
     plain[Slot.K], plain[Slot.T], plain[Slot.L] = 1.2, 20.0, 4.5
     c = started(variant)
     here = simulate(inputs(), c)
     assert np.abs(here - simulate(inputs(), plain)).max() > 1e-3
     for p in variant.params:
-        assert np.abs(here - simulate(inputs(), other(c, p))).max() > 1e-6, p.name
+        assert np.abs(here - simulate(inputs(), with_one_changed(c, p))).max() > 1e-6, p.name
 
 
-def test_every_effect_is_either_added_or_found() -> None:
-    """An effect has variants that are fitted, or is found in the trends or by the controller's check; never both."""
+def test_every_effect_is_either_fitted_or_found() -> None:
+    """An effect is either fitted by its variants, or found in the trends or by the check of the controller;
+    never both."""
     for effect in EFFECTS.values():
         found = effect in RECORDER_FAULTS or effect.name in FOUND_BY_CHECK
         assert bool(effect.variants) + found == 1, effect.name
         assert isinstance(effect, Fault) == found, effect.name
 
 
-def test_every_effect_is_said_and_drawn() -> None:
-    """Each has a sentence whose numbers it can give, something to look at, and a picture."""
+def test_every_effect_has_a_sentence_and_a_picture() -> None:
+    """Each effect has a sentence, a check for the user, and a picture."""
     for effect in EFFECTS.values():
         assert effect.sentence
         assert effect.check
@@ -76,11 +79,11 @@ def test_every_effect_is_said_and_drawn() -> None:
         assert drawn is not None, effect.name
 
 
-def test_physics_of_no_name_takes_no_name() -> None:
-    """What is told in words beside `unexplained` is called nothing that could be a verdict."""
+def test_names_outside_the_catalogue_are_no_verdicts() -> None:
+    """Physics outside the catalogue has no name that could be a verdict."""
     assert not set(OUTSIDE) & set(EFFECTS)
 
 
 def test_names_are_those_of_the_contract() -> None:
-    """The catalogue holds as many effects as its contract, and no two files one name."""
+    """The catalogue has as many effects as the contract, and no name has two files."""
     assert len(EFFECTS) == NAMED_IN_CONTRACT - NEVER_FOUND

@@ -1,4 +1,4 @@
-"""A misfit is located where it was put, beside features that go with it, and nowhere on white noise."""
+"""A misfit is located at its true feature, not at correlated features, and nowhere on white noise."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ MEMORY = 25
 
 
 def trends(seed: int, n: int = N) -> tuple[np.ndarray, np.ndarray]:
-    """OP that wanders about 50 %, and PV that follows it with a lag and noise of its own."""
+    """OP that varies slowly about 50 %, and PV that follows it with a lag and its own noise."""
     rng = np.random.default_rng(seed)
     op = 50 + lfilter([1.0], [1.0, -0.99], rng.normal(0, 1, n))
     return 1.2 * lfilter([0.05], [1.0, -0.95], op) + rng.normal(0, 0.5, n), op
 
 
 def at(e: np.ndarray, pv: np.ndarray, op: np.ndarray) -> Located:
-    """Located with no dead time."""
+    """The location without a dead time."""
     return located(e, pv, op, np.ones(e.size, dtype=bool), 1.0, 0, MEMORY)
 
 
 def names(found: Located) -> list[str]:
-    """Names of what carries the misfit."""
+    """Names of the features that carry the misfit."""
     return [f.name for f in found.carrying]
 
 
 def test_white_noise_is_located_nowhere() -> None:
-    """Of 100 draws of white noise on a wandering loop at least 95 are tied to no feature."""
+    """At most 5 of 100 draws of white noise are located at a feature."""
     pv, op = trends(1, 1500)
     assert (
         sum(bool(at(np.random.default_rng(s).normal(0, 1, 1500), pv, op).carrying) for s in range(100)) <= 5
@@ -48,7 +48,7 @@ def test_white_noise_is_located_nowhere() -> None:
 
 
 def fed_back(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """White innovations, and PV and OP of a PI loop that they drive beside set-point steps."""
+    """White innovations, and PV and OP of a PI loop that they drive in addition to set-point steps."""
     rng = np.random.default_rng(seed)
     e, sp = rng.normal(0, 1, N), np.repeat(rng.normal(0, 5, N // 160), 160)
     pv, op = np.zeros(N), np.zeros(N)
@@ -63,12 +63,13 @@ def fed_back(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def test_innovations_of_a_closed_loop_are_located_nowhere() -> None:
-    """Under feedback, where every OP answers the noise before it, at most 3 of 40 loops are tied to a feature."""
+    """Under feedback, where OP responds to earlier noise, the innovations of at most 3 of 40 loops are located
+    at a feature."""
     assert sum(bool(at(*fed_back(seed)).carrying) for seed in range(40)) <= 3
 
 
 def test_residual_above_an_op_is_located_there() -> None:
-    """A residual that grows where OP was above 60 % is laid to OP above 57 to 63 %, and not to PV."""
+    """A residual that is larger where OP was above 60 % is located at OP above 57 to 63 %, and not at PV."""
     pv, op = trends(2)
     e = np.random.default_rng(3).normal(0, 1, N) * np.where(np.roll(op, 2) > 60, 2.0, 1.0)
     found = at(e, pv, op)
@@ -78,23 +79,24 @@ def test_residual_above_an_op_is_located_there() -> None:
     assert 57 < low < 63
 
 
-def test_residual_by_pv_is_laid_to_pv_beside_op() -> None:
-    """A residual that lives above a PV is laid to PV although OP goes with it."""
+def test_residual_above_a_pv_is_located_at_pv() -> None:
+    """A residual that is larger above a PV is located at PV, although OP is correlated with it."""
     pv, op = trends(4)
     e = np.random.default_rng(5).normal(0, 1, N) * np.where(np.roll(pv, 2) > np.quantile(pv, 0.8), 2.0, 1.0)
     assert at(e, pv, op).features[0].name == "pv_level"
 
 
-def test_residual_of_one_sign_per_direction_is_laid_to_direction() -> None:
-    """A bias that turns its sign with OP's direction is laid to the direction, by sign and not by power."""
+def test_bias_by_direction_is_located_at_the_direction() -> None:
+    """A bias that changes its sign with OP's direction is located at the direction, by sign and not by power."""
     pv, op = trends(6)
     way = np.roll(turns(op, least_turn(op))[0], 2)
     first = at(np.random.default_rng(7).normal(0, 1, N) + 0.4 * way, pv, op).features[0]
     assert (first.name, first.by) == ("op_direction", "sign")
 
 
-def test_residual_after_reversals_is_laid_to_them() -> None:
-    """A bias against OP's direction within ten samples after it turned is laid to the time since the turn."""
+def test_residual_after_reversals_is_located_there() -> None:
+    """A bias against OP's direction within ten samples after an OP reversal is located at the time since the
+    reversal."""
     pv, op = trends(8)
     way, since = (np.roll(x, 2) for x in turns(op, least_turn(op)))
     e = np.random.default_rng(9).normal(0, 1, N) - 0.8 * way * (since < 10)
@@ -104,48 +106,49 @@ def test_residual_after_reversals_is_laid_to_them() -> None:
     assert low < 10
 
 
-def test_late_residual_is_laid_to_time() -> None:
-    """A residual that grows in the last fifth of the record is laid to time."""
+def test_late_residual_is_located_at_time() -> None:
+    """A residual that is larger in the last fifth of the record is located at time."""
     pv, op = trends(10)
     e = np.random.default_rng(11).normal(0, 1, N) * np.where(np.arange(N) > 0.8 * N, 1.8, 1.0)
     assert at(e, pv, op).features[0].name == "time_in_record"
 
 
 def test_scale_and_masked_samples_change_nothing() -> None:
-    """Residuals a thousand times as large, or wild where they are not judged, are located alike."""
+    """Residuals a thousand times as large, or with extreme values at masked samples, are located at the same
+    features."""
     pv, op = trends(12)
     e = np.random.default_rng(13).normal(0, 1, N) * np.where(np.roll(op, 2) > 55, 1.6, 1.0)
     judged = np.ones(N, dtype=bool)
     judged[500:600] = False
-    wild = np.where(judged, 1000 * e, 1e9)
-    one, two = (located(x, pv, op, judged, 1.0, 0, MEMORY) for x in (e, wild))
+    with_extremes = np.where(judged, 1000 * e, 1e9)
+    one, two = (located(x, pv, op, judged, 1.0, 0, MEMORY) for x in (e, with_extremes))
     assert [(f.name, f.p) for f in one.features] == [(f.name, f.p) for f in two.features]
 
 
 def test_short_record_is_not_located() -> None:
-    """A record of under ten memories is located by nothing, and says so by having no features."""
+    """A record shorter than ten settling times has no features."""
     pv, op = trends(14, 200)
     assert at(np.random.default_rng(15).normal(0, 1, 200), pv, op).features == ()
 
 
-def test_turns_are_those_of_a_triangle() -> None:
-    """OP up 4, down 4 and up again turns where it has come back far enough, and ripples turn nothing."""
+def test_reversals_are_those_of_a_triangle() -> None:
+    """OP up 4, down 4 and up again reverses where it has moved back far enough, and ripples are no reversals."""
     op = np.array([0, 1, 2, 3, 4, 3, 2, 1, 0, 1, 2, 1.8, 2, 3.0])
     way, since = turns(op, 0.5)
     np.testing.assert_array_equal(way, [0, 1, 1, 1, 1, -1, -1, -1, -1, 1, 1, 1, 1, 1])
     np.testing.assert_array_equal(since[4:10], [3, 0, 1, 2, 3, 0])
 
 
-def test_turns_know_no_future() -> None:
-    """What OP does after a sample changes neither its direction nor its time since the turn."""
+def test_reversals_use_no_later_samples() -> None:
+    """Later samples of OP change neither the direction nor the time since the reversal."""
     _, op = trends(18)
     whole, part = turns(op, 1.0), turns(op[:1000], 1.0)
     np.testing.assert_array_equal(whole[0][:1000], part[0])
     np.testing.assert_array_equal(whole[1][:1000], part[1])
 
 
-def test_block_products_agree_with_a_slow_twin() -> None:
-    """Products of reordered blocks are those of arrays that were reordered."""
+def test_block_products_agree_with_a_slow_implementation() -> None:
+    """Products of reordered blocks equal those of reordered arrays."""
     rng = np.random.default_rng(19)
     x, y, order = rng.normal(0, 1, (60, 3)), rng.normal(0, 1, (60, 2)), rng.permutation(6)
     moved = np.concatenate([y.reshape(6, 10, 2)[i] for i in order])
@@ -153,12 +156,12 @@ def test_block_products_agree_with_a_slow_twin() -> None:
     np.testing.assert_allclose(fast, x.T @ moved, atol=1e-12)
 
 
-def test_directions_leave_out_what_others_hold() -> None:
-    """What a group adds is orthogonal to all other groups; a copy of another group adds nothing."""
+def test_directions_are_orthogonal_to_other_groups() -> None:
+    """The directions of a group are orthogonal to all other groups. A copy of another group adds none."""
     rng = np.random.default_rng(20)
     a, b = rng.normal(0, 1, (500, 2)), rng.normal(0, 1, (500, 1))
-    own, twin, free = directions([a, a.copy(), b + a[:, :1]])
-    assert own.shape[1] == twin.shape[1] == 0
+    own, duplicate, free = directions([a, a.copy(), b + a[:, :1]])
+    assert own.shape[1] == duplicate.shape[1] == 0
     np.testing.assert_allclose(free.T @ (a - a.mean(axis=0)), 0.0, atol=1e-9)
 
 
@@ -166,12 +169,12 @@ def test_directions_leave_out_what_others_hold() -> None:
     ("height", "run"), [([0, 0, 5, 6, 0, 4], (2, 3)), ([1, 1, 1, 1], None), ([1, 9], None)]
 )
 def test_part_of_range_is_the_longest_high_run(height: list[float], run: tuple[int, int] | None) -> None:
-    """The part of a range named is the run that stands out; a level profile has none."""
+    """The reported part of a range is the longest run of high values. A constant profile has none."""
     assert part_of_range(np.array(height, dtype=float)) == run
 
 
-def test_limits_and_hats() -> None:
-    """OP at 100 % or standing at its own end is at a limit, a test signal between two values is not."""
+def test_limits_and_piecewise_linear_basis() -> None:
+    """OP at 100 % or constant at its own extreme is at a limit; a test signal between two values is not."""
     op = np.concatenate(([50.0, 100, 100, 60, 70, 40, 40, 40], np.arange(45.0, 60.0)))
     np.testing.assert_array_equal(at_limits(op)[:9], [0, 1, 1, 0, 0, 1, 1, 1, 0])
     assert not at_limits(np.repeat([40.0, 60.0, 40.0], 5)).any()

@@ -1,4 +1,4 @@
-"""A saved model runs over other recordings, and refuses what is none."""
+"""A saved model runs on other recordings, and files that hold no model are refused."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from identification.simulation.parameters import Slot, neutral
 
 
 def model() -> tuple[ModelInputs, np.ndarray]:
-    """A plain loop with play, and OP that moves."""
+    """A loop with backlash and a moving OP."""
     op = 50 + np.repeat(np.random.default_rng(1).uniform(-5, 5, 20), 30)
     c = neutral()
     c[Slot.K], c[Slot.T], c[Slot.L], c[Slot.STICKBAND] = 1.5, 40.0, 7.0, 2.0
@@ -23,7 +23,7 @@ def model() -> tuple[ModelInputs, np.ndarray]:
 
 
 def test_model_survives_json() -> None:
-    """Written to JSON and read again a model gives the same PV, but for the bias that is freed."""
+    """A model that is written to JSON and read again gives the same PV, except for a free bias."""
     inputs, c = model()
     data = json.loads(json.dumps(to_data("A", inputs, c, ("backlash",), 0.0, {})))
     pv = inputs.level + simulate(inputs, c)
@@ -32,7 +32,7 @@ def test_model_survives_json() -> None:
 
 
 def test_closed_loop_settles_at_setpoint() -> None:
-    """Under its PI the carried model ends at SP."""
+    """Under its PI controller the saved model settles at SP."""
     inputs, c = model()
     c[Slot.STICKBAND] = 0.0
     data = to_data("A", inputs, c, (), 0.0, {})
@@ -43,7 +43,7 @@ def test_closed_loop_settles_at_setpoint() -> None:
 
 
 @pytest.mark.parametrize("data", [{}, {"constants": {"T": "x"}}, {"constants": {"T": -3.0}}])
-def test_what_is_no_model_is_refused(data: dict) -> None:
-    """A file that holds no model, or one of impossible units, is refused with a line that says so."""
+def test_a_file_without_a_model_is_refused(data: dict) -> None:
+    """A file without a model, or with impossible constants, is refused with an error."""
     with pytest.raises(InputError):
         constants(data)

@@ -1,4 +1,4 @@
-"""Shapes of what was found: against closed forms, with bands that hold them."""
+"""Pictures of the effects against closed forms, with bands that contain them."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ def inputs() -> ModelInputs:
 
 
 def row(name: str) -> Variant:
-    """The catalogue's first row of that name."""
+    """The catalogue's first variant of this name."""
     return next(r for r in CANDIDATES if r.name == name)
 
 
 def shape(name: str, spread: float = 0.1, **constants: float) -> Picture:
-    """The shape of an effect with the given constants, each known within a share."""
+    """The picture of an effect with the given constants, each with a relative uncertainty."""
     plain = neutral()
     plain[Slot.K], plain[Slot.T], plain[Slot.L] = 1.2, 20.0, 5.0
     best = plain.copy()
@@ -48,8 +48,9 @@ def shape(name: str, spread: float = 0.1, **constants: float) -> Picture:
     return curve(Drawing(inputs(), row(name), known, best, plain))
 
 
-def test_play_is_drawn_as_a_loop_of_its_width() -> None:
-    """The loop of play is what the play operator gives on the same sweep, half its width to either side of OP."""
+def test_backlash_is_drawn_as_a_loop_of_its_width() -> None:
+    """The loop of backlash equals that of the backlash operator on the same sweep, half its width on each side
+    of OP."""
     found = shape("backlash", STICKBAND=4.0)
     loop = found.curves[0]
     assert np.abs(loop.y - loop.x).max() == pytest.approx(2.0, abs=1e-9)
@@ -57,8 +58,8 @@ def test_play_is_drawn_as_a_loop_of_its_width() -> None:
     np.testing.assert_allclose(loop.y, twice, atol=1e-9)
 
 
-def test_sticking_loop_holds_both_its_ends() -> None:
-    """The widest and the narrowest loop of a sticking valve are those of its interval's ends."""
+def test_stiction_loops_are_those_of_the_interval() -> None:
+    """The widest and the narrowest loop of a sticking valve are those of the interval's ends."""
     found = shape("stiction", STICKBAND=4.0, JUMP=2.0)
     width = {c.name: float(np.abs(c.y - c.x).max()) for c in found.curves}
     assert width["least"] < width["found"] < width["most"]
@@ -66,15 +67,15 @@ def test_sticking_loop_holds_both_its_ends() -> None:
 
 
 def test_saturation_is_flat_beyond_its_limit() -> None:
-    """Flow follows OP to the limit and stays there, within a band of the limit's interval."""
+    """The flow follows OP up to the limit and stays there, within a band from the limit's interval."""
     curve = shape("saturation", STOP_HI=60.0).curves[0]
     np.testing.assert_allclose(curve.y, np.minimum(curve.x, 60.0))
     assert curve.high is not None
     assert curve.high[-1] == pytest.approx(66.0)
 
 
-def test_slew_takes_size_over_rate() -> None:
-    """A step of a slewing valve arrives after its size over the rate."""
+def test_slew_time_is_size_over_rate() -> None:
+    """A step of a rate-limited valve is complete after its size divided by the rate."""
     curve = shape("rate-limit", RATE=0.5).curves[0]
     size = curve.y[-1]
     arrived = curve.x[np.argmax(curve.y > 0.999 * size)]
@@ -90,8 +91,8 @@ def test_second_lag_response_is_the_closed_form() -> None:
     np.testing.assert_allclose(y, theory, atol=0.01)
 
 
-def test_falling_is_slower_where_asymmetry_says_so() -> None:
-    """With a ratio of four PV falls four times as slowly as it rises."""
+def test_falling_is_slower_by_the_asymmetry() -> None:
+    """With a ratio of four, PV falls four times as slowly as it rises."""
     curve = shape("direction-asymmetry", ASYMMETRY=math.log(4.0)).curves[0]
     top, half = curve.y.max(), curve.x[-1] / 2
     rise = curve.x[np.argmax(curve.y > 0.632 * top)] - 5.0
@@ -100,7 +101,7 @@ def test_falling_is_slower_where_asymmetry_says_so() -> None:
 
 
 def test_gain_over_pv_and_time_are_straight_lines() -> None:
-    """Gain by slope and gain by drift are the lines that their constants say, about the plain gain."""
+    """Gain over PV and gain over time are the lines of their constants, about the baseline gain."""
     level = shape("nonlinear-gain", SLOPE=0.5).curves[0]
     np.testing.assert_allclose(level.y, 1.2 * (1 + 0.5 * (level.x - 50) / 50))
     drift = shape("gain-drift", DRIFT=-0.4).curves[0]
@@ -108,13 +109,13 @@ def test_gain_over_pv_and_time_are_straight_lines() -> None:
 
 
 def test_dead_time_falls_with_flow() -> None:
-    """With a share of one the dead time is that of a pipe: in inverse proportion to flow."""
+    """With a share of one, the dead time is that of a pipe: inversely proportional to flow."""
     curve = shape("flow-dependent-delay", PIPE=1.0).curves[0]
     np.testing.assert_allclose(curve.y, 5.0 * 50.0 / curve.x, rtol=1e-9)
 
 
-def test_load_step_stands_at_its_time() -> None:
-    """A load step is drawn at its time and size, and marked there."""
+def test_load_step_is_drawn_at_its_time() -> None:
+    """A load step is drawn at its time and size, with a mark."""
     found = shape("load-step", STEP=3.0)
     curve = found.curves[0]
     assert found.places == (500.0,)
@@ -122,8 +123,8 @@ def test_load_step_stands_at_its_time() -> None:
     assert curve.y[-1] == 3.0
 
 
-def test_every_row_of_the_catalogue_has_a_shape() -> None:
-    """No effect of the catalogue is found and then not shown; every curve is finite and above its lower band."""
+def test_every_row_of_the_catalogue_has_a_picture() -> None:
+    """Every effect of the catalogue has a picture, and every curve is finite and above its lower band."""
     alone = {
         "SERVO": 2.0,
         "DAMPING": 0.5,
@@ -143,7 +144,7 @@ def test_every_row_of_the_catalogue_has_a_shape() -> None:
 
 
 def test_band_adds_deviations_as_squares() -> None:
-    """Two constants that each move a value by 3 and 4 give a band of 5."""
+    """Two constants that change a value by 3 and 4 give a band of 5."""
     c = neutral()
     params = (Param(Slot.T, "lag", "s", 0.0, 9.0), Param(Slot.L, "delay", "s", 0.0, 9.0))
     known = {"lag": Estimate(c[0], c[0] - 3, c[0] + 3), "delay": Estimate(0.0, -4.0, 4.0)}
@@ -152,8 +153,9 @@ def test_band_adds_deviations_as_squares() -> None:
     assert (y[0] - low[0], high[0] - y[0]) == pytest.approx((5.0, 5.0))
 
 
-def test_stretches_hold_what_they_are_for() -> None:
-    """The busiest stretch holds the burst, those about a run or a move hold them; all are in the record."""
+def test_stretches_contain_their_events() -> None:
+    """The busiest stretch contains the burst, and the stretches about a run or a move contain these; all are
+    inside the record."""
     x = np.zeros(1000)
     x[700:740] = np.random.default_rng(0).normal(0, 1, 40)
     part = busiest(x, 100)
@@ -168,16 +170,16 @@ def test_stretches_hold_what_they_are_for() -> None:
     assert biggest_move(step, 60, np.ones(1000, dtype=bool)) == slice(940, 1000)
 
 
-def test_rebuilt_output_is_the_law() -> None:
-    """OP computed by a PI is rebuilt by the same settings to rounding, and not by others."""
+def test_rebuilt_output_is_that_of_the_controller() -> None:
+    """OP of a PI controller is reproduced by the same settings within rounding, and not by others."""
     e = np.random.default_rng(1).normal(0, 1, 500)
     op = 50 + 1.5 * (e + np.cumsum(e) / 30.0)
     np.testing.assert_allclose(rebuilt(e, op, 1.5, 30.0), op, atol=1e-9)
     assert np.abs(rebuilt(e, op, 1.0, 30.0) - op).max() > 0.3
 
 
-def test_grid_and_gap_are_seen_in_their_pictures() -> None:
-    """Teeth stand a step apart; OP stands still under the gap alone."""
+def test_grid_and_gap_show_in_their_pictures() -> None:
+    """The peaks of the grid have the distance of one step. OP is constant only below the gap."""
     rng = np.random.default_rng(2)
     n, every = 5000, np.ones(5000, dtype=bool)
     coarse = Recording(

@@ -1,4 +1,4 @@
-"""An effect in another's place: what is told of the set is what was fitted."""
+"""An effect that replaces another: the reported set of effects is the fitted one."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from identification.mismatch.selection import Candidate, silent
 N = 900
 
 
-def stepped_into() -> Recording:
-    """A lag under moves of OP by hand, into which a load steps: a difference equation, not the simulator."""
+def with_load_step() -> Recording:
+    """A lag under manual moves of OP with a load step: a difference equation, not the simulator."""
     rng = np.random.default_rng(3)
     op = 50 + np.repeat(rng.uniform(-6, 6, N // 60), 60)
     y, pv = 0.0, []
@@ -34,8 +34,8 @@ def stepped_into() -> Recording:
 
 @cache
 def replaced() -> Explanation:
-    """The loop explained by two wrong effects, of which a load step takes the first one's place."""
-    s = stepped_into()
+    """The loop explained by two wrong effects, of which a load step replaces the first one."""
+    s = with_load_step()
     inputs = inputs_of(s)
     p, plain = prepared(inputs, s.pv - inputs.level, s.usable)
     fit, taken = plain, []
@@ -50,23 +50,23 @@ def replaced() -> Explanation:
         return replacement_step(Explanation(p, plain, fit, tuple(taken)), silent, s)
 
 
-def test_load_step_in_anothers_place_stays_where_it_was_found() -> None:
-    """Simulated anew the set leaves what it left as it was fitted: its load steps where this round has located it."""
+def test_load_step_that_replaces_another_effect_keeps_its_time() -> None:
+    """A new simulation of the set has the residual of the fit, because its load step keeps the located time."""
     found = replaced()
     assert found.best.names == ("valve-characteristic", "load-step")
     assert residual_fit(found.p, found.best.model).loss == pytest.approx(found.best.loss, rel=1e-9)
 
 
-def test_nothing_told_is_an_alternative() -> None:
-    """What is told, first or second, is not among what could be told in the place of the first."""
+def test_no_reported_effect_is_an_alternative() -> None:
+    """No reported effect is among the alternatives to the first one."""
     found = replaced()
     first = tuple(Candidate(c.fit, 9e9, 9e9) for c in found.accepted)
     again = Explanation(found.p, found.plain, found.best, found.accepted, first)
     assert not set(alternatives(again)) & set(found.best.names)
 
 
-def test_what_is_taken_is_what_is_fitted_in_its_order() -> None:
-    """The effect that is told first is the first of those taken: it is the last that is given up."""
+def test_accepted_effects_have_the_order_of_the_fit() -> None:
+    """The accepted effects have the order of the fitted ones; another order is an error."""
     found = replaced()
     assert tuple(c.name for c in found.accepted) == found.best.names
     with pytest.raises(ValueError, match="taken"):

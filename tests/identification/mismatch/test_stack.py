@@ -1,4 +1,4 @@
-"""Three effects stacked on each other are no name."""
+"""Three effects in one loop are not reported by name."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ from tests.identification.plain_loop import Plant, recording
 
 
 @pytest.mark.parametrize(("count", "stacked"), [(1, False), (2, False), (3, True)])
-def test_three_effects_of_a_loop_are_a_stack_and_two_are_a_pair(count: int, stacked: bool) -> None:
-    """Of a loop in closed loop three effects are a stack, two are not; of an experiment three are not either."""
+def test_three_effects_of_a_loop_are_too_many_and_two_are_not(count: int, stacked: bool) -> None:
+    """Three effects of a closed loop count as a stack, one or two do not. Three effects of an experiment do
+    not."""
     s = recording(Plant(), 1)
     p, fit = prepared(inputs_of(s), s.pv - s.pv.mean(), s.usable)
     rows = [next(r for r in CANDIDATES if r.name == n) for n in ("slow-mode", "backlash", "gain-drift")]

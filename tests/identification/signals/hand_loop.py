@@ -1,4 +1,4 @@
-"""A PI loop stepped by hand, sharing no code with the project's simulator."""
+"""A PI loop in plain Python that shares no code with the project's simulator."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 def error(
     kp_gain: float, ti_s: float, lag_s: float, dead_s: int, load: np.ndarray, noise: np.ndarray
 ) -> np.ndarray:
-    """SP - PV of a lag of gain one with dead time under PI control at 1 s, the load at the process input."""
+    """SP - PV of a lag of gain one with dead time under PI control at 1 s, with the load at the process input."""
     n = load.size
     state, total = 0.0, 0.0
     late = np.zeros(dead_s + 1)

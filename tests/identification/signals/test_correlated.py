@@ -1,4 +1,4 @@
-"""How many samples tell as much as an independent one."""
+"""Number of correlated samples that count as one independent sample."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from identification.signals.correlation import correlated
 
 
 @pytest.mark.parametrize("pole", [0.0, 0.5, 0.9])
-def test_of_a_first_order_noise_it_is_known(pole: float) -> None:
-    """Noise of first order with pole a has (1 + a) / (1 - a) samples to an independent one."""
+def test_first_order_noise_has_the_closed_form(pole: float) -> None:
+    """For first-order noise with pole a, (1 + a) / (1 - a) samples count as one independent sample."""
     e = np.random.default_rng(5).standard_normal(40_000)
     x = np.empty(e.size)
     x[0] = e[0]
@@ -20,6 +20,6 @@ def test_of_a_first_order_noise_it_is_known(pole: float) -> None:
 
 
 def test_a_constant_is_one_sample() -> None:
-    """An error that never changes tells once, however long it is recorded."""
+    """A constant error counts as one sample at any length."""
     assert correlated(np.full(700, 3.0)) == 700.0
     assert correlated(np.zeros(700)) == 700.0

@@ -1,4 +1,4 @@
-"""Coherence, lag and drift of two signals against a slow twin, theory and signals whose answer is known."""
+"""Coherence, lag and drift of two signals against a slow implementation, theory and signals with known answers."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ N, PERIOD = 20_000, 100.0
 LINE = N / PERIOD
 
 
-def walking(seed: int, walk: float = 0.03) -> np.ndarray:
-    """A wave whose phase walks, shape (N,)."""
+def with_random_phase(seed: int, walk: float = 0.03) -> np.ndarray:
+    """A sine with a random walk of its phase, shape (N,)."""
     rng = np.random.default_rng(seed)
     return np.sin(2 * np.pi * np.arange(N) / PERIOD + np.cumsum(walk * rng.standard_normal(N)))
 
@@ -41,11 +41,11 @@ def coherence_of(x: np.ndarray, y: np.ndarray, shift: int = 0) -> float:
 
 
 @pytest.mark.parametrize("shift", [0, 5, -7])
-def test_coherence_is_that_of_a_slow_twin(shift):
-    """The kernel's coherence is, piece by piece, what the textbook's formula gives."""
+def test_coherence_agrees_with_a_slow_implementation(shift):
+    """The kernel's coherence equals the textbook's formula, piece by piece."""
     rng = np.random.default_rng(1)
-    x = lines(walking(1))
-    y = lines(walking(1) + 0.5 * rng.standard_normal(N))
+    x = lines(with_random_phase(1))
+    y = lines(with_random_phase(1) + 0.5 * rng.standard_normal(N))
     low, high, width = band(LINE)
     edges = [low + (high - low) * p // ((high - low) // width) for p in range((high - low) // width + 1)]
     shared = whole = 0.0
@@ -56,16 +56,17 @@ def test_coherence_is_that_of_a_slow_twin(shift):
     assert coherence_of(x, y, shift) == pytest.approx(shared / whole, rel=1e-9)
 
 
-def test_a_filter_and_a_delay_do_not_part_two_signals():
-    """A wave and the same wave a period and a half later at another size are coherent, and two walkers are not."""
-    x = walking(2)
+def test_a_gain_and_a_delay_keep_two_signals_coherent():
+    """A signal and its copy with another gain and a delay of 1.5 periods are coherent. Two independent signals
+    are not."""
+    x = with_random_phase(2)
     assert coherence_of(lines(x), lines(0.2 * np.roll(x, 150))) > 0.95
-    assert coherence_of(lines(x), lines(walking(3))) < 0.5
+    assert coherence_of(lines(x), lines(with_random_phase(3))) < 0.5
 
 
 @pytest.mark.parametrize(("count", "width"), [(8, 8), (16, 8), (40, 8), (60, 12)])
-def test_chance_reaches_what_theory_says(count, width):
-    """Of tapered white lines without anything in common, two in a hundred exceed the coherence for 2 %."""
+def test_chance_coherence_agrees_with_theory(count, width):
+    """Of independent tapered white lines, about 2 % exceed the coherence limit for 2 %."""
     rng = np.random.default_rng(4)
     least, trials = chance_coherence(count, width, 0.02), 20_000
     raw = rng.standard_normal((2, trials, count + 2)) + 1j * rng.standard_normal((2, trials, count + 2))
@@ -79,9 +80,10 @@ def test_chance_reaches_what_theory_says(count, width):
 
 @pytest.mark.parametrize("late", [-60, 0, 35, 140])
 def test_the_lag_is_the_delay(late):
-    """The lag of a delayed wave with noise is its delay within three of the deviations told, and those are useful."""
+    """The lag of a delayed signal with noise is its delay within three reported deviations, and these are below
+    30 s."""
     rng = np.random.default_rng(5)
-    x = walking(6)
+    x = with_random_phase(6)
     y = np.roll(x, late) + 0.2 * rng.standard_normal(N)
     low, high, _ = band(LINE)
     found = lag(lines(x)[low - 1 : high - 1], lines(y)[low - 1 : high - 1], N, 400.0)
@@ -90,8 +92,8 @@ def test_the_lag_is_the_delay(late):
     assert found.coherence > 0.9
 
 
-def test_a_steady_wave_tells_no_lag():
-    """The lag of a wave without any wandering has a deviation of many periods."""
+def test_a_sine_of_constant_frequency_gives_no_lag():
+    """The lag of a sine of constant frequency has a deviation above 30 s."""
     t = np.arange(N)
     x, y = np.sin(2 * np.pi * t / PERIOD), np.sin(2 * np.pi * (t - 35) / PERIOD)
     low, high, _ = band(LINE)
@@ -101,13 +103,13 @@ def test_a_steady_wave_tells_no_lag():
     assert lag(lines(x)[cut], lines(y)[cut], N, 400.0).deviation_s > 30.0
 
 
-@pytest.mark.parametrize("turns", [0.0, 0.5, 1.0, 2.0])
-def test_drift_is_the_difference_of_frequencies(turns):
-    """Two walks that are one but for a frequency a line or so apart drift by as many turns."""
+@pytest.mark.parametrize("cycles", [0.0, 0.5, 1.0, 2.0])
+def test_drift_is_the_difference_of_frequencies(cycles):
+    """Two signals with a frequency difference of 0 to 2 lines drift by as many cycles."""
     x = 2 * np.pi * np.arange(N) / PERIOD
     rng = np.random.default_rng(9)
     walk = np.cumsum(0.005 * rng.standard_normal(N))
-    apart = 2 * np.pi * turns * np.arange(N) / N
+    apart = 2 * np.pi * cycles * np.arange(N) / N
     low, high, _ = band(LINE)
     one, other = (spectrum(np.sin(p), 1.0).lines[low:high] for p in (x + walk, x + walk + apart))
-    assert abs(drift(one, other[None])[0]) == pytest.approx(turns, abs=0.1)
+    assert abs(drift(one, other[None])[0]) == pytest.approx(cycles, abs=0.1)

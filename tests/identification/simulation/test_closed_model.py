@@ -1,4 +1,4 @@
-"""The whole model closed by its controller takes the steps that it takes open, and its OP is the law's."""
+"""The model in closed loop has the same response as in open loop, and its OP is that of the controller."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from identification.simulation.open_loop import ModelInputs, as_parameters, simu
 from identification.simulation.parameters import Slot
 
 N, KP, TI = 900, 0.8, 25.0
-WORN = Stiction(1.5, 0.9, Motion.HALTS)
+STICKING = Stiction(1.5, 0.9, Motion.HALTS)
 
 
 def inputs(op: np.ndarray | None = None) -> ModelInputs:
-    """A loop at rest at 50 %, one sample a second."""
+    """A loop at rest at 50 %, with one sample per second."""
     return ModelInputs(np.full(N, 50.0) if op is None else op, 1.0, 50.0, 50.0, (30.0, 70.0), (400,))
 
 
 def setpoint() -> np.ndarray:
-    """A staircase."""
+    """A sequence of set-point steps."""
     return 50.0 + np.repeat(np.array([0.0, 4.0, -3.0, 6.0, 1.0, -5.0]), N // 6)
 
 
@@ -45,11 +45,11 @@ def setpoint() -> np.ndarray:
         {"STEP": 3.0, "DRIFT": 0.3},
         {"CLIP_HI": 53.0},
     ],
-    ids=lambda e: "+".join(e) or "plain",
+    ids=lambda e: "+".join(e) or "baseline",
 )
 def test_closed_is_open_under_its_own_output(extra: dict[str, float]) -> None:
-    """PV of the closed loop is what the model gives, open, for the OP that the closed loop moved."""
-    c = as_parameters(Fopdt(1.4, 18.0, 3.4), WORN if "SERVO" not in extra else None)
+    """PV of the closed loop equals PV of the open-loop model under the OP of the closed loop."""
+    c = as_parameters(Fopdt(1.4, 18.0, 3.4), STICKING if "SERVO" not in extra else None)
     for name, value in extra.items():
         c[Slot[name]] = value
     pv, op = closed_model(inputs(), c, setpoint(), KP, TI)
@@ -58,8 +58,8 @@ def test_closed_is_open_under_its_own_output(extra: dict[str, float]) -> None:
     np.testing.assert_allclose(pv, again, atol=1e-7)
 
 
-def test_output_is_the_law() -> None:
-    """OP's moves are kp times the error's moves and its share over Ti, held at the limits."""
+def test_output_is_that_of_the_controller() -> None:
+    """Each OP move is kp times the move of the error plus its share over Ti."""
     pv, op = closed_model(inputs(), as_parameters(Fopdt(1.4, 18.0, 3.4)), setpoint(), KP, TI)
     e = setpoint() - pv
     moves = KP * (np.diff(e) + e[1:] / TI)
@@ -69,7 +69,7 @@ def test_output_is_the_law() -> None:
 @pytest.mark.parametrize("process", [Fopdt(1.4, 18.0, 3.4), Integrator(0.05, 2.7)])
 @pytest.mark.parametrize("valve", [None, Backlash(1.5), *(Stiction(1.5, 0.9, m) for m in Motion)])
 def test_both_closed_loops_agree(process: Process, valve: Valve) -> None:
-    """The loop that settings are searched with and the loop that models are carried with are one loop."""
+    """The simulator of the settings search and that of saved models give the same closed loop."""
     loop = Loop(process, Pid(KP, TI), valve)
     searched = closed_loop(loop, setpoint(), np.zeros(N))
     pv, op = closed_model(inputs(), as_parameters(process, valve), setpoint(), KP, TI)
@@ -78,7 +78,7 @@ def test_both_closed_loops_agree(process: Process, valve: Valve) -> None:
 
 
 def test_transport_by_flow_is_refused() -> None:
-    """A dead time that the flow itself sets is not stepped sample by sample, and that is said."""
+    """A dead time that depends on the flow cannot be simulated in closed loop, and the error states this."""
     c = as_parameters(Fopdt(1.4, 18.0, 3.4))
     c[Slot.PIPE] = 0.5
     with pytest.raises(NotAssessedError, match="run it open loop"):

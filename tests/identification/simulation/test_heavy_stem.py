@@ -1,4 +1,4 @@
-"""A stem with mass under dry friction: beside a slow integration of its equation, and where theory knows its end."""
+"""A stem with mass under dry friction, compared with a slow integration of its equation and with theory."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ LAW = StemLaw(1.5, 0.5, SLIDES)
 
 
 def slowly(op: Floats, law: StemLaw, time_s: float, dt_s: float) -> Floats:
-    """Mean positions by a solver of differential equations, sample by sample, stopped where the speed turns."""
+    """Mean positions from a solver of differential equations, sample by sample, with a stop at each reversal of
+    the speed."""
     at, speed, out = float(op[0]), 0.0, np.empty_like(op)
     for k, u in enumerate(op):
         t, total = 0.0, 0.0
@@ -45,8 +46,8 @@ def slowly(op: Floats, law: StemLaw, time_s: float, dt_s: float) -> Floats:
 
 
 @pytest.mark.parametrize("time_s", [0.1, 0.3, 1.0])
-def test_it_goes_as_its_equation_says(time_s: float) -> None:
-    """Solved piece by piece the stem goes where a solver of m z'' + c z' + k z = u - friction takes it."""
+def test_the_stem_follows_its_equation(time_s: float) -> None:
+    """The piecewise solution agrees with a solver of m z'' + c z' + k z = u - friction within 0.05."""
     rng = np.random.default_rng(4)
     op = 50.0 + 4.0 * np.sin(np.arange(300) / 20.0) + rng.normal(0.0, 0.3, 300)
     found = walk(op, LAW, op[0], time_s, 1.0)
@@ -54,8 +55,9 @@ def test_it_goes_as_its_equation_says(time_s: float) -> None:
     assert np.ptp(found) > 3.0
 
 
-def test_it_holds_within_the_breakaway_and_then_comes_to_the_sliding_distance() -> None:
-    """An OP within the breakaway moves nothing; a step beyond brings the stem to where spring and friction agree."""
+def test_the_stem_rests_within_the_breakaway_and_then_moves_to_the_sliding_distance() -> None:
+    """An OP within the breakaway does not move the stem. A larger step moves it to the balance of spring and
+    friction."""
     still = 50.0 + 1.4 * np.sign(np.sin(np.arange(100) / 5.0))
     assert (walk(still, LAW, 50.0, 0.3, 1.0) == 50.0).all()
     step = np.r_[np.full(10, 50.0), np.full(40, 53.0)]
@@ -64,8 +66,8 @@ def test_it_holds_within_the_breakaway_and_then_comes_to_the_sliding_distance() 
         assert end == pytest.approx(50.0 + way * 2.5, abs=0.02)
 
 
-def test_a_stem_that_hardly_weighs_anything_rests_after_each_slip() -> None:
-    """With a natural time far under the sample, over which OP stands, it is the stem that rests (He 2007)."""
+def test_a_light_stem_rests_after_each_slip() -> None:
+    """With a natural period far below the sample, the stem rests after each slip under constant OP (He 2007)."""
     op = 50.0 + 5.0 * np.sin(np.arange(400) / 15.0)
     light = walk(np.repeat(op, 3), LAW, op[0], 1e-3, 1.0)[2::3]
     assert np.abs(light - walk(op, StemLaw(1.5, 0.5, RESTS), op[0])).max() < 0.02

@@ -21,7 +21,8 @@ def inputs(seed: int = 1, n: int = 600) -> ModelInputs:
 
 
 def constants(**given: float) -> np.ndarray:
-    """The plain loop with gain 1.5, time constant 40 s and dead time 7 s, and what is given by slot name."""
+    """The baseline model with gain 1.5, time constant 40 s and dead time 7 s, and the given values by slot
+    name."""
     c = neutral()
     c[Slot.K], c[Slot.T], c[Slot.L] = 1.5, 40.0, 7.0
     for name, value in given.items():
@@ -29,7 +30,7 @@ def constants(**given: float) -> np.ndarray:
     return c
 
 
-def test_plain_equals_exact_open_loop() -> None:
+def test_baseline_model_equals_exact_open_loop() -> None:
     """Without any effect the model is the exact first-order lag with fractional dead time."""
     s = inputs()
     expected = pv_of(Fopdt(1.5, 40.0, 7.0), None, s.op, s.dt_s)
@@ -41,15 +42,15 @@ def test_plain_equals_exact_open_loop() -> None:
     "valve", [None, Backlash(3.0), *(Stiction(3.0, 1.2, motion) for motion in Motion), Stiction(2.0, 2.0)]
 )
 def test_models_become_parameters(process: Process, valve: Valve) -> None:
-    """Any process and valve of the project, turned into parameters, give the PV of stem and difference equation."""
+    """The parameters of any process and valve give the PV of the stem and the difference equation."""
     s = inputs()
     got = simulate(s, as_parameters(process, valve))
     expected = pv_of(process, valve, s.op, s.dt_s)
     assert np.allclose(got - got[0], expected - expected[0], atol=1e-9)
 
 
-def test_play_equals_play_before_lag() -> None:
-    """The play of a candidate is the project's own play before the same lag."""
+def test_backlash_equals_backlash_before_lag() -> None:
+    """The backlash of a candidate is the project's backlash before the same lag."""
     s = inputs()
     got = simulate(s, constants(STICKBAND=3.0))
     expected = pv_of(Fopdt(1.5, 40.0, 7.0), Backlash(3.0), s.op, s.dt_s)
@@ -68,14 +69,14 @@ def test_play_equals_play_before_lag() -> None:
         {"CAP": 1e6},
     ],
 )
-def test_rich_vessel_without_strength_is_plain(neutral_effect: dict[str, float]) -> None:
-    """An effect of no strength changes nothing."""
+def test_effect_of_zero_size_is_the_baseline_model(neutral_effect: dict[str, float]) -> None:
+    """An effect of size zero does not change PV."""
     s = inputs()
     assert np.allclose(simulate(s, constants(**neutral_effect)), simulate(s, constants()), atol=1e-4)
 
 
 def test_second_lag_equals_two_lags() -> None:
-    """A second lag gives the closed-form step response of two lags in series."""
+    """A second lag has the closed-form step response of two lags in series."""
     op = np.concatenate((np.full(5, 50.0), np.full(400, 51.0)))
     s = ModelInputs(op, 2.0, 50.0, 50.0, (40.0, 60.0))
     y = simulate(s, constants(T2=15.0, L=0.0))
@@ -84,8 +85,8 @@ def test_second_lag_equals_two_lags() -> None:
     assert np.allclose(y, np.where(t > 0, step, 0.0), atol=5e-3)
 
 
-def test_opposing_mode_starts_the_wrong_way() -> None:
-    """A fast mode of opposite sign moves PV down before it goes up."""
+def test_opposing_mode_starts_in_the_opposite_direction() -> None:
+    """A fast mode of opposite sign moves PV down before PV rises."""
     op = np.concatenate((np.full(5, 50.0), np.full(200, 52.0)))
     y = simulate(ModelInputs(op, 1.0, 50.0, 50.0, (40.0, 60.0)), constants(SHARE=-0.3, MODE_T=2.0, L=0.0))
     assert y[:20].min() < -0.2
@@ -93,7 +94,7 @@ def test_opposing_mode_starts_the_wrong_way() -> None:
 
 
 def test_pipe_delay_is_dead_time_at_rest_and_shorter_at_flow() -> None:
-    """A pipe at its nominal flow is the plain dead time; with more flow PV answers sooner."""
+    """A pipe at its nominal flow has the constant dead time; with more flow PV responds earlier."""
     op = np.concatenate((np.full(50, 50.0), np.full(100, 50.2), np.full(100, 90.0), np.full(100, 90.2)))
     s = ModelInputs(op, 1.0, 50.0, 50.0, (40.0, 60.0))
     plain, piped = (simulate(s, constants(L=20.0, PIPE=pipe)) for pipe in (0.0, 1.0))
@@ -102,7 +103,8 @@ def test_pipe_delay_is_dead_time_at_rest_and_shorter_at_flow() -> None:
 
 
 def test_overflow_is_flat_and_then_late() -> None:
-    """Above its cap PV stands; a clipped sensor stands too but the vessel beneath goes on."""
+    """Above the overflow level PV is constant. A clipped sensor is also constant, but its vessel continues to
+    fill."""
     s = inputs()
     top = float(simulate(s, constants()).max())
     wide = replace(s, pv_range=(0.0, 100.0))
@@ -114,7 +116,7 @@ def test_overflow_is_flat_and_then_late() -> None:
 
 
 def by_euler(op: np.ndarray, c: np.ndarray, level: float, parts: int = 400) -> np.ndarray:
-    """PV's deviation of two vessels in series, the upper of which spills, in small steps, shape (n,)."""
+    """Deviation of PV of two vessels in series, of which the upper one overflows, in small steps, shape (n,)."""
     middle, dt = float(op[0]), 2.0 / parts
     x, above, out = c[Slot.START], c[Slot.BIAS] + c[Slot.BEGUN], np.empty(op.size)
     fed = np.concatenate((np.full(round(c[Slot.L] / dt), op[0]), np.repeat(op, parts)))
@@ -128,8 +130,9 @@ def by_euler(op: np.ndarray, c: np.ndarray, level: float, parts: int = 400) -> n
     return out
 
 
-def test_a_vessel_that_spills_into_the_next() -> None:
-    """What the upper of two vessels spills falls on in the share stated: as small steps of the balance have it."""
+def test_a_vessel_that_overflows_into_the_next() -> None:
+    """The overflow of the upper vessel enters the lower one with the stated share, as in small steps of the
+    balance."""
     s = inputs(n=150)
     c = constants(T2=25.0, UPPER_CAP=52.0, PASSED=0.6, BEGUN=-3.0, L=8.0)
     expected = by_euler(s.op, c, s.level)
@@ -140,7 +143,8 @@ def test_a_vessel_that_spills_into_the_next() -> None:
 
 @pytest.mark.parametrize("root", [0.0, 0.8])
 def test_begun_at_rest_pv_does_not_move(root: float) -> None:
-    """A vessel fed at first what its level lets go begins level, wherever it stands and OP is; else it does not."""
+    """A vessel whose inflow equals its outflow at the start keeps its level, for every level and OP. Otherwise
+    the level moves."""
     s, c = inputs(), constants(T2=60.0, BEGUN=5.0, START=-6.0, BIAS=2.0, ROOT=root)
     assert np.diff(simulate(s, begun_at_rest(s, c)))[0] == pytest.approx(0.0, abs=0.01)
     assert np.diff(simulate(s, c))[0] > 0.3

@@ -1,4 +1,4 @@
-"""What goes with PV as recorded: a switch with its band, and the mean of the past."""
+"""Effects that depend on recorded PV: a switch with its band, and the mean of the past."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from identification.simulation.open_loop import RAMP, gain_change_by_history, re
 
 
 def test_load_is_switched_as_a_schmitt_trigger_does() -> None:
-    """Beyond the ramp on either side of its band a switched load is what two comparisons and a memory make of PV."""
+    """Outside the ramps of its band a switched load equals a Schmitt trigger of PV in plain Python."""
     rng = np.random.default_rng(3)
     pv = np.cumsum(rng.normal(0.0, 0.6, 4000))
     pv -= pv.mean()
@@ -30,7 +30,7 @@ def test_load_is_switched_as_a_schmitt_trigger_does() -> None:
 
 
 def test_past_of_pv_is_a_first_order_mean_of_it() -> None:
-    """A step of PV is remembered as 1 - exp(-t / memory), and never by the sample at which it is recorded."""
+    """A step of PV has the effect 1 - exp(-t / memory), and no effect in the sample at which it is recorded."""
     pv = np.where(np.arange(3000) >= 500, 5.0, 0.0)
     gain = gain_change_by_history(pv, 0.4, 300.0, 2.0)
     assert not gain[:501].any()
@@ -39,12 +39,12 @@ def test_past_of_pv_is_a_first_order_mean_of_it() -> None:
 
 
 def test_gain_never_changes_its_sign() -> None:
-    """However far PV has been, a twentieth of the gain is left."""
+    """At any distance of PV, at least a twentieth of the gain remains."""
     assert gain_change_by_history(np.full(500, -90.0), 3.0, 10.0, 1.0).min() == -0.95
 
 
-def test_what_returns_is_pv_of_a_while_ago() -> None:
-    """A straight line comes back later by the way, counted to each sample's middle."""
+def test_returned_flow_is_delayed_pv() -> None:
+    """A ramp returns after the delay, counted to the middle of each sample."""
     pv = 3.0 + 0.2 * np.arange(400)
     assert np.array_equal(returned(pv, 0.1, 2.0), pv)
     back = returned(pv, 101.0, 2.0)

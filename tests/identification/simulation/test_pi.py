@@ -1,4 +1,4 @@
-"""The law of the controller against closed forms and a twin in absolute form."""
+"""The controller against closed forms and an implementation in absolute form."""
 
 import math
 from dataclasses import replace
@@ -16,7 +16,7 @@ WIDE = {"op_lo": -1e9, "op_hi": 1e9}
 
 
 def outputs(c: Pid, sp: np.ndarray, pv: np.ndarray) -> np.ndarray:
-    """OP that a controller gives, in open loop and from 0."""
+    """OP of a controller in open loop, starting at 0."""
     law, seen = per_scan(c, c.scan_s), (0.0, sp[0], pv[0], 0.0)
     out = np.empty(sp.size)
     for k in range(sp.size):
@@ -25,8 +25,8 @@ def outputs(c: Pid, sp: np.ndarray, pv: np.ndarray) -> np.ndarray:
     return out
 
 
-def test_filtered_derivative_answers_a_ramp_as_theory_has_it():
-    """On a ramp r of PV the derivative part is -kp Td r (1 - exp(-t N/Td)), the answer of Td s/(1 + Td s/N)."""
+def test_filtered_derivative_responds_to_a_ramp_as_in_theory():
+    """On a ramp r of PV the derivative part is -kp Td r (1 - exp(-t N/Td)), the response of Td s/(1 + Td s/N)."""
     c = Pid(2.0, math.inf, 40.0, scan_s=0.01, td_filter=5.0, **WIDE)
     t = np.arange(2000) * 0.01
     pv = 0.3 * t
@@ -37,7 +37,8 @@ def test_filtered_derivative_answers_a_ramp_as_theory_has_it():
 @pytest.mark.parametrize("td_filter", [3.0, 8.0, 0.0, math.inf])
 @pytest.mark.parametrize("pv_filter_s", [0.0, 12.0])
 def test_response_is_the_gain_of_a_simulated_sine(td_filter, pv_filter_s):
-    """A sine of PV comes out of the stepped law with gain and phase of its frequency response, filters with it."""
+    """The response of the simulated controller to a sine of PV has the gain and phase of its frequency
+    response, also with filters."""
     c = Pid(1.5, 80.0, 20.0, scan_s=1.0, td_filter=td_filter, pv_filter_s=pv_filter_s, **WIDE)
     omega = 2 * math.pi / 50
     k = np.arange(8000)
@@ -47,7 +48,7 @@ def test_response_is_the_gain_of_a_simulated_sine(td_filter, pv_filter_s):
 
 
 def test_a_filter_of_pv_acts_as_a_lag():
-    """At a fine scan the law behind a filter of PV agrees with scipy's PI behind a lag within 1 %."""
+    """At a small scan, the controller with a filter of PV agrees with scipy's PI after a lag within 0.02."""
     c = Pid(2.0, 30.0, scan_s=0.02, pv_filter_s=10.0, **WIDE)
     t = np.arange(5000) * 0.02
     pv = np.sin(0.2 * t)
@@ -57,7 +58,7 @@ def test_a_filter_of_pv_acts_as_a_lag():
 
 
 def gapped(e: float, gap: float, gain: float) -> float:
-    """The error that counts, by hand."""
+    """The error after the gap, in plain Python."""
     if abs(e) <= gap:
         return gain * e
     return e - math.copysign((1 - gain) * gap, e)
@@ -73,19 +74,20 @@ def gapped(e: float, gap: float, gain: float) -> float:
     ],
 )
 def test_gap_square_and_weight_are_those_of_the_absolute_form(extra, acting):
-    """The stepped law is kp s(e) + ki sum s(e), less what the weight takes of the set point, to rounding."""
+    """The incremental controller equals kp s(e) + ki sum s(e), minus the part of the set-point weight, within
+    rounding."""
     rng = np.random.default_rng(4)
     sp = np.repeat(rng.normal(size=40), 25)
     pv = np.cumsum(rng.normal(size=1000)) * 0.1
     c = replace(Pid(3.0, 60.0, scan_s=2.0, **WIDE), **extra)
     s = np.array([acting(e) for e in sp - pv])
-    weighed = (1 - c.sp_weight) * (sp - sp[0])
-    expected = 3.0 * (s - s[0] - weighed) + 3.0 * 2.0 / 60.0 * np.cumsum(s)
+    weighted = (1 - c.sp_weight) * (sp - sp[0])
+    expected = 3.0 * (s - s[0] - weighted) + 3.0 * 2.0 / 60.0 * np.cumsum(s)
     assert outputs(c, sp, pv) == pytest.approx(expected, abs=1e-9)
 
 
 def test_integral_alone_and_a_limit_of_rate():
-    """Without gain OP is 1/Ti times the sum of the error; a limit of rate makes a ramp of just that slope."""
+    """Without gain, OP is 1/Ti times the sum of the error. A rate limit gives a ramp of this slope."""
     sp, pv = np.full(100, 5.0), np.zeros(100)
     assert outputs(Pid(0.0, 50.0, **WIDE), sp, pv)[-1] == pytest.approx(100 * 5.0 / 50.0)
     ramp = outputs(Pid(10.0, 50.0, scan_s=2.0, op_rate=0.05, **WIDE), sp, pv)
@@ -93,9 +95,9 @@ def test_integral_alone_and_a_limit_of_rate():
 
 
 def test_stability_with_filters_agrees_with_simulation():
-    """Winding and a simulated kick agree on stability, with filters of PV and of the derivative."""
+    """The winding number and a simulated pulse agree on stability, with filters of PV and of the derivative."""
     rng = np.random.default_rng(8)
-    asked = 0
+    compared = 0
     for _ in range(120):
         process = rng.choice([Fopdt(1.0, 30.0, rng.uniform(1, 12)), Integrator(1 / 30.0, rng.uniform(1, 12))])
         c = Pid(rng.uniform(0.5, 9.0), rng.uniform(20, 200), rng.uniform(0, 15), td_filter=rng.uniform(2, 10))
@@ -104,7 +106,7 @@ def test_stability_with_filters_agrees_with_simulation():
         pv = closed_loop(loop, np.zeros(3000), load, op_start=0.0).pv
         grown = np.ptp(pv[-750:]) / (np.ptp(pv[750:1500]) + 1e-12)
         if not 0.2 < grown < 5:
-            asked += 1
+            compared += 1
             assert is_stable(loop) == (grown < 1)
             assert math.isfinite(maximum_sensitivity(loop)) == (grown < 1)
-    assert asked > 60
+    assert compared > 60

@@ -1,4 +1,4 @@
-"""Valve operators against their definitions."""
+"""Valve models against their definitions."""
 
 import numpy as np
 import pytest
@@ -18,8 +18,8 @@ from identification.simulation.valve import (
 )
 
 
-def slow_play(op: list[float], width: float, stem: float) -> list[float]:
-    """Play by its picture: a slot of the given width pushed along by OP."""
+def slow_backlash(op: list[float], width: float, stem: float) -> list[float]:
+    """Backlash by its mechanism: a slot of the given width that OP pushes."""
     out = []
     for u in op:
         left, right = stem - width / 2, stem + width / 2
@@ -32,21 +32,21 @@ def slow_play(op: list[float], width: float, stem: float) -> list[float]:
 
 
 @given(st.lists(st.floats(-50, 50), min_size=1, max_size=60), st.floats(0.01, 20))
-def test_play_agrees_with_slow_twin(op, width):
-    """The kernel and a pushed slot give the same stem to rounding."""
-    assert play(np.array(op), width, 0.0) == pytest.approx(slow_play(op, width, 0.0), abs=1e-9)
+def test_backlash_agrees_with_a_slow_implementation(op, width):
+    """The kernel and a pushed slot give the same stem within rounding."""
+    assert play(np.array(op), width, 0.0) == pytest.approx(slow_backlash(op, width, 0.0), abs=1e-9)
 
 
 @given(st.lists(st.floats(-50, 50), min_size=1, max_size=60), st.floats(0.01, 20), st.floats(0, 1))
 def test_stem_never_leaves_breakaway(op, stickband, share):
-    """The stem is never further from OP than the breakaway distance (S + J)/2."""
+    """The distance between stem and OP is never larger than the breakaway distance (S + J)/2."""
     jump = stickband * share
     stem = stem_position(np.array(op), Stiction(stickband, jump))
     assert np.all(np.abs(np.array(op) - stem) <= (stickband + jump) / 2 + 1e-9)
 
 
 def test_equal_stickband_and_jump_is_a_relay():
-    """S = J = 2d under a sine of amplitude 2d is a relay of height d switching at d (the study's Eq. 2)."""
+    """S = J = 2d under a sine of amplitude 2d is a relay of height d that switches at d (the study's Eq. 2)."""
     d = 1.0
     op = 2 * d * np.sin(np.linspace(0, 8 * np.pi, 4001))
     stem = stem_position(op, Stiction(2 * d, 2 * d), -d)[1000:]
@@ -54,8 +54,8 @@ def test_equal_stickband_and_jump_is_a_relay():
     assert np.abs(np.abs(stem) - d).max() < 0.01
 
 
-def test_play_is_rate_independent():
-    """Repeating every OP sample leaves the stem's path unchanged."""
+def test_backlash_is_rate_independent():
+    """The stem's path does not change if every OP sample is repeated."""
     op = np.cumsum(np.random.default_rng(1).normal(size=300))
     assert np.array_equal(
         stem_position(np.repeat(op, 3), Backlash(2.0))[::3], stem_position(op, Backlash(2.0))
@@ -63,8 +63,9 @@ def test_play_is_rate_independent():
 
 
 @given(st.lists(st.floats(-50, 50), min_size=2, max_size=60), st.floats(0.5, 20), st.floats(-1, 1))
-def test_play_has_one_path_once_op_has_covered_it(op, width, where):
-    """From any start within the play, the stem joins the path from first_slip once OP has covered the width."""
+def test_backlash_has_one_path_after_op_has_covered_it(op, width, where):
+    """From any start within the backlash, the stem joins the path from first_slip after OP has covered the
+    width."""
     x = np.array(op)
     covered = np.flatnonzero(np.maximum.accumulate(x) - np.minimum.accumulate(x) > width)
     known = play(x, width, first_slip(x, StemLaw(width / 2, width / 2)))
@@ -74,7 +75,8 @@ def test_play_has_one_path_once_op_has_covered_it(op, width, where):
 
 
 def test_stick_slip_that_needs_more_than_half_of_the_range_moves():
-    """A valve that lets go at 0.9 of OP's amplitude beyond its middle still cycles: its start is not OP's middle."""
+    """A valve with a breakaway above OP's amplitude still moves, because its first position is not the middle
+    of OP."""
     op = np.sin(np.linspace(0, 20 * np.pi, 2001))
     law = StemLaw(*thresholds(1.2, 1.0))
     stem = walk(op, law, first_slip(op, law))
@@ -83,7 +85,8 @@ def test_stick_slip_that_needs_more_than_half_of_the_range_moves():
 
 
 def dry_stem(op: np.ndarray, static: float, kinetic: float) -> np.ndarray:
-    """A light stem on a spring with dry friction in fine steps: at rest below `static`, else towards `kinetic`."""
+    """A light stem on a spring with dry friction in small steps: at rest below `static`, otherwise towards
+    `kinetic`."""
     z, moving, out = 0.0, False, []
     for u in op:
         for _ in range(200):
@@ -98,7 +101,7 @@ def dry_stem(op: np.ndarray, static: float, kinetic: float) -> np.ndarray:
 
 
 def test_dry_friction_halts_with_op():
-    """Dry friction lets a stem go by J again after OP stood still, as HALTS does and SLIDES does not."""
+    """After a stop of OP, dry friction holds the stem until its next slip, as HALTS does and SLIDES does not."""
     op = np.concatenate([np.linspace(0, 3, 31), np.full(5, 3.0), np.linspace(3, 4, 11)[1:], np.full(3, 4.0)])
     breakaway, sliding = thresholds(2.0, 1.0)
     true = dry_stem(op, breakaway, sliding)
