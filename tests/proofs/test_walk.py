@@ -36,7 +36,7 @@ def test_a_cell_that_differs_is_reported() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "reported"),
     [
         ({}, 0),
         ({"action": "undecided", "kp_new": None}, 1),
@@ -53,7 +53,7 @@ def test_a_row_that_contradicts_itself_is_reported(change: dict[str, Any], repor
 @pytest.mark.skipif(
     os.environ.get("TRIAGE_WALK") != "all", reason="takes half an hour: TRIAGE_WALK=all runs it"
 )
-@pytest.mark.parametrize("asked", [MILL, *PLANTS.values()], ids=["mill", *PLANTS])
+@pytest.mark.parametrize("options", [MILL, *PLANTS.values()], ids=["mill", *PLANTS])
 def test_every_command_gives_one_answer(options: tuple[str, ...]) -> None:
     """`rank`, `tune` with and without the store, `explain` and its page report the same for each loop."""
     if not Path(options[0]).exists():
