@@ -1,1 +1,1 @@
-"""Proofs that are commands of their own; a fixed share of each runs as a test."""
+"""Proofs. Each proof is a command; the test suite runs a fixed share of each."""

@@ -1,9 +1,9 @@
 """Whether `run` and `explain` name one valve fault: python -m proofs.agreement FOLDER ... [--jobs 2]
 
-Folders of recordings as ../shared/recordings has them (an export a recording, loops.csv). Both commands are asked
-about each recording as a whole. Counted are the recordings on which either names play or stick-slip: on how many both
-name the same, on how many the other names another fault of the valve, on how many it names none. Writes
-proofs/agreement.md.
+The folders hold recordings as ../shared/recordings does (one export for each recording, and loops.csv). Both commands
+assess each recording as a whole. The table covers the recordings on which `run` or `explain` names backlash or
+stick-slip. It counts where both name the same fault, where the second names another valve fault, and where it names
+none. Writes proofs/agreement.md.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from proofs.common import command, command_line, publish
 
 FAULTS = ("stiction", "backlash")
 Row = tuple[str, str, str]
-"""Recording, what run names, what explain names."""
+"""Recording, fault named by `run`, fault named by `explain`."""
 
 
 def named_by_run(loop: PlantLoop) -> str:
-    """The valve's fault, or else the cause, as `run` has it."""
+    """The valve fault of `run`, or its cause where it names no valve fault."""
     try:
         verdict = api.assess(loop).verdict
     except NotAssessedError:
@@ -41,8 +41,8 @@ def named_by_explain(loop: PlantLoop) -> str:
         return "abstained"
 
 
-def asked(path: Path, loops: Path) -> Row:
-    """Both answers on one recording."""
+def answers(path: Path, loops: Path) -> Row:
+    """Both answers for one recording."""
     loop = api.read(path, loops=loops).loop(path.stem)
     return path.stem, named_by_run(loop), named_by_explain(loop)
 
@@ -53,7 +53,7 @@ def table(sets: dict[str, list[Row]]) -> str:
         "| recordings | either names a valve fault | the same | another | named by run alone | by explain alone |",
         "|---|---|---|---|---|---|",
     ]
-    apart: list[Row] = []
+    differing: list[Row] = []
     for name, rows in sets.items():
         either = [r for r in rows if r[1] in FAULTS or r[2] in FAULTS]
         kinds: Counter[str] = Counter()
@@ -64,19 +64,22 @@ def table(sets: dict[str, list[Row]]) -> str:
             ] += 1
         counts = (len(either), kinds["same"], kinds["other"], kinds["run"], kinds["explain"])
         lines.append(f"| {name} ({len(rows)}) | " + " | ".join(str(c) for c in counts) + " |")
-        apart += [r for r in either if r[1] != r[2]]
-    lines += ["", *(f"- {name}: run {by_run}, explain {by_explain}" for name, by_run, by_explain in apart)]
+        differing += [r for r in either if r[1] != r[2]]
+    lines += [
+        "",
+        *(f"- {name}: run {by_run}, explain {by_explain}" for name, by_run, by_explain in differing),
+    ]
     return "\n".join(lines)
 
 
 def main() -> None:
-    """Ask both about all recordings and write the table beside this file."""
+    """Run both commands on all recordings and write the table next to this file."""
     options = command_line(__doc__, folders="+", jobs=2)
     sets = {}
     with Pool(options.jobs) as pool:
         for folder in options.folders:
-            ask = partial(asked, loops=folder / "loops.csv")
-            sets[folder.name] = pool.map(ask, sorted(folder.glob("*.parquet")), chunksize=1)
+            answers_of = partial(answers, loops=folder / "loops.csv")
+            sets[folder.name] = pool.map(answers_of, sorted(folder.glob("*.parquet")), chunksize=1)
     text = table(sets)
     places = (f"../shared/recordings/{f.name}" for f in options.folders)
     publish(__file__, "What run and explain name", command(__file__, *places), text)

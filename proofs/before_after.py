@@ -1,8 +1,10 @@
-"""Proof: the report judges a change and not the load, on fresh loops with known truth.
+"""Proof: the report separates a change of the loop from a change of the load, on new loops with known truth.
 
-Two weeks of each loop of benchmarks/world about a change: a third really changed (retuned, repaired, tightened,
-slowed), a third changed in load, noise, set point or an outside sine alone, a third in nothing. Of the latter two
-half state settings that differ by 2 % in gain, half none. Truth is both loops simulated on both weeks' loads.
+It uses two weeks of each loop of benchmarks/world, one week before and one week after a change. In a third of the
+loops the loop itself changed (retuned, repaired, tightened, slowed). In a third only load, noise, set point or an
+external sine changed. In a third nothing changed. Half of the loops of the last two groups state settings with a gain
+that differs by 2 %; the other half state none. The truth comes from a simulation of both loops under the loads of
+both weeks.
 
     python -m proofs.before_after --loops 60 --seed 1
 """
@@ -39,18 +41,19 @@ WORDS = {
     Grade.INCOMPARABLE: "not comparable",
 }
 CLEAR, NONE = math.log(1.10), math.log(1.03)
-"""Logs of a true change from which it must be seen, and below which it must not; between them either is right."""
+"""Logarithms of the true change: from the first on the report must show a change, and below the second it must show
+none. Between them both answers are right."""
 FIGURES = {"average_absolute_error_pct": "average absolute error", "stem_travel_pct_per_h": "stem travel"}
 SEEDS = """\
-The rules were made on seeds 1 and 2 (115 of 120 right in the end, none blamed for the load). Seed 3 was fresh then: \
-55 of 60, 2 of 40 blamed; a repair inferred from noise and a gain of 2 % called better were corrected by it. Seeds 4 \
-(58 of 60, 0 of 40 blamed), 5 (57 of 60, 1 of 40: a cycle from outside was taken for a repair, and no longer is) and \
-6 were fresh after that."""
+The rules were set on seeds 1 and 2 (in the end 115 of 120 right, none blamed for the load). Seed 3 was new at that \
+time: 55 of 60 right, 2 of 40 blamed. It led to two corrections: a repair was inferred from noise, and a gain of 2 % \
+was called better. Seeds 4 to 6 were new after that. Seed 4 gave 58 of 60 and 0 of 40 blamed. Seed 5 gave 57 of 60 \
+and 1 of 40 blamed: an external oscillation was taken for a repair. This error is corrected."""
 Truth = Mapping[str, tuple[float, float]]
 
 
 def right_words(own: Sequence[float]) -> set[str]:
-    """The verdicts that are right of true changes of error and travel."""
+    """The verdicts that are right for the true changes of error and travel."""
     found = set()
     for least in (NONE, CLEAR):
         down, up = min(own) < -least, max(own) > least
@@ -59,7 +62,7 @@ def right_words(own: Sequence[float]) -> set[str]:
 
 
 def cases_of(loops: Sequence[Changed], folder: Path) -> dict[str, ChangeCase]:
-    """What the report makes of them, by loop."""
+    """The comparisons of the report, by loop."""
     at_s = START_US / 1e6 + DAYS * DAY_S
     files = export(folder, {c.drawn.name: recorded(c) for c in loops})
     changes = [_stated(c, at_s) for c in loops]
@@ -75,7 +78,7 @@ def _stated(c: Changed, at_s: float) -> TuningChange:
 
 
 def of_figure(case: ChangeCase, name: str) -> Change | None:
-    """The change of error, or of the stem's travel."""
+    """The change of the error, or of the stem travel."""
     column = "valve_travel_pct_per_h" if name.startswith("stem") else name
     return next((c for c in case.found.primary if c.measure.name == column), None)
 
@@ -83,25 +86,25 @@ def of_figure(case: ChangeCase, name: str) -> Change | None:
 def lines_of(
     loops: Sequence[Changed], cases: Mapping[str, ChangeCase], truths: Mapping[str, Truth]
 ) -> list[list[str]]:
-    """A row a loop: truth and what was said."""
+    """One row for each loop: truth and reported values."""
     rows = []
     for c in loops:
         true, case = truths[c.drawn.name], cases.get(c.drawn.name)
         cells = [c.drawn.name, f"{c.drawn.kind}, {c.what}"]
         for name in FIGURES:
             change = None if case is None else of_figure(case, name)
-            told = "–"
+            reported = "–"
             if change is not None and change.parts is not None:
                 low, high = change.parts.change.interval(NINETY)
-                told = f"{_pct(change.parts.change.value)} ({_pct(low)} … {_pct(high)})"
-            cells += [_pct(true[name][0]), _pct(true[name][1]), told]
-        said = "not comparable" if case is None else WORDS[grade(case.found)]
-        rows.append([*cells, said, "yes" if said in accepted(c, true) else "no"])
+                reported = f"{_pct(change.parts.change.value)} ({_pct(low)} … {_pct(high)})"
+            cells += [_pct(true[name][0]), _pct(true[name][1]), reported]
+        verdict = "not comparable" if case is None else WORDS[grade(case.found)]
+        rows.append([*cells, verdict, "yes" if verdict in accepted(c, true) else "no"])
     return rows
 
 
 def accepted(c: Changed, true: Truth) -> set[str]:
-    """The verdicts that are right of a loop."""
+    """The verdicts that are right for a loop."""
     found = right_words([true[name][0] for name in FIGURES])
     return found if c.what in CHANGES else {*found, "no change", "not comparable"}
 
@@ -113,7 +116,7 @@ def _pct(log_ratio: float) -> str:
 def held(
     loops: Sequence[Changed], cases: Mapping[str, ChangeCase], truths: Mapping[str, Truth]
 ) -> list[list[str]]:
-    """How often each figure's 90 % interval of the change's own part holds the truth, where settings changed."""
+    """How often the 90 % interval of the change's own part contains the truth, by figure, where settings changed."""
     rows = []
     for name, title in FIGURES.items():
         inside = []
@@ -130,12 +133,12 @@ def held(
 
 def main() -> None:
     """Draw, record, assess night by night, report, compare with the truth."""
-    asked = parser_of(__doc__, loops=60, seed=[1]).parse_args()
+    options = parser_of(__doc__, loops=60, seed=[1]).parse_args()
     loops, cases, truths = [], {}, {}
-    for seed in asked.seed:
+    for seed in options.seed:
         some = [
             replace(c, drawn=replace(c.drawn, name=f"S{seed}{c.drawn.name}"))
-            for c in changed(seed, asked.loops)
+            for c in changed(seed, options.loops)
         ]
         with tempfile.TemporaryDirectory() as folder:
             cases |= cases_of(some, Path(folder))
@@ -144,7 +147,7 @@ def main() -> None:
     publish(
         __file__,
         "Before and after: the change, and not the load",
-        command(__file__, loops=asked.loops, seed=asked.seed),
+        command(__file__, loops=options.loops, seed=options.seed),
         SEEDS,
         *result(loops, cases, truths),
     )
@@ -159,19 +162,19 @@ def result(
     for c, row in zip(loops, rows, strict=True):
         group = "changed" if c.what in CHANGES else "nothing" if c.what == NOTHING else "load alone"
         groups[group].update([row[-2], "loops", *(["right"] if row[-1] == "yes" else [])])
-    said = ("better", "worse", "traded", "no change", "not comparable")
-    counts = [(g, n["loops"], n["right"], *(n[word] for word in said)) for g, n in groups.items()]
+    verdict = ("better", "worse", "traded", "no change", "not comparable")
+    counts = [(g, n["loops"], n["right"], *(n[word] for word in verdict)) for g, n in groups.items()]
     right = sum(n["right"] for n in groups.values())
     others = [n for g, n in groups.items() if g != "changed"]
     blamed = sum(n["loops"] - n["right"] for n in others)
     share = f"Right: {right} of {len(loops)} ({right / len(loops):.2f}). Blamed or praised for the load: {blamed} of "
-    heads = "loop|what|error, own part|load's|told|stem travel, own part|load's|told|verdict|right"
+    heads = "loop|what|error, own part|load's|reported|stem travel, own part|load's|reported|verdict|right"
     return [
-        table(f"group|loops|right|{'|'.join(said)}", counts, True),
+        table(f"group|loops|right|{'|'.join(verdict)}", counts, True),
         f"{share}{sum(n['loops'] for n in others)}.",
         "90 % intervals of the change's own part, of loops whose settings or valve changed:",
         table("figure|hold the truth|share", held(loops, cases, truths), True),
-        "Parts in percent; told with the 90 % interval:",
+        "Parts in percent; reported with the 90 % interval:",
         table(heads, rows, True),
     ]
 

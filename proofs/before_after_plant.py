@@ -1,4 +1,4 @@
-"""Two weeks of loops of benchmarks/world about a change: truly changed, under another load, or nothing at all."""
+"""Two weeks of loops of benchmarks/world: between them the loop changes, or only its load, or nothing."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ NOTHING = "nothing"
 
 @dataclass(frozen=True)
 class World:
-    """What a week does to a loop: size [% OP] and corner [s] of its load, noise [% PV], set point moves a day, an
-    outside sine's size [% OP] and period [s]."""
+    """Inputs of the loop in one week: size [% OP] and corner [s] of its load, noise [% PV], set point moves a day,
+    size [% OP] and period [s] of an external sine."""
 
     size: float
     corner_s: float
@@ -32,8 +32,8 @@ class World:
 
 @dataclass(frozen=True)
 class Changed:
-    """A loop with its truth: what happened (CHANGES, LOADS or NOTHING), settings and valve afterwards, both weeks'
-    worlds, whether settings are stated with the change, samples are kept every so many seconds."""
+    """A loop with its truth: the event (of CHANGES, LOADS or NOTHING), settings and valve afterwards, and the inputs
+    of both weeks. `stated`: the settings are stated with the change; `every`: seconds between kept samples."""
 
     drawn: Drawn
     what: str
@@ -48,8 +48,8 @@ class Changed:
 
 
 def _settings_after(d: Drawn, what: str, rng: np.random.Generator) -> Controller:
-    """New settings of a kind: calmer for a tight loop, longer Ti behind friction, tighter or slower for a sound
-    one; of a load that changed, hardly other ones."""
+    """New settings by event: lower gain for a tight loop, longer Ti for a valve with friction, a higher or lower gain
+    for a loop without a fault. Where only the load changed, the gain changes by 2 %."""
     c = d.controller
     if what == "retuned":
         late = d.process.dead_s + 0.5 * d.process.second_s
@@ -80,7 +80,7 @@ def _world_after(d: Drawn, w: World, what: str) -> World:
 
 
 def _sequences(w: World, d: Drawn, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
-    """Load, noise and set point of a week, shape (n,) each; days differ by some 15 %."""
+    """Load, noise and set point of a week, shape (n,) each; the days differ by about 15 %."""
     n, h = DAYS * DAY_S, d.controller.scan_s
     strength = np.repeat(np.exp(0.15 * rng.standard_normal(DAYS)), DAY_S)
     load = w.size * strength * wander(rng, n, w.corner_s, h)
@@ -93,7 +93,7 @@ def _sequences(w: World, d: Drawn, rng: np.random.Generator) -> tuple[Floats, Fl
 
 
 def week(c: Changed, after: bool, new: bool) -> Trends:
-    """One week's load under the old or the new loop."""
+    """The old or the new loop under the load of one week."""
     d = c.drawn
     load, noise, sp = _sequences(
         c.after if after else c.before, d, np.random.default_rng([c.seed, int(after)])
@@ -103,21 +103,21 @@ def week(c: Changed, after: bool, new: bool) -> Trends:
 
 
 def recorded(c: Changed) -> Recording:
-    """Both weeks as a historian keeps them: the old loop, then the new one."""
+    """Both weeks as a historian records them: first the old loop, then the new one."""
     parts = [plain(week(c, after, after), c.every) for after in (False, True)]
     joined = {name: np.concatenate([p[name] for p in parts]) for name in ("sp", "pv", "op")}
     return {"stamp_s": np.arange(joined["pv"].size) * float(c.every), **joined}
 
 
 def _figures(t: Trends) -> tuple[float, float, float]:
-    """Average absolute error [%], stem travel and OP travel beyond the store's deadband on its grid [%/h]."""
+    """Average absolute error [%], stem travel, and OP travel beyond the deadband of the store on its grid [%/h]."""
     hours = t.pv.size * t.scan_s / 3600.0
     moved = (float(np.abs(np.diff(_held(x[::10]))).sum()) / hours for x in (t.stem, t.op))
     return (float(np.mean(np.abs(t.sp - t.pv))), *moved)
 
 
 def _held(x: Floats, band: float = 0.1) -> Floats:
-    """A pointer in a slot of a band's width that a signal pushes along, shape of x."""
+    """Output of a backlash of width `band` for the input x, shape of x."""
     out, at = np.empty(x.size), x[0]
     for k, value in enumerate(x.tolist()):
         at = min(max(at, value - 0.5 * band), value + 0.5 * band)
@@ -126,8 +126,8 @@ def _held(x: Floats, band: float = 0.1) -> Floats:
 
 
 def truth(c: Changed) -> dict[str, tuple[float, float]]:
-    """The change's own part and the load's of each figure, as logarithms of ratios: the mean over both weeks' loads,
-    and over both loops."""
+    """Each figure's change by the loop itself and by the load, as logarithms of ratios: means over the loads of both
+    weeks and over both loops."""
     of = {
         (a, n): np.log(np.maximum(_figures(week(c, a, n)), 1e-3))
         for a in (False, True)
@@ -150,7 +150,7 @@ def _kind_for(what: str, k: int) -> str:
 
 
 def changed(seed: int, loops: int) -> list[Changed]:
-    """So many loops, a third each of CHANGES, LOADS and NOTHING in turn."""
+    """`loops` loops, in turn of CHANGES, LOADS and NOTHING, a third each."""
     found, tried = [], 0
     for k in range(loops):
         group, turn = k % 3, k // 3

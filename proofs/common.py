@@ -1,4 +1,4 @@
-"""What proofs and benchmarks do beside their own question: ask their options, and write a page beside themselves."""
+"""What all proofs and benchmarks share: the options of a command, and the page that it writes next to its module."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from typing import Any
 
 
 def parser_of(about: str | None, **defaults: Any) -> argparse.ArgumentParser:
-    """Options of a command, one a default: a list takes several values, False is a flag; `folders` are places."""
+    """Options of a command, one for each default: a list takes several values, False is a flag; `folders` are
+    paths."""
     made = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name, default in defaults.items():
         if name == "folders":
@@ -27,7 +28,7 @@ def parser_of(about: str | None, **defaults: Any) -> argparse.ArgumentParser:
 
 
 def command_line(about: str | None, **defaults: Any) -> argparse.Namespace:
-    """What the command line asks."""
+    """The options of the command line."""
     return parser_of(about, **defaults).parse_args()
 
 
@@ -42,25 +43,27 @@ def command(file: str, *places: str, **options: Any) -> str:
 
 
 def table(heads: str, rows: Iterable[Iterable[object]], numbers: bool = False) -> str:
-    """A Markdown table of heads parted by `|`; all columns but the first are set to the right for numbers."""
+    """A Markdown table of heads separated by `|`; numbers: all columns but the first are right-aligned."""
     columns = heads.count("|") + 1
     rule = "|---" + ("|--:" if numbers else "|---") * (columns - 1) + "|"
     return "\n".join([f"| {heads} |", rule, *(f"| {' | '.join(map(str, cells))} |" for cells in rows)])
 
 
 def _commit() -> list[str]:
-    """The sentence that names the commit of the code, none where git or its history is missing."""
-    asked = ["git", "describe", "--always", "--dirty=, changed since"]
+    """The sentence that names the commit of the code; empty where git or its history is missing."""
+    arguments = ["git", "describe", "--always", "--dirty=, changed since"]
     try:
-        found = subprocess.run(asked, cwd=Path(__file__).parent, capture_output=True, text=True, check=True)
+        found = subprocess.run(
+            arguments, cwd=Path(__file__).parent, capture_output=True, text=True, check=True
+        )
     except (OSError, subprocess.CalledProcessError):
         return []
     return [f"Measured with the code of commit {found.stdout.strip()}."]
 
 
 def publish(file: str | Path, title: str, *parts: str) -> None:
-    """Write a page of these paragraphs beside the proof (or to a file of another name), and print it; it says of
-    which commit it is, where git knows."""
+    """Write a page of these paragraphs next to the proof, or to a file of another name, and print it. The page names
+    the commit of the code where git is available."""
     text = "\n\n".join([f"# {title}", *_commit(), *(p.rstrip() for p in parts)]) + "\n"
     Path(file).with_suffix(".md").write_text(text, encoding="utf-8")
     print(text)

@@ -1,8 +1,9 @@
-"""Are controllers as plants have them called wrongly stated? python -m proofs.controllers [--seed 1 2] [--days 3]
+"""Are stated settings reported as wrong for typical controllers? python -m proofs.controllers [--seed 1 2] [--days 3]
 
-Fifteen controllers (proofs/controllers_plant.py, which shares no code with the package) with a healthy valve, a worn
-one and set point moves, at 1 and 10 s. Of each the settings are stated as they are, with and without what else the
-controller has, in the usual wrong ways, and not at all. Writes controllers.md here.
+Fifteen controllers (proofs/controllers_plant.py, which shares no code with the package) are simulated with a valve
+without a fault, a worn valve, and set point moves, and recorded at 1 and 10 s. The settings of each are stated in
+four ways: correctly, correctly with the controller's other features, with the usual mistakes, and not at all. Writes
+controllers.md here.
 """
 
 from __future__ import annotations
@@ -41,14 +42,14 @@ LOOKED_FOR = {
     "op_hi_limit": "op_hi",
     "sp_weight": "sp_weight",
 }
-"""Extras that are recognized, and their names in a controller."""
+"""Features that the package recognizes, and their names in a controller."""
 WITHIN = {1: 0.10, 10: 0.25}
-"""How far recorded settings may be off by the seconds between samples [-]."""
+"""Permitted error of the recorded settings [-], by the seconds between samples."""
 Row = Mapping[str, Any]
 
 
 def mistaken(row: Row, what: str) -> dict[str, Any] | None:
-    """The row with one mistake; None where that changes nothing, or little."""
+    """The row with one mistake; None where the mistake changes little or nothing."""
     if not row["kp"]:
         return None
     if what in MISTAKES[:2] and row["ti"]:
@@ -71,10 +72,15 @@ def rows_of(c: Controlled) -> dict[str, Row]:
 
 @dataclass(slots=True)
 class Judged:
-    """What is told of one recording: of each way to state it whether it is told as wrong, whether the slip is named,
-    and how far gain and integral time told are from the true ones [-]; whether what the controller has beside is
-    recognized, None where it has none that is looked for; whether something is that it has not; and how far recorded
-    settings are off where none are stated, None where none are told."""
+    """The result for one recording.
+
+    ways: for each way to state the settings: whether they are reported as wrong, whether the mistake is named,
+        and the errors of the reported gain and integral time [-].
+    recognized: whether the other features of the controller are recognized; None where it has no recognizable
+        one.
+    invented: whether a feature is reported that the controller does not have.
+    alone: the errors of the settings reported where none are stated [-]; None where none are reported.
+    """
 
     ways: list[tuple[str, bool, bool, tuple[float, float] | None]] = field(default_factory=list)
     recognized: bool | None = None
@@ -83,14 +89,14 @@ class Judged:
 
 
 def _spec(folder: Path, row: Row) -> tuple[LoopSpec, Export]:
-    """The loop as it is stated, and its export."""
+    """The loop as stated, and its export."""
     pd.DataFrame([{"loop": "L", **row}]).to_csv(folder / "loops.csv", index=False)
     export = open_export([folder / "trends"])
     return match(read_loops(folder / "loops.csv"), export.tags)[0][0], export
 
 
 def judged(c: Controlled, every: int) -> Judged:
-    """What is told of a recording of one sample every so many seconds."""
+    """The result for a recording with one sample every `every` seconds."""
     config, out = Config(), Judged()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -108,26 +114,28 @@ def judged(c: Controlled, every: int) -> Judged:
             off = None if seen.other is None else _off(seen.other, c.ideal)
             out.ways.append((what, seen.other is not None, named, off))
             if what == TRUE:
-                out.recognized, out.invented = _beside(stated, seen.beside, c.extras)
+                out.recognized, out.invented = _features(stated, seen.beside, c.extras)
         alone = shown(p.record, None, time_scale(p.record, cycle, None), config.settings).beside
         out.alone = None if alone is None else _off(alone, c.ideal)
     return out
 
 
-def _beside(stated: Pid, seen: Pid | None, extras: Row) -> tuple[bool | None, bool]:
-    """Whether an extra is recognized, None where the controller has none, and whether one is told that it has not."""
+def _features(stated: Pid, seen: Pid | None, extras: Row) -> tuple[bool | None, bool]:
+    """Whether the features are recognized, None where the controller has none; and whether one is reported that it
+    does not have."""
     seen = seen or stated
-    told = {name for name, of in LOOKED_FOR.items() if getattr(seen, of) != getattr(stated, of)}
+    reported = {name for name, of in LOOKED_FOR.items() if getattr(seen, of) != getattr(stated, of)}
     true = {name: value for name, value in extras.items() if name in LOOKED_FOR}
     right = [
-        name in told and (value == "squared" or abs(getattr(seen, LOOKED_FOR[name]) - value) <= 0.25 * value)
+        name in reported
+        and (value == "squared" or abs(getattr(seen, LOOKED_FOR[name]) - value) <= 0.25 * value)
         for name, value in true.items()
     ]
-    return (all(right) if right else None), bool(told - set(true))
+    return (all(right) if right else None), bool(reported - set(true))
 
 
 def _off(found: Pid, ideal: tuple[float, float, float]) -> tuple[float, float]:
-    """How far a gain and an integral time are from the true ones [-]."""
+    """Relative errors of a gain and an integral time [-]."""
     kp, ti, _ = ideal
     if not kp or not found.kp:
         return math.nan, math.nan
@@ -136,50 +144,55 @@ def _off(found: Pid, ideal: tuple[float, float, float]) -> tuple[float, float]:
 
 def main() -> None:
     """Judge all loops of some seeds and write the tables."""
-    asked = command_line(__doc__, seed=[1], days=3.0)
+    options = command_line(__doc__, seed=[1], days=3.0)
     of: dict[tuple[str, int], list[Judged]] = defaultdict(list)
     for form in FORMS:
-        for seed in asked.seed:
+        for seed in options.seed:
             for scene in SCENES:
-                c = controlled(form, scene, seed, asked.days)
+                c = controlled(form, scene, seed, options.days)
                 for every in (1, 10):
                     of[form, every].append(judged(c, every))
         print(form, flush=True)
     columns = [(w, e) for w in (TRUE, WITH_EXTRAS, *MISTAKES) for e in (1, 10)]
     heads = "controller | " + " | ".join(f"{w}, {e} s" for w, e in columns)
-    tellable = [(f, e) for f, e in of if (f, e) != ("fast PI", 10)]
-    rows = [[f, *(_told([of[f, e]], w) for w, e in columns)] for f in FORMS]
+    identifiable = [(f, e) for f, e in of if (f, e) != ("fast PI", 10)]
+    rows = [[f, *(_reported([of[f, e]], w) for w, e in columns)] for f in FORMS]
     rows.append(
         [
             "all but fast PI at 10 s",
-            *(_told([of[f, e] for f, e in tellable if e == x], w) for w, x in columns),
+            *(_reported([of[f, e] for f, e in identifiable if e == x], w) for w, x in columns),
         ]
     )
-    rows.append(["slip named", *(_told([of[f, e] for f, e in tellable if e == x], w, 2) for w, x in columns)])
-    off = [x for f, e in tellable for j in of[f, e] for *_, x in j.ways[2:] if x is not None]
+    rows.append(
+        ["slip named", *(_reported([of[f, e] for f, e in identifiable if e == x], w, 2) for w, x in columns)]
+    )
+    off = [x for f, e in identifiable for j in of[f, e] for *_, x in j.ways[2:] if x is not None]
     publish(
         __file__,
-        "Are controllers as plants have them called wrongly stated?",
-        command(__file__, seed=asked.seed, days=asked.days),
-        "Loops of which the stated settings are told as not the controller's. Stated as they are, each one is a "
-        "false complaint; in the other columns each one is right. A fast PI (integral time of 3 to 10 s) at 10 s is "
-        "a control: nothing is to be told of it. A gain schedule is stated by its gain below an OP of 50 %. A series "
-        "law with a Td of a tenth of its Ti is an ideal one within 10 %: samples slower than the scan do not tell.",
+        "Are stated settings reported as wrong for typical controllers?",
+        command(__file__, seed=options.seed, days=options.days),
+        "Loops whose stated settings are reported as not those of the controller. Where the settings are stated as "
+        "they are, each report is a false alarm; in the other columns each report is right. A fast PI (integral time "
+        "of 3 to 10 s) at 10 s is a control case: no report is right for it. A gain schedule is stated by its gain "
+        "below an OP of 50 %. A series form with a Td of a tenth of its Ti is within 10 % of an ideal one: samples "
+        "slower than the scan cannot distinguish them.",
         table(heads, rows),
-        f"Where wrong settings are told, how far gain and integral time told beside them are from the true ones, as "
-        f"median and 90 % quantile: {_quantiles(off)}.",
-        "What the controller has beside, recognized within 25 % where its settings are stated as they are and it is "
-        "not; how often something is that it has not; and how often settings that are not stated at all, told from "
-        "a law that explains more than 90 % of OP's increments, are within 10 % at 1 s and 25 % at 10 s:",
+        f"A report of wrong settings also gives gain and integral time. Their errors, as median and 90 % quantile: "
+        f"{_quantiles(off)}.",
+        "The next table shows how often a feature of the controller that is not stated is recognized within 25 %, "
+        "where its settings are stated as they are. It shows how often a feature is reported that the controller "
+        "does not have. The last columns are for settings that are not stated at all. These are reported where the "
+        "control law explains more than 90 % of OP's increments; right is within 10 % at 1 s and 25 % at 10 s:",
         table(
-            "controller | " + " | ".join(f"{w}, {e} s" for w in BESIDE for e in (1, 10)),
-            [[f, *(cell(of[f, e], e) for cell in BESIDE.values() for e in (1, 10))] for f in FORMS],
+            "controller | " + " | ".join(f"{w}, {e} s" for w in FEATURES for e in (1, 10)),
+            [[f, *(cell(of[f, e], e) for cell in FEATURES.values() for e in (1, 10))] for f in FORMS],
         ),
     )
 
 
-def _told(of: list[list[Judged]], what: str, place: int = 1) -> str:
-    """In how many of all recordings a way to state them is told as wrong, or its slip named (place 2)."""
+def _reported(of: list[list[Judged]], what: str, place: int = 1) -> str:
+    """In how many of all recordings a way to state the settings is reported as wrong, or its mistake named (place
+    2)."""
     each = [bool(way[place]) for judged in of for j in judged for way in j.ways if way[0] == what]
     return f"{sum(each)} of {len(each)}" if each and (place == 1 or what in MISTAKES) else ""
 
@@ -198,7 +211,7 @@ def _alone(of: list[Judged], every: int) -> str:
     return f"{sum(x <= WITHIN[every] for x in each)} of {len(each)}" if each else "none told"
 
 
-BESIDE = {"recognized": _recognized, "not there": _invented, "recorded settings right": _alone}
+FEATURES = {"recognized": _recognized, "not there": _invented, "recorded settings right": _alone}
 
 
 def _quantiles(off: list[tuple[float, float]]) -> str:

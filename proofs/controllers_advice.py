@@ -1,9 +1,9 @@
-"""Does advice hold for controllers as plants have them? python -m proofs.controllers_advice [--seed 1 2] [--days 1]
+"""Does advice hold for typical controllers? python -m proofs.controllers_advice [--seed 1 2] [--days 1]
 
-Loops of proofs/controllers_plant.py with a gap, limits of OP and of its rate, a filter of PV or a slow scan, of which
-gain and integral time alone are stated, and with a gain schedule that is stated too: worn, tuned too tight, and
-unstable. What is advised is typed into the same controller on the same plant under the same load. Writes
-controllers_advice.md here.
+The loops are from proofs/controllers_plant.py. Some have a gap, limits of OP and of its rate, a filter of PV or a
+slow scan, and state only gain and integral time. Others have a gain schedule, which is stated too. Each is worn,
+tuned too tight, or unstable. The advised settings are set in the same controller on the same plant under the same
+load. Writes controllers_advice.md here.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from proofs.common import command, command_line, publish, table
 from proofs.controllers_plant import Controlled, controlled
 
 STATED = ("gain schedule", "P only", "integral only")
-"""Controllers of which all is stated."""
-ASKED = ("gap", "limit of OP", "limit of OP's rate", "PV filter", "slow scan", *STATED)
+"""Controllers that are stated completely."""
+TESTED = ("gap", "limit of OP", "limit of OP's rate", "PV filter", "slow scan", *STATED)
 CASES = {"worn": ("worn", 1.5), "too tight": ("healthy", 3.0), "unstable": ("healthy", 5.0)}
-"""Scene, and times the usual gain."""
+"""Scene, and factor on the usual gain."""
 
 
 def advised(c: Controlled, every: int) -> tuple[float, float] | None:
-    """Gain and integral time that are advised, None where none are."""
+    """Advised gain and integral time; None where there is no advice."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "trends").mkdir()
@@ -49,31 +49,32 @@ def error(c: Controlled) -> float:
 
 
 def main() -> None:
-    """Type in what is advised, and tabulate what the error does."""
-    asked = command_line(__doc__, seed=[1], days=1.0)
+    """Set the advised settings, and tabulate the change of the error."""
+    options = command_line(__doc__, seed=[1], days=1.0)
     rows = []
-    for form in ASKED:
+    for form in TESTED:
         for case, (scene, tight) in CASES.items():
             ratios = []
-            for seed in asked.seed:
-                before = controlled(form, scene, seed, asked.days, tight)
+            for seed in options.seed:
+                before = controlled(form, scene, seed, options.days, tight)
                 for every in (1, 10):
                     typed = advised(before, every)
                     if typed is not None:
-                        after = controlled(form, scene, seed, asked.days, tight, typed)
+                        after = controlled(form, scene, seed, options.days, tight, typed)
                         ratios.append(error(after) / error(before))
             change = (
                 [f"{100 * (x - 1):+.0f}" for x in (np.median(ratios), max(ratios))] if ratios else ["", ""]
             )
-            rows.append((form, case, 2 * len(asked.seed), len(ratios), *change, sum(x > 1.1 for x in ratios)))
+            rows.append(
+                (form, case, 2 * len(options.seed), len(ratios), *change, sum(x > 1.1 for x in ratios))
+            )
             print(*rows[-1], flush=True)
     publish(
         __file__,
-        "Does advice hold for controllers as plants have them?",
-        command(__file__, seed=asked.seed, days=asked.days),
-        "Loops of which gain and integral time are stated and nothing else, but for a gain schedule, which is stated "
-        "too; recorded every 1 and 10 s. New settings "
-        "are typed into the same controller on the same plant under the same load.",
+        "Does advice hold for typical controllers?",
+        command(__file__, seed=options.seed, days=options.days),
+        "Of these loops only gain and integral time are stated; a gain schedule is stated too. They are recorded "
+        "every 1 and 10 s. New settings are set in the same controller on the same plant under the same load.",
         table(
             "controller | case | recordings | new settings | error, median % | error, worst % | over 10 %",
             rows,

@@ -1,8 +1,8 @@
-"""Three days of loops under controllers as plants have them, simulated with no code of the package.
+"""Three days of loops with typical plant controllers, simulated without code of the package.
 
-Fifteen controllers, in position form with an integral that stops or tracks at a limit, before a lag with dead time
-under a load that walks and steps; the valve is healthy or has play, the set point rests or steps. Recorded at every
-second or at every tenth.
+There are fifteen controllers in position form. Their integral stops or tracks at a limit. The process is a lag with
+dead time under a load that wanders and steps. The valve has no fault or has backlash; the set point is constant or
+steps. The loops are recorded every second or every tenth second.
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ SCAN_S, DAY_S = 1.0, 86_400
 
 @dataclass(frozen=True, slots=True)
 class Controlled:
-    """One loop: SP, PV and OP at every second, its row of loops.csv stated truly, and what a list may leave out."""
+    """One loop: SP, PV and OP at every second, its row of loops.csv with the true settings, and the features that a
+    list may omit."""
 
     form: str
     scene: str
@@ -50,7 +51,7 @@ class Controlled:
     """Kp [%/%], Ti and Td [s] of the ideal form."""
 
     def trends(self, tag: str, every: int) -> pd.DataFrame:
-        """The recording of one sample every so many seconds."""
+        """The recording with one sample every `every` seconds."""
         time = pd.Timestamp("2026-03-02", tz="UTC") + pd.to_timedelta(
             np.arange(0, self.sp.size, every), unit="s"
         )
@@ -60,7 +61,7 @@ class Controlled:
 
 @njit(cache=True)
 def _run(sp, load, noise, plant, gains, extras, limits, out):  # type: ignore[no-untyped-def]
-    """Fill PV and OP, shape (2, n), scan by scan of one second."""
+    """Fill PV and OP, shape (2, n), one scan of a second after the other."""
     gain, lag, dead, play = plant
     kp, ki, kd, slope_lag = gains
     filter_s, gap, squared, weight, hold, upper = extras
@@ -101,7 +102,7 @@ def _run(sp, load, noise, plant, gains, extras, limits, out):  # type: ignore[no
 
 
 def _walk(rng: np.random.Generator, n: int, size: float, memory_s: float) -> np.ndarray:
-    """A load that wanders about 0 and now and then steps [% PV]."""
+    """A load that wanders about 0 with occasional steps [% PV]."""
     pole = math.exp(-1.0 / memory_s)
     drive = rng.standard_normal(n) * size * math.sqrt(1 - pole * pole)
     walk = np.empty(n)
@@ -124,9 +125,11 @@ def _lag(drive, pole, out):  # type: ignore[no-untyped-def]
 
 @dataclass
 class _Law:
-    """A controller as it is simulated and as loops.csv states it: gains kp, ki, kd; filter of PV [s], gap, squared,
-    set point weight, scan [s], gain above an OP of 50 %; highest OP and its rate; the row, what it leaves out, and
-    the settings of the ideal form."""
+    """A controller as simulated and as stated in loops.csv.
+
+    gains kp, ki, kd; filter of PV [s], gap, squared, set point weight, scan [s], gain above an OP of 50 %;
+    highest OP and its rate; the row, the features that it omits, and the settings of the ideal form.
+    """
 
     kp: float
     ki: float
@@ -158,7 +161,7 @@ def _with_derivative(law: _Law, form: str, settings: tuple[float, float, float],
 def _with_form(
     law: _Law, form: str, plant: Plant, load: np.ndarray, rng: np.random.Generator, tight: float
 ) -> None:
-    """What a form has beside gain and integral time."""
+    """The features of a form in addition to gain and integral time."""
     gain, lag, dead = plant
     kp, ti, _ = law.ideal
     match form:
@@ -201,7 +204,7 @@ Plant = tuple[float, float, float]
 
 
 def _drawn(rng: np.random.Generator, form: str, tight: float) -> tuple[Plant, tuple[float, float, float]]:
-    """A plant, and gain, integral and derivative time of its controller."""
+    """A plant, with gain, integral time and derivative time of its controller."""
     gain, lag, dead = rng.uniform(0.7, 2.0), 10 ** rng.uniform(1.7, 2.7), 10 ** rng.uniform(0.7, 1.5)
     aim = dead * rng.uniform(1.2, 3.0)
     kp = tight * min(lag / (gain * (aim + dead)), 12.0)
@@ -231,8 +234,8 @@ def controlled(
     tight: float = 1.0,
     typed: tuple[float, float] | None = None,
 ) -> Controlled:
-    """One loop of a form in a scene, with so many times the gain; with other gain and integral time typed into the
-    controller under the same load, where they are given."""
+    """One loop of a form in a scene, with `tight` times the gain. Where other settings are given, the controller uses
+    their gain and integral time under the same load."""
     rng = np.random.default_rng([seed, FORMS.index(form), SCENES.index(scene)])
     n = int(days * DAY_S)
     plant, settings = _drawn(rng, form, tight)

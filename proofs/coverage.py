@@ -1,9 +1,9 @@
-"""Do the 90 % intervals hold the truth? python -m proofs.coverage [--loops 240] [--seed 1] [--jobs 2]
+"""Do the 90 % intervals contain the truth? python -m proofs.coverage [--loops 240] [--seed 1] [--jobs 2]
 
-Loops of four types, made by proofs/concealed (physics that shares no code with identification: fine steps, a third
-lag, dry friction with a stem's mass, imperfect controllers, rounding historians), go through the nightly assessment.
-A third has play and cycles, a third sticks and cycles, a third is sound and follows set point moves under load.
-Counted is how often the interval told holds the true value. Writes coverage.md here.
+Loops of four types from proofs/concealed go through the nightly assessment. Their physics shares no code with
+identification: fine steps, a third lag, dry friction with stem mass, imperfect controllers, historians that round. A
+third has backlash and cycles, a third has stick-slip and cycles, a third has no fault and follows set point moves
+under load. The table counts how often the reported interval contains the true value. Writes coverage.md here.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ ATTEMPTS = 40
 
 @dataclass(frozen=True)
 class Made:
-    """A loop, what it did, and its true constants by the names of the estimates."""
+    """A loop, its recording, and its true constants by the names of the estimates."""
 
     family: str
     kind: str
@@ -46,7 +46,7 @@ class Made:
 
 @dataclass(frozen=True)
 class Held:
-    """One interval: whether it holds the truth, and the relative error of its middle."""
+    """One interval: whether it contains the truth, and the relative error of its midpoint."""
 
     family: str
     name: str
@@ -55,7 +55,7 @@ class Held:
 
 
 def controller(rng: Rng, p: Plant, family: str, scan: float) -> Pi:
-    """A PI by internal-model rules; of valve loops with the integral time too short, as those that cycle have it."""
+    """A PI by internal model control; valve loops have a shorter integral time, with which they cycle."""
     wish = rng.uniform(1.0, 2.5) * (p.L + scan)
     kp = p.T / (p.K * (wish + p.L))
     if p.leak == 0.0:
@@ -65,7 +65,7 @@ def controller(rng: Rng, p: Plant, family: str, scan: float) -> Pi:
 
 
 def loop(rng: Rng, family: str) -> tuple[str, Plant]:
-    """A plant of a random type; levels integrate where their valve is at fault."""
+    """A plant of a random type; a level is integrating where its valve has a fault."""
     kind = str(rng.choice(list(KINDS)))
     plant = draw_plant(rng, kind)
     if family == FAMILIES[2]:
@@ -79,7 +79,7 @@ def loop(rng: Rng, family: str) -> tuple[str, Plant]:
 
 
 def drive(rng: Rng, n: int, p: Plant, scan: float, family: str, settle: float) -> Drive:
-    """Load, noise and, of sound loops, set point moves."""
+    """Load, noise and, for loops without a fault, set point moves."""
     zero = np.zeros(n)
     moves = family == FAMILIES[2]
     sp = setpoints(rng, n, p.y0, settle, 7.0, 0.0) if moves else zero + p.y0
@@ -89,7 +89,7 @@ def drive(rng: Rng, n: int, p: Plant, scan: float, family: str, settle: float) -
 
 
 def made(family: str, seed: int) -> Made:
-    """One loop of a family, drawn anew until, where its valve is at fault, it cycles within OP's range."""
+    """One loop of a family. A loop with a valve fault is drawn again until it cycles within the range of OP."""
     for attempt in range(ATTEMPTS):
         rng = np.random.default_rng([seed, attempt, FAMILIES.index(family)])
         kind, plant = loop(rng, family)
@@ -106,7 +106,7 @@ def made(family: str, seed: int) -> Made:
 
 
 def cycles(trends: Floats, p: Plant) -> bool:
-    """Whether PV has left the set point for good and OP stays within its range."""
+    """Whether PV keeps moving off the set point and OP stays within its range."""
     late = trends[:, SAMPLES // 2 :]
     width = p.gap + p.static + p.sliding
     return bool(
@@ -127,7 +127,7 @@ def truth_of(p: Plant, family: str) -> dict[str, float]:
 
 
 def assessed(m: Made) -> Assessment:
-    """The loop as the nightly batch sees it."""
+    """The loop as the nightly batch assesses it."""
     stamp = START_S + m.scan_s * np.arange(SAMPLES)
     found = {f"L.{role}": series(stamp, x) for role, x in zip(("SP", "PV", "OP"), m.trends, strict=True)}
     pid = Pid(m.pi.kp, m.pi.ti, scan_s=m.scan_s)
@@ -135,32 +135,32 @@ def assessed(m: Made) -> Assessment:
 
 
 def held(case: tuple[str, int]) -> list[Held] | str:
-    """Every interval told for one loop, or the verdict under which none of this family is told."""
+    """Every interval reported for one loop, or the verdict under which this family has no intervals."""
     family, seed = case
     m = made(family, seed)
     try:
         verdict = assessed(m).verdict
     except NotAssessedError:
         return "not assessed"
-    told = f"{verdict.cause}, {verdict.fault}"
+    reported = f"{verdict.cause}, {verdict.fault}"
     wanted = {FAMILIES[0]: "valve, backlash", FAMILIES[1]: "valve, stiction", FAMILIES[2]: "none, none"}[
         family
     ]
-    if told != wanted or verdict.measured is None:
-        return told
+    if reported != wanted or verdict.measured is None:
+        return reported
     found = intervals(verdict.fit, family != FAMILIES[2], AdviceLimits(), verdict.measured.controller)
     return [compared(family, name, found[name], true) for name, true in m.truth.items() if name in found]
 
 
 def compared(family: str, name: str, e: Estimate, true: float) -> Held:
-    """One interval beside the truth."""
+    """One interval compared with the truth."""
     return Held(family, name, bool(e.low <= true <= e.high), abs(e.value / true - 1.0))
 
 
 def table(results: Sequence[list[Held] | str], cases: Sequence[tuple[str, int]]) -> str:
-    """Coverage and errors by family and constant, and what else was said."""
+    """Coverage and errors by family and constant, and the other verdicts."""
     every = [h for r in results if not isinstance(r, str) for h in r]
-    lines = ["| loops | constant | intervals | hold the truth | median error |", "|---|---|---|---|---|"]
+    lines = ["| loops | constant | intervals | contain the truth | median error |", "|---|---|---|---|---|"]
     for family in FAMILIES:
         for name in dict.fromkeys(h.name for h in every if h.family == family):
             mine = [h for h in every if (h.family, h.name) == (family, name)]
@@ -183,14 +183,14 @@ def row(family: str, name: str, mine: Sequence[Held]) -> str:
 
 
 def main() -> None:
-    """Make and judge all loops, write the table beside this file."""
+    """Simulate and assess all loops, write the table next to this file."""
     options = command_line(__doc__, loops=240, seed=1, jobs=2)
     each = math.ceil(options.loops / len(FAMILIES))
     cases = [(family, options.seed * 100_000 + k) for family in FAMILIES for k in range(each)]
     with get_context("spawn").Pool(options.jobs) as pool:
         results = pool.map(held, cases, chunksize=4)
     shown = f"{command(__file__, loops=options.loops, seed=options.seed)}; intervals are of 90 %."
-    publish(__file__, "Do intervals hold the truth?", shown, table(results, cases))
+    publish(__file__, "Do intervals contain the truth?", shown, table(results, cases))
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
 """Which of two loops moves first, by lag and by Granger causality: python -m proofs.direction [--plants 30]
 
-Pairs of a source and a follower that shows, of coupled plants (proofs/coupled). Granger's test (statsmodels) asks
-whether the past of one error helps to foresee the other, both at twelve samples a period and with lags of one period;
-it is read by which way has the larger F. The lag is that of the plant-wide pass. Writes proofs/direction.md.
+The pairs are a source and a follower that shows the oscillation, of coupled plants (proofs/coupled). Granger's test
+(statsmodels) measures whether the past of one error improves the prediction of the other. The errors have twelve
+samples a period, and the test has lags of one period; the direction with the larger F is the answer. The lag is that
+of the plant-wide pass. Writes proofs/direction.md.
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ from proofs.common import command, command_line, publish, table
 from proofs.coupled.draw import draw
 
 A_PERIOD = 12
-"""Samples a period that Granger's test is given."""
+"""Samples a period for Granger's test."""
 SHOWS = 1.25
 
 
 def granger(cause: np.ndarray, effect: np.ndarray) -> float:
-    """F of one error's past in foreseeing another."""
+    """F of Granger's test: whether the past of one error predicts the other."""
     with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         found = grangercausalitytests(np.column_stack((effect, cause)), [A_PERIOD])
@@ -33,13 +34,13 @@ def granger(cause: np.ndarray, effect: np.ndarray) -> float:
 
 
 def thinned(x: np.ndarray, samples: float) -> np.ndarray:
-    """Means of so many samples."""
+    """Means of `samples` samples."""
     edges = np.arange(0, x.size, max(samples, 1.0)).astype(int)
     return np.add.reduceat(x, edges) / np.diff(np.append(edges, x.size))
 
 
 def lead(one: np.ndarray, other: np.ndarray, dt_s: float, period_s: float) -> Delay:
-    """Lag of a second error behind a first one."""
+    """Lag of the second error after the first."""
     x, y = spectrum(one, dt_s), spectrum(other, dt_s)
     low, high, _ = band(x.duration_s / period_s)
     cut = slice(low - 1, high - 1)
@@ -47,7 +48,7 @@ def lead(one: np.ndarray, other: np.ndarray, dt_s: float, period_s: float) -> De
 
 
 def main() -> None:
-    """Draw, ask both, count."""
+    """Draw the plants, apply both methods, count."""
     options = command_line(__doc__, plants=30, seed=3000)
     by_granger, by_lag, sure = [], [], []
     for seed in range(options.seed, options.seed + options.plants):
@@ -66,14 +67,14 @@ def main() -> None:
             found = lead(a, b, drawn.step_s, period)
             by_lag.append(found.lag_s > 0)
             sure.append(abs(found.lag_s) > 2 * found.deviation_s)
-    told = np.array(sure)
+    significant = np.array(sure)
     right = {
         f"Granger's F, {A_PERIOD} samples a period": by_granger,
         "sign of the lag": by_lag,
-        f"… of the {told.sum()} that are over two deviations": np.array(by_lag)[told],
+        f"… of the {significant.sum()} that exceed two deviations": np.array(by_lag)[significant],
     }
     rows = ((way, f"{100 * np.mean(found):.0f} %") for way, found in right.items())
-    shown = f"{command(__file__, plants=options.plants, seed=options.seed)}: {told.size} pairs."
+    shown = f"{command(__file__, plants=options.plants, seed=options.seed)}: {significant.size} pairs."
     publish(__file__, "Who moves first", shown, table("who is first, by | right", rows, numbers=True))
 
 
