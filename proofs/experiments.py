@@ -1,11 +1,11 @@
-"""What is explained of experiments in open loop: plants of known physics, moved by a script, under known loads.
+"""What `explain` names in open-loop experiments: plants of known physics, with a scripted OP, under known loads.
 
 python -m proofs.experiments [--plants 20] [--seed 1] [--out proofs/experiments.md]
 
-Each plant is stepped by Euler's method at a twentieth of a sample, with no code of the identification's. OP is a
-staircase, a random binary signal or random levels, or one step; noise is white at the sensor, and a load of first
-order moves PV by .15 to .9 % with a time constant of a tenth to three times the process's. A second recording of the
-plant, under other moves and another load, is what the saved constants are carried to.
+Each plant is integrated by Euler's method with twenty steps a sample, without code of identification. OP is a
+staircase, a random binary signal, random levels, or one step. White noise acts at the sensor. A first-order load
+moves PV by .15 to .9 %, with a time constant of a tenth to three times that of the process. The saved constants are
+tested on a second recording of the plant, with other OP moves and another load.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from identification.record import Floats
 from proofs.common import parser_of
 
 N, PARTS, DT = 1500, 20, 1.0
-"""Samples of a recording, Euler's steps in one, and its interval [s]."""
+"""Samples of a recording, Euler steps in one sample, and sample interval [s]."""
 Physics = Callable[[Floats, np.random.Generator, "Plant"], Floats]
 
 
 @dataclass(frozen=True, slots=True)
 class Plant:
-    """A plant's constants: gain [% PV / % OP], time constant and dead time [s], and its own second figure."""
+    """Constants of a plant: gain [% PV / % OP], time constant and dead time [s], and one constant of its kind."""
 
     gain: float
     lag_s: float
@@ -42,7 +42,8 @@ class Plant:
 
 
 def euler(op: Floats, plant: Plant, speed: Callable[[float, float], float]) -> Floats:
-    """PV after a dead time, shape (n,) [% PV], of a state that moves with speed(level, OP), from rest at 50 % OP."""
+    """PV after a dead time, shape (n,) [% PV]. The state changes at speed(level, OP) and starts at rest at 50 %
+    OP."""
     late = round(plant.dead_s / DT * PARTS)
     driven = np.concatenate((np.full(late, op[0]), np.repeat(op, PARTS)))[: op.size * PARTS]
     x, out = 50.0, np.empty(op.size)
@@ -54,12 +55,12 @@ def euler(op: Floats, plant: Plant, speed: Callable[[float, float], float]) -> F
 
 
 def plain(op: Floats, _: np.random.Generator, p: Plant) -> Floats:
-    """A plain loop's process."""
+    """The baseline process."""
     return euler(op, p, lambda x, u: (50.0 + p.gain * (u - 50.0) - x) / p.lag_s)
 
 
 def second_lag(op: Floats, rng: np.random.Generator, p: Plant) -> Floats:
-    """A lag of .4 to .8 of the first behind it."""
+    """A second lag of .4 to .8 of the first, in series."""
     fine, lag = np.repeat(plain(op, rng, p), PARTS), p.lag_s * p.own
     x, out = 50.0, np.empty(op.size)
     for k in range(op.size):
@@ -70,20 +71,20 @@ def second_lag(op: Floats, rng: np.random.Generator, p: Plant) -> Floats:
 
 
 def slow_mode(op: Floats, rng: np.random.Generator, p: Plant) -> Floats:
-    """A wall that takes .15 to .3 of each move eight times as long."""
+    """A vessel wall: .15 to .3 of each response has a time constant eight times as long."""
     slow = Plant(p.gain, 8.0 * p.lag_s, p.dead_s, 0.0)
     share = 0.375 * p.own
     return (1.0 - share) * plain(op, rng, p) + share * plain(op, rng, slow)
 
 
 def curve(op: Floats, rng: np.random.Generator, p: Plant) -> Floats:
-    """A valve whose gain doubles or more over the strokes used."""
+    """A valve characteristic: the gain at least doubles over the strokes used."""
     bent = 50.0 + 25.0 * (np.exp(p.own * (op - 50.0) / 12.0) - 1.0) / p.own * 0.5
     return plain(bent, rng, p)
 
 
 def supply(op: Floats, rng: np.random.Generator, p: Plant) -> Floats:
-    """A heat exchanger whose hot side cools by a third or more and comes back: gain and bias go with it."""
+    """A heat exchanger whose hot side cools by a third or more and recovers: gain and bias follow it."""
     at = np.linspace(0.0, 2.0 * np.pi, op.size)
     hot = 1.0 - 0.5 * p.own * (1.0 - np.cos(at)) / 2.0
     late = round(p.dead_s / DT)
@@ -96,7 +97,7 @@ def supply(op: Floats, rng: np.random.Generator, p: Plant) -> Floats:
 
 
 def two_tanks(op: Floats, _: np.random.Generator, p: Plant) -> Floats:
-    """Two vessels with holes, the upper one over the lower; what the upper spills falls half into the lower."""
+    """Two vessels with outlet holes, one above the other; half of the upper overflow goes to the lower vessel."""
     full, h1, h2 = 62.0 + 10.0 * p.own, 50.0, 50.0
     k, out = np.sqrt(50.0) / p.lag_s, np.empty(op.size)
     for i, u in enumerate(op):
@@ -112,7 +113,7 @@ def two_tanks(op: Floats, _: np.random.Generator, p: Plant) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of plant: its physics, what may be answered, and whether a single step shows it."""
+    """A kind of plant: its physics, the right names, and whether a single step shows its effect."""
 
     physics: Physics
     names: tuple[str, ...]
@@ -130,7 +131,7 @@ KINDS = {
 
 
 def moves(rng: np.random.Generator, one_step: bool, lag_s: float) -> Floats:
-    """A script's OP, shape (N,) [% OP]."""
+    """OP of a script, shape (N,) [% OP]."""
     if one_step:
         return np.where(np.arange(N) < N // 8, 50.0, 50.0 + rng.choice([-10.0, 10.0]))
     hold = max(int(lag_s * rng.uniform(1.0, 4.0)), 5)
@@ -147,7 +148,7 @@ def moves(rng: np.random.Generator, one_step: bool, lag_s: float) -> Floats:
 
 
 def load(rng: np.random.Generator, lag_s: float) -> Floats:
-    """Noise of a sensor and a load of first order, shape (N,) [% PV]."""
+    """Sensor noise and a first-order load, shape (N,) [% PV]."""
     pole = np.exp(-DT / (lag_s * np.exp(rng.uniform(np.log(0.1), np.log(3.0)))))
     size = np.exp(rng.uniform(np.log(0.15), np.log(0.9)))
     e = rng.standard_normal(N) * size * np.sqrt(1.0 - pole**2)
@@ -159,7 +160,7 @@ def load(rng: np.random.Generator, lag_s: float) -> Floats:
 
 
 def drawn(kind: str, seed: int) -> tuple[Recording, Recording]:
-    """One plant of a kind: the recording that is explained, and a later one."""
+    """One plant of a kind: the recording to explain, and a later one."""
     rng = np.random.default_rng([seed, list(KINDS).index(kind)])
     lag_s = float(np.exp(rng.uniform(np.log(10.0), np.log(30.0))))
     plant = Plant(rng.uniform(0.8, 2.0), lag_s, rng.uniform(0.1, 0.5) * lag_s, rng.uniform(0.4, 0.8))
@@ -173,15 +174,15 @@ def drawn(kind: str, seed: int) -> tuple[Recording, Recording]:
 
 
 def carried_misfit(found: Explanation, later: Recording) -> tuple[float, float]:
-    """Misfit [% PV] of the plain and of the better model on the later recording."""
+    """Misfit [% PV] of the baseline and of the better model on the later recording."""
     fits = (found.plain, found.best)
     data = [to_data("X", found.p.inputs, f.model.c, (), 0.0, {}) for f in fits]
     sizes = [misfit(later.pv, carried(d, later.op, later.pv, later.dt_s)).rmse for d in data]
     return sizes[0], sizes[1]
 
 
-def asked(kind: str, seed: int) -> tuple[Answer, tuple[float, float]]:
-    """The answer for one plant, and the misfits that its models leave on the later recording."""
+def answered(kind: str, seed: int) -> tuple[Answer, tuple[float, float]]:
+    """The answer for one plant, and the misfits of its models on the later recording."""
     s, later = drawn(kind, seed)
     found = explain(s)
     return answer(found, s), carried_misfit(found, later)
@@ -190,14 +191,16 @@ def asked(kind: str, seed: int) -> tuple[Answer, tuple[float, float]]:
 def line(kind: str, seeds: Sequence[int]) -> str:
     """One kind as a row of the table."""
     with np.errstate(all="ignore"):
-        told = [asked(kind, seed) for seed in seeds]
-    first = Counter(said.verdict for said, _ in told)
-    right = sum(said.verdict in KINDS[kind].names for said, _ in told)
-    within = sum(any(e.name in KINDS[kind].names for e in said.effects) for said, _ in told)
-    before, after = np.median([sizes for _, sizes in told], axis=0)
-    worse = sum(y > 1.1 * x for _, (x, y) in told)
+        answers = [answered(kind, seed) for seed in seeds]
+    first = Counter(found_answer.verdict for found_answer, _ in answers)
+    right = sum(found_answer.verdict in KINDS[kind].names for found_answer, _ in answers)
+    within = sum(
+        any(e.name in KINDS[kind].names for e in found_answer.effects) for found_answer, _ in answers
+    )
+    before, after = np.median([sizes for _, sizes in answers], axis=0)
+    worse = sum(y > 1.1 * x for _, (x, y) in answers)
     names = ", ".join(f"{name} {count}" for name, count in first.most_common())
-    count = len(told)
+    count = len(answers)
     return f"| {kind} | {right} of {count} | {within} | {before:.2f} → {after:.2f} | {worse} | {names} |"
 
 

@@ -1,10 +1,11 @@
 """The indices of the literature on all labelled data: python -m proofs.field_indices SHARED [--seed 16 17] [--each 8]
 
-Worn valves found and sound ones blamed by each index at its published limits, beside this tool's own answer. SHARED
-holds recordings/isdb and refinery (labelled by people; a controller counts once, by majority of what its recordings
-say), plants and wild (simulated, a and b); the world is benchmarks/world. A worn valve counts where its fault shows:
-by the rules of the simulated data's own scoring (the spread of the error at 1.5 times that without the fault, and a
-rhythm). Sound are all other loops, whatever makes them swing. Writes field_indices.md here.
+The tables compare each index, at its published limits, with the answer of this tool: worn valves found, and other
+valves blamed. SHARED holds recordings/isdb and refinery, plants and wild. The first two are labelled by people; a
+controller counts once, by the majority of its recordings. Plants and wild are simulated (a and b); the world is
+benchmarks/world. A worn valve counts where its fault shows, by the rules that score the simulated data: the spread of
+the error is 1.5 times that without the fault, and the error has a rhythm. All other loops are without a valve fault,
+also where they oscillate. Writes field_indices.md here.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ import numpy as np
 
 from analyzer.loop.decisions import Cause, Fault, Status, counts
 from analyzer.words.decision import indices
-from benchmarks.world.__main__ import told as world_rows
+from benchmarks.world.__main__ import night_rows as world_rows
 from benchmarks.world.draw import KINDS, drawn, run
 from benchmarks.world.recorder import recorded
 from proofs.common import command, parser_of, publish, table
-from proofs.field_peer import asked, labels
+from proofs.field_peer import labels, night_rows
 
 COLUMNS = [
     "loop",
@@ -58,8 +59,8 @@ Row = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Labelled:
-    """A loop and what is known of it: the data it is of; whose it is; whether its valve is worn, and whether it
-    oscillates, None where neither is to be asked; what was put into it; the true width [% OP], 0 unknown."""
+    """A loop and its truth: data set, controller, row of the night, whether its valve is worn and whether it
+    oscillates (None: not counted), its simulated cause, and the true width [% OP] (0: unknown)."""
 
     data: str
     who: str
@@ -70,7 +71,7 @@ class Labelled:
     width: float = 0.0
 
     def finds(self, index: str) -> bool | str | None:
-        """What an index says: True, False, None where undecided, 'abstains'."""
+        """The answer of an index: True, False, None where undecided, 'abstains'."""
         ours = {
             "triage: cause": (self.row["cause"], (Cause.VALVE,)),
             "triage: valve_fault": (self.row["valve_fault"], WORN),
@@ -80,8 +81,8 @@ class Labelled:
                 return "abstains"
             if index not in ours:
                 return counts(self.row["oscillating_pct"] or 0.0)
-            said, faults = ours[index]
-            return None if said == Fault.UNDECIDED else said in faults
+            answers, faults = ours[index]
+            return None if answers == Fault.UNDECIDED else answers in faults
         found = {x["index"]: x["finds"] for x in indices(self.row)}
         return found.get(index, "abstains")
 
@@ -93,17 +94,17 @@ class Labelled:
 def recordings(folder: Path, out: Path, jobs: int) -> list[Labelled]:
     """Real recordings whose valves are labelled."""
     worn, who = labels(folder, "stiction")
-    rows = asked(folder, out, COLUMNS, jobs)
+    rows = night_rows(folder, out, COLUMNS, jobs)
     return [Labelled(folder.name, who[loop], rows[loop], at_fault) for loop, at_fault in worn.items()]
 
 
 def plant_shows(t: Row) -> bool:
-    """Whether a loop of plants shows its cause: as shared/score/plant.py."""
+    """Whether a loop of plants shows its cause, as in shared/score/plant.py."""
     return bool(t["swell"] >= 1.5 and t["rhythm"] >= 0.3)
 
 
 def wild_shows(t: Row) -> bool:
-    """Whether a loop of wild does: as shared/score/wild.py."""
+    """Whether a loop of wild shows its cause, as in shared/score/wild.py."""
     whole = t["cycles"] >= 5 and t["samples_a_cycle"] >= 4 and t["steady"] >= 0.75
     return bool(whole and t["swell"] >= 1.5 and t["rhythm"] >= 0.15)
 
@@ -112,13 +113,13 @@ def simulated(folder: Path, out: Path, jobs: int, shows: Callable[[Row], bool]) 
     """Simulated loops with their truth."""
     truth = json.loads((folder / "truth.json").read_text("utf-8"))
     made = []
-    for loop, row in asked(folder, out, COLUMNS, jobs).items():
+    for loop, row in night_rows(folder, out, COLUMNS, jobs).items():
         t = truth.get("loops", truth)[loop]
-        calm = t["cause"] in ("healthy", "sluggish")
-        worn, shown = t["cause"].startswith(WORN), not calm and shows(t)
-        swings = None if not calm and not shown else shown
-        ask = None if worn and not shown else worn
-        made.append(Labelled(folder.parent.name, loop, row, ask, swings, t["cause"]))
+        steady = t["cause"] in ("healthy", "sluggish")
+        worn, shown = t["cause"].startswith(WORN), not steady and shows(t)
+        swings = None if not steady and not shown else shown
+        counted_as = None if worn and not shown else worn
+        made.append(Labelled(folder.parent.name, loop, row, counted_as, swings, t["cause"]))
     return made
 
 
@@ -142,26 +143,28 @@ def world(seeds: Sequence[int], each: int, jobs: int) -> list[Labelled]:
 
 
 def counted(loops: Sequence[Labelled], index: str) -> str:
-    """What an index says of loops, a controller once: found, undecided, abstained, of all."""
+    """Counts of an index over loops, one for each controller: found, undecided, abstained, of all."""
     votes: dict[str, Counter[Any]] = defaultdict(Counter)
     for x in loops:
         votes[x.who][x.finds(index)] += 1
-    said: Counter[Any] = Counter()
+    answers: Counter[Any] = Counter()
     for of in votes.values():
-        told = of[True] + of[False]
-        said[of[True] >= of[False] if told else None if of[None] else "abstains"] += 1
-    return f"{said[True]}, {said[None]}, {said['abstains']} of {len(votes)}"
+        decided = of[True] + of[False]
+        answers[of[True] >= of[False] if decided else None if of[None] else "abstains"] += 1
+    return f"{answers[True]}, {answers[None]}, {answers['abstains']} of {len(votes)}"
 
 
-def by_data(loops: Sequence[Labelled], names: Sequence[str], kept: Callable[[Labelled], bool]) -> str:
+def by_data(loops: Sequence[Labelled], names: Sequence[str], selected: Callable[[Labelled], bool]) -> str:
     """A table of indices over sets of data."""
-    sets = list(dict.fromkeys(x.data for x in loops if kept(x)))
-    rows = [[n, *(counted([x for x in loops if x.data == d and kept(x)], n) for d in sets)] for n in names]
+    sets = list(dict.fromkeys(x.data for x in loops if selected(x)))
+    rows = [
+        [n, *(counted([x for x in loops if x.data == d and selected(x)], n) for d in sets)] for n in names
+    ]
     return table(f"index | {' | '.join(sets)}", rows, numbers=True)
 
 
 def measured(loops: Sequence[Labelled]) -> str:
-    """What the indices without a line are of each kind of loop of the world: median and tenths at both ends."""
+    """Values of the indices without a limit, for each kind of loop of the world: median, first and last decile."""
     made: dict[str, list[str]] = {}
     for kind in KINDS:
         own = [x for x in loops if x.kind == kind and x.data.startswith("world")]
@@ -177,7 +180,7 @@ def measured(loops: Sequence[Labelled]) -> str:
 
 
 def main() -> None:
-    """Ask all data and write the table beside this file."""
+    """Assess all data and write the table next to this file."""
     parser = parser_of(__doc__, folders=1, seed=[16, 17], each=8, jobs=2)
     options = parser.parse_args()
     (place,) = options.folders
@@ -198,20 +201,20 @@ def main() -> None:
         "The literature's indices on all labelled data",
         command(__file__, "SHARED", seed=options.seed, each=options.each),
         (__doc__ or "").split("\n\n")[1].replace("\n", " ").split(" Writes ")[0],
-        "An index abstains where its own conditions are not met: no cycle found, too few of its samples or cycles, "
-        "compressed trends, a level where it is of flows, no integral time where it needs one.",
+        "An index abstains where its own conditions are not met. Examples are no cycle found, too few samples or "
+        "cycles, compressed trends, a level where the index is for flows, and a missing integral time.",
         "## Worn valves: found, undecided, abstained, of all",
         by_data(loops, valves, lambda x: x.worn is True),
-        "## Sound valves: blamed, undecided, abstained, of all",
+        "## Valves without a fault: blamed, undecided, abstained, of all",
         by_data(loops, valves, lambda x: x.worn is False),
         "## Loops that oscillate: found, undecided, abstained, of all",
         by_data(loops, cycles, lambda x: x.oscillates is True),
-        "## Loops that do not: called oscillating, undecided, abstained, of all",
+        "## Loops that do not oscillate: called oscillating, undecided, abstained, of all",
         by_data(loops, cycles, lambda x: x.oscillates is False),
-        "## Sluggish loops, and all others: called sluggish, undecided, abstained, of all",
+        "## Sluggish loops, and all other loops: called sluggish, undecided, abstained, of all",
         by_data(loops, ["idle"], lambda x: x.kind == "sluggish"),
         by_data(loops, ["idle"], lambda x: x.kind not in ("", "sluggish")),
-        "## Measures, by kind of loop of the world: median (tenth and nine tenths)",
+        "## Measures, by kind of loop of the world: median (first and last decile)",
         measured(loops),
         "## Sources and limits",
         table("index | source", [*SOURCES.items(), *MEASURES.items()]),

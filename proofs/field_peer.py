@@ -1,12 +1,13 @@
-"""Real recordings with labels, told by this tool and by two open ways.
+"""Real recordings with labels, assessed by this tool and by two open methods.
 
     python -m proofs.field_peer RECORDINGS --peer PYTHON
 
-Valves (isdb, refinery): PyPI's `stictionanalyser`, which fits ellipses to OP over PV cycle by cycle; a valve is told
-where it counts half of the cycles or more. Its environment is made as benchmarks/peer.py says; without --peer its
-column is left out. Cycles (isdb-op): the regularity of the zero crossings of the error's autocorrelation (Thornhill,
-Huang, Zhang 2003: a third of mean over deviation of the first intervals above 1), without the band filter that its
-user sets by hand. Recordings of one controller count once, by majority. Writes field_peer.md here.
+Valves (isdb, refinery): PyPI's `stictionanalyser` fits ellipses to OP over PV cycle by cycle. A valve counts as named
+where the package finds stiction in half of the cycles or more. benchmarks/peer.py describes its environment; without
+--peer its column is empty. Cycles (isdb-op): the regularity of the zero crossings of the error's autocorrelation
+(Thornhill, Huang, Zhang 2003). Regular means that a third of mean over deviation of the first intervals is above 1.
+The band filter, which the user sets by hand, is not applied. Recordings of one controller count once, by majority.
+Writes field_peer.md here.
 """
 
 from __future__ import annotations
@@ -29,14 +30,14 @@ from proofs.common import command, parser_of, publish, table
 
 VALVES, CYCLES = ("isdb", "refinery"), ("isdb-op",)
 INTERVALS = 11
-"""Zero crossings of the autocorrelation that are looked at, as in the paper."""
+"""Number of zero crossings of the autocorrelation, as in the paper."""
 SHARE = 0.5
-"""Share of cycles with stiction from which the ellipses tell a valve."""
+"""Share of cycles with stiction from which the ellipses name a valve."""
 COLUMNS = ["loop", "cause", "oscillating_pct"]
 NightDecision = Mapping[str, bool]
 
 
-def asked(
+def night_rows(
     folder: Path, out: Path, columns: list[str] = COLUMNS, jobs: int = 2
 ) -> dict[str, dict[str, object]]:
     """The night's rows of a folder of recordings, by loop."""
@@ -47,7 +48,7 @@ def asked(
 
 
 def trends(folder: Path, loop: str) -> tuple[Floats, Floats | None]:
-    """Error (or PV about its mean where no SP is recorded) and OP of a recording, gaps left out."""
+    """Error (or PV about its mean where no SP is recorded) and OP of a recording, without gaps."""
     import pandas as pd
 
     held = pd.read_parquet(folder / f"{loop}.parquet")
@@ -77,7 +78,7 @@ def regular(error: Floats) -> bool:
 
 
 def ellipses(folder: Path, loops: list[str], python: Path) -> NightDecision:
-    """What the other package tells of each recording."""
+    """The answer of the other package for each recording."""
     with tempfile.TemporaryDirectory() as place:
         paths = {loop: Path(place) / f"{k}.npz" for k, loop in enumerate(loops)}
         for loop, path in paths.items():
@@ -86,16 +87,16 @@ def ellipses(folder: Path, loops: list[str], python: Path) -> NightDecision:
         done = subprocess.run(
             [str(python), "-c", PEER, *map(str, paths.values())], check=True, capture_output=True, text=True
         )
-    said = json.loads(done.stdout)
-    told = {loop: said[str(path)]["told"] for loop, path in paths.items()}
-    return {loop: cycles > 0 and sticking / cycles >= SHARE for loop, (sticking, cycles) in told.items()}
+    answers = json.loads(done.stdout)
+    counts = {loop: answers[str(path)]["told"] for loop, path in paths.items()}
+    return {loop: cycles > 0 and sticking / cycles >= SHARE for loop, (sticking, cycles) in counts.items()}
 
 
-def counted(truth: NightDecision, said: NightDecision, who: Mapping[str, str]) -> str:
-    """Faults found and false alarms, a controller once."""
+def counted(truth: NightDecision, answers: NightDecision, who: Mapping[str, str]) -> str:
+    """Faults found and false alarms; a controller counts once."""
     votes: dict[str, list[tuple[bool, bool]]] = defaultdict(list)
     for loop, at_fault in truth.items():
-        votes[who[loop]].append((at_fault, said.get(loop, False)))
+        votes[who[loop]].append((at_fault, answers.get(loop, False)))
     of = [tuple(2 * sum(v) >= len(v) for v in zip(*pairs, strict=True)) for pairs in votes.values()]
     found, faults = sum(t and s for t, s in of), sum(t for t, _ in of)
     return f"{found} of {faults}, {sum(s and not t for t, s in of)} of {len(of) - faults}"
@@ -110,38 +111,38 @@ def labels(folder: Path, column: str) -> tuple[dict[str, bool], dict[str, str]]:
     }
 
 
-def asked_of(folder: Path, python: Path | None, out: Path) -> list[str]:
-    """A row of the table: what each way tells of a folder of recordings."""
+def row_of(folder: Path, python: Path | None, out: Path) -> list[str]:
+    """A row of the table: the result of each method for a folder of recordings."""
     valves = folder.name in VALVES
     truth, who = labels(folder, "stiction" if valves else "oscillates")
-    found = asked(folder, out)
+    found = night_rows(folder, out)
     if not valves:
         ours = {loop: (r["oscillating_pct"] or 0.0) >= 50.0 for loop, r in found.items()}
         peer = {loop: regular(trends(folder, loop)[0]) for loop in truth}
         return [f"{folder.name}: oscillates", counted(truth, ours, who), "–", counted(truth, peer, who)]
     ours = {loop: r["cause"] == "valve" for loop, r in found.items()}
-    told = counted(truth, ellipses(folder, list(truth), python), who) if python else "–"
-    return [f"{folder.name}: valve at fault", counted(truth, ours, who), told, "–"]
+    counts = counted(truth, ellipses(folder, list(truth), python), who) if python else "–"
+    return [f"{folder.name}: valve at fault", counted(truth, ours, who), counts, "–"]
 
 
 def main() -> None:
-    """Ask all and write the table beside this file."""
+    """Run all methods and write the table next to this file."""
     parser = parser_of(__doc__, folders=1)
     parser.add_argument("--peer", type=Path, help="the Python of stictionanalyser's environment")
     options = parser.parse_args()
     (place,) = options.folders
     with tempfile.TemporaryDirectory() as out:
-        rows = [asked_of(place / n, options.peer, Path(out) / n) for n in (*VALVES, *CYCLES)]
+        rows = [row_of(place / n, options.peer, Path(out) / n) for n in (*VALVES, *CYCLES)]
     about = (
-        "Each cell: found of those labelled so, and false alarms of the others; a controller counts once. "
-        "The ellipses see few cycles in records of two hours at 10 s, and none at all in most."
+        "Each cell shows the loops found of those with the label, and the false alarms of the others; recordings of "
+        "a controller count once. In records of two hours at 10 s the ellipses find few cycles, and mostly none."
     )
     text = table(
         "recordings and question | triage | stictionanalyser | regularity of the autocorrelation", rows
     )
     publish(
         __file__,
-        "Real recordings beside open ways",
+        "Real recordings: comparison with open methods",
         command(__file__, "RECORDINGS", peer="PYTHON"),
         about,
         text,

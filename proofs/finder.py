@@ -1,11 +1,11 @@
-"""Loops found in a bag of tags by the data alone: python -m proofs.finder [--shared ../shared] [--seeds 1 2]
+"""Loops found in tags without names: python -m proofs.finder [--shared ../shared] [--seeds 1 2]
 
-Tags lose their names and their order, and twenty measurements of no loop stand among them: drift, slow noise, waves,
-sensors that follow a PV, plain noise. Plants: those of the shared folder, where it is there, at 1, 10 and 60 s, its
-recording of the Tennessee Eastman process at 3 s, and the sample mill at 10 s. A pair is right where PV and OP are of
-one loop; only pairs that are sure are counted. Gains and integral times are compared with loops.csv where the law
-explains .9 of OP's moves. Bags without a controller are the same plants without OP and set points that move, and a
-thousand tags of noise, drift and waves. Writes finder.md here.
+Tags lose their names and their order. Twenty signals that belong to no loop are added: drift, slow noise,
+oscillations, sensors that follow a PV, white noise. The plants are those of the shared folder, if it exists, at 1, 10
+and 60 s; its recording of the Tennessee Eastman process at 3 s; and the sample mill at 10 s. A pair is right where PV
+and OP belong to one loop; only sure pairs count. Gains and integral times are compared with loops.csv where the
+control law explains .9 of OP's moves. False pairs are also counted in sets without a controller: the same plants
+without OP and without moving set points, and a thousand tags of noise, drift and oscillations. Writes finder.md here.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from proofs.common import command, command_line, publish, table
 
 STRANGERS = 20
 NEAR = 0.2
-"""A gain or an integral time is right within this share."""
+"""Permitted relative error of a gain or an integral time."""
 Bag = tuple[str, pd.DataFrame, float, dict[str, LoopSpec]]
 """Name, tags in columns, time between samples [s], and what loops.csv states."""
 
 
 def strangers(values: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Measurements of no loop, shape (n, count)."""
+    """Signals that belong to no loop, shape (n, count)."""
     n = len(values)
     e, t = rng.normal(size=(n, count)), np.arange(n)
     out = np.empty((n, count))
@@ -53,7 +53,7 @@ def strangers(values: np.ndarray, count: int, rng: np.random.Generator) -> np.nd
 
 
 def bags(shared: Path) -> Iterator[Bag]:
-    """The plants, those of the shared folder where it is there."""
+    """The plants; those of the shared folder where it exists."""
     mill = pd.read_parquet("sample_data/mill.parquet")
     day = mill[(mill["timestamp"] >= "2026-03-08") & (mill["timestamp"] < "2026-03-09")]
     yield "sample mill, 10 s", day, 10.0, _stated(Path("sample_data/loops.csv"))
@@ -70,9 +70,9 @@ def bags(shared: Path) -> Iterator[Bag]:
                 yield f"{folder}, {every} s", thinned, float(every), stated
 
 
-def of_another_hand(seed: int) -> Iterator[Bag]:
-    """Loops of benchmarks/world, to which no limit of the finder was fitted; each kind of a seed of its own, for
-    loops of one seed share their load and noise."""
+def of_world(seed: int) -> Iterator[Bag]:
+    """Loops of benchmarks/world, an independent generator on which no limit of the finder was set. Each kind has its
+    own seed, because loops of one seed share their load and noise."""
     kinds = ("backlash", "stiction", "tight", "load", "healthy", "sluggish")
     loops = [d for k, kind in enumerate(kinds) for d in drawn(10 * seed + k, 4, (kind,))]
     trends = {d.name: run(d) for d in loops}
@@ -91,7 +91,7 @@ def _stated(path: Path) -> dict[str, LoopSpec]:
 
 
 def in_disorder(held: pd.DataFrame, seed: int) -> tuple[list[str], np.ndarray]:
-    """True names and values, shape (n, tags), in a random order among strangers."""
+    """True names and values, shape (n, tags), in random order together with signals of no loop."""
     rng = np.random.default_rng(seed)
     numbers = held.select_dtypes("number").ffill().bfill().fillna(0.0)
     values = np.column_stack([numbers, strangers(numbers.to_numpy(float), STRANGERS, rng)])
@@ -101,7 +101,7 @@ def in_disorder(held: pd.DataFrame, seed: int) -> tuple[list[str], np.ndarray]:
 
 
 def counted(names: list[str], values: np.ndarray, dt_s: float, stated: dict[str, LoopSpec]) -> Counter[str]:
-    """What is right and wrong of a bag."""
+    """Counts of right and wrong pairs and settings of one set of tags."""
     found: Counter[str] = Counter(loops=sum(name.endswith(".OP") for name in names))
     for pair in found_pairs(values):
         if pair.sure_pct < SURE_PCT:
@@ -117,12 +117,12 @@ def counted(names: list[str], values: np.ndarray, dt_s: float, stated: dict[str,
 
 
 def _names(names: list[str], values: np.ndarray, tag: int) -> set[str]:
-    """Names of all tags that hold the same as one: the output of a master is the set point of its slave."""
+    """Names of all tags with the same values as one tag: the output of a master is the set point of its slave."""
     return {names[k] for k in np.flatnonzero((values == values[:, [tag]]).all(axis=0))}
 
 
 def _settings(pair: FoundPair, spec: LoopSpec, dt_s: float) -> Counter[str]:
-    """Whether gain and integral time are those that are stated."""
+    """Whether gain and integral time agree with the stated ones."""
     span = (spec.pv_hi or 100.0) - (spec.pv_lo or 0.0)
     pid = controller(spec, span)
     if pid is None or pair.told < LAW_TOLD:
@@ -140,14 +140,14 @@ def _settings(pair: FoundPair, spec: LoopSpec, dt_s: float) -> Counter[str]:
 
 
 def without_controllers(held: pd.DataFrame, seed: int) -> int:
-    """Pairs that are told of the measurements of a plant alone, with the set points that never move."""
+    """Pairs reported in the measurements of a plant alone, with the constant set points."""
     still = [c for c in held if c.endswith(".SP") and held[c].nunique() == 1]
     _, values = in_disorder(held[[*still, *(c for c in held if c.endswith(".PV"))]], seed)
     return sum(p.sure_pct >= SURE_PCT for p in found_pairs(values))
 
 
 def of_nothing(seed: int) -> int:
-    """Pairs that are told of forty tags of noise, drift and waves."""
+    """Pairs reported in forty tags of noise, drift and oscillations."""
     rng = np.random.default_rng(seed)
     values = strangers(np.cumsum(rng.normal(size=(3000, 8)), axis=0), 40, rng)[:, np.arange(40) % 5 != 3]
     return sum(p.sure_pct >= SURE_PCT for p in found_pairs(values))
@@ -159,7 +159,7 @@ def main() -> None:
     rows, nothing = [], 0
     totals = {"limits were set on": Counter[str](), "of another hand": Counter[str]()}
     fitted = ((x, "limits were set on") for x in bags(given.shared))
-    others = ((x, "of another hand") for seed in given.worlds for x in of_another_hand(seed))
+    others = ((x, "of another hand") for seed in given.worlds for x in of_world(seed))
     for (name, held, dt_s, stated), group in chain(fitted, others):
         found, took_s = Counter[str](), 0.0
         for seed in given.seeds:
@@ -171,15 +171,15 @@ def main() -> None:
         totals[group] += found
         rows.append((*_cells(name, found), f"{took_s:.1f}"))
     noise = sum(of_nothing(seed) for seed in range(32))
-    heads = "plant | loops | right | wrong | SP of right | Kp | sign | told | Ti | told | s"
+    heads = "plant | loops | right | wrong | SP of right | Kp | sign | of pairs | Ti | of pairs | s"
     publish(
         __file__,
-        "Loops found in a bag of tags",
+        "Loops found in tags without names",
         command(__file__, seeds=given.seeds, worlds=given.worlds),
         (__doc__ or "").split("\n\n")[1].replace("\n", " ").split(" Writes finder.md")[0],
         table(heads, [*rows, *((*_cells(f"all {k}", c), "") for k, c in totals.items())], numbers=True),
-        f"Pairs told where no controller is: {nothing} in the plants' measurements alone, {noise} among 1,024 tags "
-        "of noise, drift and waves.",
+        f"Pairs reported in data without a controller: {nothing} in the measurements of the plants alone, {noise} in "
+        "1,024 tags of noise, drift and oscillations.",
     )
 
 

@@ -1,8 +1,8 @@
-"""Proof: where nothing was changed, hardly any figure is called better or worse.
+"""Proof: where nothing was changed, at most 5 % of the figures are called better or worse.
 
-200 plants of one loop each run for two weeks under one law: sound valves, play, stick-slip; white noise, slow
-loads, drifts of load and of its strength over hours to weeks, days and nights, sinusoids, set point moves.
-Nothing is changed in the middle, yet the weeks are compared there.
+200 plants of one loop each run for two weeks with constant controller settings. The valves have no fault, backlash,
+or stick-slip. Disturbances are white noise, slow loads, drifts of the load and of its strength over hours to weeks,
+days and nights, sinusoids, and set point moves. Nothing changes in the middle, but the two weeks are compared.
 
     python -m proofs.honesty --plants 200 --jobs 2
 """
@@ -44,7 +44,7 @@ def wander(rng: np.random.Generator, hours: float, n: int = N, step_s: float = S
 
 
 def loads(rng: np.random.Generator) -> np.ndarray:
-    """Load plus noise as it adds to PV [%], whose level and strength drift over hours to weeks."""
+    """Load plus noise as it adds to PV [%]; its level and strength drift over hours to weeks."""
     strength = np.exp(rng.uniform(0, 0.4) * wander(rng, np.exp(rng.uniform(np.log(2), np.log(200)))))
     fast = rng.uniform(0.1, 0.6) * wander(rng, np.exp(rng.uniform(np.log(0.02), np.log(0.3))))
     slow = rng.uniform(0.0, 4.0) * wander(rng, np.exp(rng.uniform(np.log(3), np.log(200))))
@@ -56,7 +56,7 @@ def loads(rng: np.random.Generator) -> np.ndarray:
 
 
 def set_points(rng: np.random.Generator) -> np.ndarray:
-    """A constant set point, or one that an operator moves some times a day [%]."""
+    """A constant set point, or one that an operator moves several times a day [%]."""
     moves = (rng.uniform(size=N) < rng.uniform(0, 4) / DAY) * rng.normal(size=N)
     return 50.0 + np.clip(np.cumsum(moves) * (rng.uniform() < 0.5), -4, 4)
 
@@ -78,7 +78,7 @@ def simulated(seed: int) -> LoopRecord:
 
 
 def hours_of(record: LoopRecord) -> dict[str, np.ndarray]:
-    """The rows that a store would hold, night by night."""
+    """The rows that a store would hold, by night."""
     rows: list[dict[str, float | None]] = []
     for day in range(DAYS):
         night = record.span(day * DAY, (day + 1) * DAY)
@@ -92,7 +92,7 @@ def hours_of(record: LoopRecord) -> dict[str, np.ndarray]:
 
 
 def examine(seed: int) -> tuple[LoopComparison, list[bool]]:
-    """Compare the two weeks of a plant; and, for contrast, what a t-test over hours would call changed."""
+    """The comparison of the two weeks of a plant, and the result of a t-test over hours as a contrast."""
     hours = hours_of(simulated(seed))
     before, after = spans_around(START_S + DAYS / 2 * 86400.0, DAYS / 2)
     naive = []
@@ -117,9 +117,9 @@ def counted(all_found: list[LoopComparison], naive: list[list[bool]]) -> tuple[l
     lines, calls = [], []
     for i, m in enumerate(MEASURES):
         answers = [a for a in (called(f, m.name) for f in all_found) if a is not None]
-        plain = f"{100 * np.mean([n[i] for n in naive]):5.1f} %" if m.primary else ""
+        naive_share = f"{100 * np.mean([n[i] for n in naive]):5.1f} %" if m.primary else ""
         lines.append(
-            f"{m.name:28} {sum(answers):4d} of {len(answers):4d}  {100 * np.mean(answers):5.1f} %  {plain}"
+            f"{m.name:28} {sum(answers):4d} of {len(answers):4d}  {100 * np.mean(answers):5.1f} %  {naive_share}"
         )
         calls += answers if m.primary else []
     compared = [f for f in all_found if not f.reasons]
@@ -133,7 +133,7 @@ def counted(all_found: list[LoopComparison], naive: list[list[bool]]) -> tuple[l
 
 
 def examined(plants: int, jobs: int, first: int = 0) -> Iterator[tuple[LoopComparison, list[bool]]]:
-    """All plants, on some processes."""
+    """All plants, examined in `jobs` processes."""
     seeds = range(first, first + plants)
     if jobs == 1:
         yield from map(examine, seeds)
@@ -143,7 +143,7 @@ def examined(plants: int, jobs: int, first: int = 0) -> Iterator[tuple[LoopCompa
 
 
 def main() -> None:
-    """Print how many figures were called better or worse; exit 1 where it is more than 5 %."""
+    """Print how many figures are called better or worse; exit with 1 where the share is above 5 %."""
     parser = parser_of(__doc__, plants=200, jobs=2)
     parser.add_argument("--first", type=int, default=0, help="first seed")
     options = parser.parse_args()

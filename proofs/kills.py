@@ -1,9 +1,9 @@
-"""A night killed at random points and gone on with: python -m proofs.kills [--kills 50]
+"""A night that is killed at random points and resumed: python -m proofs.kills [--kills 50]
 
-A run of 24 loops over two nights, as a plant runs it (loops.csv, changes.csv, two worker processes), is killed with
-signal 9, parent and workers, after a random share of the time that an undisturbed one takes, and begun again with
---resume until it ends; its store must be that of the undisturbed run, table by table and cell by cell. Every process
-has a hash seed of its own, as on a plant. Writes kills.md here.
+A run of 24 loops over two nights, as in a plant (loops.csv, changes.csv, two worker processes), is killed with signal
+9, parent and workers. The kill comes after a random share of the time of an undisturbed run. Then the run is started
+again with --resume until it ends. Its store must equal that of the undisturbed run, table by table and cell by cell.
+Every process has its own hash seed, as in a plant. Writes kills.md here.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from proofs.plant import START_S, Sketch, simulate, write_export
 
 LOOPS, HOURS = 24, 40.0
 CHANGED_H = 30.0
-"""When settings of some loops are changed, within the second night [h after the start]."""
+"""Time at which settings of some loops change, within the second night [h after the start]."""
 
 
 def tables(store: Path) -> dict[str, list[dict[str, object]]]:
@@ -56,19 +56,19 @@ def state(folder: Path, loops: Sequence[str]) -> None:
 
 
 def command(export: Path, store: Path, *more: str) -> list[str]:
-    """The batch as a process of its own, as a plant runs it."""
-    said = [sys.executable, "-m", "analyzer.cli", "run", str(export), "--store", str(store), "--jobs", "2"]
+    """The batch as its own process, as in a plant."""
+    result = [sys.executable, "-m", "analyzer.cli", "run", str(export), "--store", str(store), "--jobs", "2"]
     stated = ("--loops", str(export.parent / "loops.csv"), "--changes", str(export.parent / "changes.csv"))
-    return [*said, *stated, *more]
+    return [*result, *stated, *more]
 
 
 def seeded(seed: int) -> dict[str, str]:
-    """The environment of a process whose sets have an order of their own."""
+    """The environment of a process with its own order of sets."""
     return {**os.environ, "PYTHONHASHSEED": str(seed)}
 
 
 def stage(store: Path) -> str:
-    """How far a killed run had come."""
+    """The stage that a killed run had reached."""
     if not (store / "parts" / "run.json").exists():
         return "before the first piece" if not list(store.glob("nights/*.parquet")) else "after the end"
     done = list(store.glob("parts/*/nights-*.parquet"))
@@ -78,7 +78,7 @@ def stage(store: Path) -> str:
 
 
 def killed(export: Path, store: Path, after_s: float) -> str:
-    """Run, kill after a time, and go on until it ends; the stage at which it was killed, or 'not killed'."""
+    """Run, kill after a time, and resume until the run ends; the stage of the kill, or 'not killed'."""
     silent = subprocess.DEVNULL
     run = subprocess.Popen(command(export, store), stderr=silent, stdout=silent, env=seeded(1))
     try:
@@ -96,7 +96,7 @@ def killed(export: Path, store: Path, after_s: float) -> str:
 
 
 def main() -> None:
-    """Kill, compare, print and write the table beside this file."""
+    """Kill, compare, print and write the table next to this file."""
     wanted = command_line(__doc__, kills=50).kills
     draw, at, same = random.Random(1), Counter[str](), 0
     with tempfile.TemporaryDirectory() as name:
@@ -116,13 +116,13 @@ def main() -> None:
                 continue
             at[where] += 1
             same += tables(store) == whole
-    said = f"{same} of {wanted} stores are those of the undisturbed run."
+    result = f"{same} of {wanted} stores equal the store of the undisturbed run."
     about = (
-        f"{LOOPS} loops of {HOURS:g} h at 1 s with loops.csv and changes.csv, two workers; signal 9 to the parent,\n"
-        "whose workers end with it; each process with a hash seed of its own."
+        f"{LOOPS} loops of {HOURS:g} h at 1 s with loops.csv and changes.csv, two workers. The parent gets signal 9;"
+        "\nits workers end with it. Each process has its own hash seed."
     )
     counts = table("killed | times", sorted(at.items()), numbers=True)
-    publish(__file__, "A night killed at random points", shown(__file__, kills=wanted), about, counts, said)
+    publish(__file__, "A night killed at random points", shown(__file__, kills=wanted), about, counts, result)
 
 
 if __name__ == "__main__":

@@ -1,14 +1,14 @@
-"""What each number that decides something does when it is moved by a fifth: python -m proofs.limits [--jobs 2]
+"""What a change of 20 % of each limit does to the answers: python -m proofs.limits [--jobs 2]
 
-Every limit of `triage config` is moved down and up by 20 % (whole numbers by one at least, the ends of its range
-kept), and the stage that it belongs to is asked again: quality, oscillation and figures of 240 untidy loops
-(proofs/untidy), oscillation of 900 records without any (nulls.py) too, the causes of those that can be fitted,
-settings of 60 that are stated wrong by half, advice on 30 simulated loops, groups of coupled plants (proofs/coupled),
-comparisons of weeks, recorder, controller and effects of sealed cases (proofs/concealed). A limit that no answer
-notices is set to both ends of its range, which switches most of them off: what an answer notices then is a guard that
-stands well clear of the sample; what none notices even so is listed apart.
-Sections of resources and of how nights are cut (workers, opening, nights) decide no finding and are left
-out. Writes proofs/limits.md.
+Every limit of `triage config` is lowered and raised by 20 % (whole numbers by one at least, within the range of the
+limit). Then the stage of the limit runs again on its samples. They are: quality, oscillation and figures of 240
+untidy loops (proofs/untidy); oscillation of 900 records without any (nulls.py); the causes of loops with a fitted
+model; settings of 60 loops that are stated wrong by half; advice on 30 simulated loops; groups of coupled plants
+(proofs/coupled); comparisons of weeks; recorder, controller and effects of sealed cases (proofs/concealed). A limit
+that changes no answer is set to both ends of its range, where most limits have no effect. If an answer changes then,
+the limit is a guard far from this sample. Limits that change no answer even then are listed separately. Sections of
+resources and of the cutting of nights (workers, opening, nights) decide no finding and are omitted. Writes
+proofs/limits.md.
 """
 
 from __future__ import annotations
@@ -29,20 +29,21 @@ OUT = Path(__file__).with_suffix(".md")
 STEP = 0.2
 
 
-def moved(value: float, said: Limit, way: float) -> float:
-    """A limit moved by a fifth within its range; whole numbers by one at least."""
+def moved(value: float, limit: Limit, way: float) -> float:
+    """A limit changed by a fifth within its range; whole numbers by one at least."""
     new = value * (1.0 + way * STEP)
     if isinstance(value, int):
         new = value + (max(round(abs(new - value)), 1) if way > 0 else -max(round(abs(new - value)), 1))
-    kept = min(max(new, said.least), said.most)
-    return int(kept) if isinstance(value, int) else kept
+    bounded = min(max(new, limit.least), limit.most)
+    return int(bounded) if isinstance(value, int) else bounded
 
 
 @dataclass(frozen=True)
 class Effect:
-    """A limit with how many answers change when it is lowered and raised; None where its range ends there.
+    """A limit, and how many answers change when it is lowered and raised; None where its range ends there.
 
-    at_ends : how many do at the end of its range where most do; None where a fifth of it is noticed already.
+    at_ends: how many change at the end of its range with more changes; None where a change of a fifth has an
+    effect.
     """
 
     section: str
@@ -61,28 +62,28 @@ class Effect:
 
 @cache
 def usual(section: str, by_measures: bool = False) -> list[Any]:
-    """What a stage answers by the defaults; of causes, by what was measured."""
+    """The answers of a stage with the defaults; by_measures: causes from the measures, without a new fit."""
     return STAGES[section](replace(DEFAULT) if by_measures else DEFAULT)
 
 
 def effect(job: tuple[str, str]) -> Effect:
-    """What moving one limit does."""
+    """The effect of a change of one limit."""
     section, name = job
     own = getattr(DEFAULT, section)
-    said = next(f.metadata[KEY] for f in fields(own) if f.name == name)
+    limit = next(f.metadata[KEY] for f in fields(own) if f.name == name)
     value, base = getattr(own, name), usual(section, section == "cause" and name not in OF_FITS)
 
     def changed(new: float) -> int | None:
         if new == value:
             return None
-        asked = STAGES[section](replace(DEFAULT, **{section: replace(own, **{name: new})}))
-        return sum(a != b for a, b in zip(base, asked, strict=False)) + abs(len(base) - len(asked))
+        arguments = STAGES[section](replace(DEFAULT, **{section: replace(own, **{name: new})}))
+        return sum(a != b for a, b in zip(base, arguments, strict=False)) + abs(len(base) - len(arguments))
 
-    lower, higher = (changed(moved(value, said, way)) for way in (-1.0, 1.0))
+    lower, higher = (changed(moved(value, limit, way)) for way in (-1.0, 1.0))
     found = Effect(section, name, value, lower, higher, len(base))
     if found.noticed:
         return found
-    ends = [changed(type(value)(end)) for end in (said.least, said.most)]
+    ends = [changed(type(value)(end)) for end in (limit.least, limit.most)]
     return replace(found, at_ends=max(n or 0 for n in ends))
 
 
@@ -97,13 +98,13 @@ def jobs(sections: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def table(found: Sequence[Effect]) -> str:
-    """Effects as Markdown, those that nothing notices first by name."""
+    """Effects as Markdown; limits without any effect are named first."""
     clear = [e for e in found if e.at_ends]
     silent = [f"`{e.section}.{e.name}`" for e in found if e.at_ends == 0]
     head = (
-        f"{len(found)} limits moved by a fifth; {len(found) - len(clear) - len(silent)} change an answer of this "
-        f"sample, {len(clear)} more do at an end of their range. What none of its answers notices even so: "
-        f"{', '.join(silent) or 'nothing'}."
+        f"{len(found)} limits changed by a fifth; {len(found) - len(clear) - len(silent)} change an answer of this "
+        f"sample, {len(clear)} more do so at an end of their range. Limits that change no answer: "
+        f"{', '.join(silent) or 'none'}."
     )
     lines = ["| limit | value | lowered | raised | at an end | of answers |", "|---|--:|--:|--:|--:|--:|"]
     for e in found:
@@ -113,7 +114,7 @@ def table(found: Sequence[Effect]) -> str:
 
 
 def main() -> None:
-    """Move every limit, ask, write."""
+    """Change every limit, run its stage, write the page."""
     parser = parser_of(__doc__, jobs=2, out=OUT)
     parser.add_argument("--sections", nargs="+", choices=list(STAGES), default=list(STAGES))
     options = parser.parse_args()
@@ -127,8 +128,8 @@ def main() -> None:
                 flush=True,
             )
     text = table(found)
-    asked = "" if options.sections == list(STAGES) else " --sections " + " ".join(options.sections)
-    options.out.write_text(f"# What each limit does\n\n`python -m proofs.limits{asked}`: {text}")
+    arguments = "" if options.sections == list(STAGES) else " --sections " + " ".join(options.sections)
+    options.out.write_text(f"# What each limit does\n\n`python -m proofs.limits{arguments}`: {text}")
     print("\n" + text)
 
 

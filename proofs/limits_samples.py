@@ -1,4 +1,4 @@
-"""Loops, plants and weeks on which proofs/limits.py asks what each limit does."""
+"""Loops, plants and weeks on which proofs/limits.py measures the effect of each limit."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ from proofs.plant import Sketch, peer, prepared, record, simulate
 from proofs.untidy.draw import draw
 
 LOOPS, MOST = 240, 12_000
-"""Untidy loops, and samples of each at most."""
+"""Number of untidy loops, and the most samples of each."""
 REFITTED, UNFIT, SETTINGS = 12, 8, 60
-"""Of how many of them models are fitted anew where a limit acts on fits, whether the cause can be told at all, and
-whether settings are wrong."""
+"""Number of loops for each of three questions: models fitted again where a limit acts on fits, whether the cause can
+be identified, and whether settings are wrong."""
 OF_FITS = frozenset({"window", "blocks_per_period", "judged", "evidence_jump"})
-"""Limits of causes that act on what is fitted; the others act on what was."""
+"""Limits of causes that act on the fitted data; the others act on the fitted result."""
 VARIANTS, PLANTS, WEEKS, NULLS = 3, 20, 60, 150
-"""Loops of each sketch that are advised on, their gains a tenth apart, coupled plants, pairs of
-weeks, and records of each family in which nothing oscillates."""
+"""Loops with advice for each sketch (their gains differ by a tenth), coupled plants, pairs of weeks, and records of
+each family in which nothing oscillates."""
 START_S = 1_772_409_600.0
 ADVISED = (
     Sketch("valve", (40.0, 1200.0, 8.0), 0.8, 100.0, backlash=0.8, load_std=0.1),
@@ -62,7 +62,8 @@ SMALL = tuple(
     for play in (1.0, 2.0, 4.0)
     for sine in (0.0, 1.5, 4.0)
 )
-"""Tanks under PI of little damping, whose play is small beside OP's range, some of them driven from outside."""
+"""Tanks under a PI with little damping. Their backlash is small compared with OP's range; some have an external
+disturbance."""
 DEFAULT = Config()
 
 
@@ -76,8 +77,8 @@ class Raw:
 
 
 def spoilt(kind: int, rng: np.random.Generator, series: dict[str, Series]) -> dict[str, Series]:
-    """A loop's samples with what historians do to some: values frozen, lost or not understood, OP out of its range,
-    stamps left out, a month between two parts."""
+    """A loop's samples with defects of historians: values frozen, lost or not readable, OP out of its range, missing
+    stamps, a month between two parts."""
     out = dict(series)
     pv, op = series["L.PV"], series["L.OP"]
     n = pv.value.size
@@ -110,7 +111,7 @@ def spoilt(kind: int, rng: np.random.Generator, series: dict[str, Series]) -> di
 
 @dataclass(frozen=True)
 class Coupled:
-    """A loop of a coupled plant: what oscillates in it, when its record ends, and what its own verdict says."""
+    """A loop of a coupled plant: its oscillations, the end of its record, and its own verdict."""
 
     name: str
     found: Oscillations
@@ -121,7 +122,7 @@ class Coupled:
 
 @cache
 def raws() -> tuple[Raw, ...]:
-    """Untidy loops, half of them spoilt."""
+    """Untidy loops, half of them with defects."""
     out = []
     for seed in range(700_000, 700_000 + 40 * LOOPS):
         drawn = draw(seed)
@@ -142,7 +143,7 @@ def raws() -> tuple[Raw, ...]:
 
 
 def tried(task: Callable[[], Any]) -> Any:
-    """What a task gives, or the words of its refusal."""
+    """The result of a task, or the message of its refusal."""
     try:
         return task()
     except TriageError as error:
@@ -151,14 +152,14 @@ def tried(task: Callable[[], Any]) -> Any:
 
 @cache
 def ready() -> tuple[tuple[Raw, Prepared], ...]:
-    """The loops that prepare well by the defaults."""
+    """The loops that can be prepared with the defaults."""
     found = ((r, tried(lambda r=r: prepare(r.spec, r.series, DEFAULT.quality))) for r in raws())
     return tuple((r, p) for r, p in found if isinstance(p, Prepared))
 
 
 @cache
 def nothing() -> tuple[LoopRecord, ...]:
-    """Records of noise, drift and ramps, at rest, on grids and compressed (nulls.py)."""
+    """Records of noise, drift and ramps, constant, rounded and compressed (nulls.py)."""
     made = (null(family, seed) for family in FAMILIES for seed in range(NULLS))
     fixed = ((pv, op, np.full(pv.size, 50.0), np.zeros(pv.size, dtype=bool)) for pv, op in made)
     return tuple(LoopRecord("L", START_S, 1.0, sp, pv, op, bad) for pv, op, sp, bad in fixed)
@@ -166,13 +167,13 @@ def nothing() -> tuple[LoopRecord, ...]:
 
 @cache
 def detected() -> tuple[tuple[Raw, Prepared, Oscillations], ...]:
-    """Those with what oscillates in them."""
+    """Prepared loops with their oscillations."""
     return tuple((r, p, detect(p.record, DEFAULT.oscillation)) for r, p in ready())
 
 
 @cache
 def measured() -> tuple[tuple[Prepared, Oscillations, Measured], ...]:
-    """Those of which models can be fitted, with what was measured of them."""
+    """Loops whose models can be fitted, with their measures."""
     out = []
     for r, p, f in detected():
         if unfit_for_cause(p, None, DEFAULT) or float(np.ptp(p.record.pv)) == 0.0:
@@ -190,7 +191,7 @@ def measured() -> tuple[tuple[Prepared, Oscillations, Measured], ...]:
 
 @cache
 def wound() -> tuple[LoopRecord, ...]:
-    """Records of a PV that stands off its set point while OP winds over some of its range."""
+    """Records whose PV stays off the set point while OP winds up over a part of its range."""
     n, out = 3600, []
     for k, width in enumerate(range(4, 64, 4)):
         pv = 45.0 + 0.02 * np.random.default_rng(k).standard_normal(n)
@@ -201,7 +202,7 @@ def wound() -> tuple[LoopRecord, ...]:
 
 @cache
 def advised() -> tuple[tuple[Sketch, Assessment], ...]:
-    """Simulated loops to be advised on, as assessed by the defaults."""
+    """Simulated loops for advice, assessed with the defaults."""
     sketches = (
         replace(s, process=(s.process[0] * (0.9 + 0.1 * k), *s.process[1:]))
         for s in ADVISED
@@ -213,7 +214,7 @@ def advised() -> tuple[tuple[Sketch, Assessment], ...]:
 
 @cache
 def plants() -> tuple[tuple[Coupled, ...], ...]:
-    """Loops of coupled plants with what oscillates in them and what their own verdicts say."""
+    """Loops of coupled plants with their oscillations and their own verdicts."""
     out = []
     for seed in range(46, 46 + PLANTS):
         loops = []
@@ -235,7 +236,7 @@ def plants() -> tuple[tuple[Coupled, ...], ...]:
 
 
 def pairs() -> list[tuple[Coupled, ...]]:
-    """Two loops with one wave: of the second its third harmonic alone, or both with a valve that is blamed."""
+    """Pairs of loops with one oscillation: the second has only its third harmonic, or both valves are blamed."""
     rng, n, out = np.random.default_rng(5), 28_800, []
     phase = 2 * np.pi * np.arange(n) / 300.0 + np.cumsum(0.005 * rng.standard_normal(n))
     for size in (0.03, 0.04, 0.055, 0.08, 0.11, 0.2):
@@ -249,7 +250,7 @@ def pairs() -> list[tuple[Coupled, ...]]:
 
 
 def _sharing(k: int, error: np.ndarray, alone: Finding) -> Coupled:
-    """A loop with an error [%] of one sample a second under a little noise."""
+    """A loop with this error [%], one sample a second, and a little noise."""
     own = record(50.0 - error + 0.1 * np.random.default_rng(k).standard_normal(error.size))
     pct = {cause: 100.0 * (cause is alone.cause) for cause in (Cause.VALVE, Cause.TUNING, Cause.LOAD)}
     return Coupled(f"L{k}", detect(own, DEFAULT.oscillation), own.start_s + own.duration_s, alone, pct)
@@ -257,7 +258,7 @@ def _sharing(k: int, error: np.ndarray, alone: Finding) -> Coupled:
 
 @cache
 def weeks() -> tuple[dict[str, np.ndarray], ...]:
-    """Hourly figures of two weeks of some loops, the second week changed by nothing to a half."""
+    """Hourly figures of two weeks of some loops; the second week changes by 0 to 50 %."""
     out = []
     for seed in range(WEEKS):
         rng = np.random.default_rng(seed)

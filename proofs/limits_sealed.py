@@ -1,4 +1,4 @@
-"""Sealed cases of proofs/concealed on which proofs/limits.py asks what the limits of an explanation do."""
+"""Sealed cases of proofs/concealed on which proofs/limits.py measures the limits of an explanation."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from proofs.concealed.plan import Case, plan
 from proofs.limits_samples import DEFAULT, tried
 
 CASES, EXPLAINED, SEED = 84, 10, 4077
-"""Cases asked about recorder and controller, how many of them are explained whole, and the seed of all."""
+"""Cases for recorder and controller, how many of them are fully explained, and the seed of all."""
 HARD = tuple(
     (name, level)
     for name in ("controller-gap", "controller-logic")
     for level in ("masked", "concealed", "buried")
 )
 EACH = 12
-"""Faults of a controller that are hard to see, and how many of each are asked about beside the others."""
+"""Number of additional cases for each controller fault that is hard to detect."""
 THINNED = 10
-"""Every tenth sample of each recording is asked about too, as a historian keeps it."""
+"""Each recording is also used with every tenth sample, as a historian keeps it."""
 
 
 def _cases() -> list[Case]:
@@ -40,8 +40,8 @@ def _cases() -> list[Case]:
     return [*plan(CASES, SEED), *(Case(f"H{n}", (fault,), "", SEED + n) for fault, n in hard)]
 
 
-def _subject(folder: Path, tag: str) -> Recording:
-    """One sealed recording as `triage explain` has it."""
+def _recording(folder: Path, tag: str) -> Recording:
+    """One sealed recording as `triage explain` reads it."""
     plant = read(folder / f"{tag}-fit.parquet", folder / "loops.csv")
     source, specs = plant.export, plant.specs
     spec = spec_of(specs, tag)
@@ -50,23 +50,23 @@ def _subject(folder: Path, tag: str) -> Recording:
 
 
 @cache
-def subjects() -> list[Recording]:
-    """All cases that can be asked at all."""
+def recordings() -> list[Recording]:
+    """All cases that can be read."""
     out = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for todo in _cases():
             rows, tag, _ = seal(folder, [], todo)
             pd.DataFrame(rows).to_csv(folder / "loops.csv", index=False)
-            found = tried(partial(_subject, folder, tag))
+            found = tried(partial(_recording, folder, tag))
             out += [] if isinstance(found, str) else [found]
     return out
 
 
 def thinned(s: Recording) -> Recording:
-    """A recording of which every tenth sample was kept."""
+    """A recording with every tenth sample."""
     keep = slice(None, None, THINNED)
-    said = s.stated
+    settings = s.stated
     return replace(
         s,
         sp=None if s.sp is None else s.sp[keep],
@@ -75,37 +75,39 @@ def thinned(s: Recording) -> Recording:
         usable=s.usable[keep],
         dt_s=s.dt_s * THINNED,
         stamp_s=s.stamp_s[keep],
-        stated=None if said is None else StatedSettings(said.kp, said.ti / THINNED, said.scans * THINNED),
+        stated=None
+        if settings is None
+        else StatedSettings(settings.kp, settings.ti / THINNED, settings.scans * THINNED),
         neighbours=tuple(x[keep] for x in s.neighbours),
     )
 
 
-def _told(found: Finding | None) -> Any:
+def _answer_of(found: Finding | None) -> Any:
     return None if found is None else (found.name, *(f"{k} {v:.3g}" for k, v in found.values.items()))
 
 
 def of_recorder(c: Config) -> list[Any]:
-    """What the recorder did, samples that were not logged, and whether the controller can be judged."""
+    """Recorder finding, samples that were not logged, and whether the controller can be assessed."""
     out = []
-    unranged = [replace(s, ranged=False) for s in subjects()[::3]]
-    for s in (replace(s, limits=c.explain) for s in [*subjects(), *unranged]):
+    unranged = [replace(s, ranged=False) for s in recordings()[::3]]
+    for s in (replace(s, limits=c.explain) for s in [*recordings(), *unranged]):
         found = recorder_finding_of(s)
         missing = unlogged(s.stamp_s, s.pv.size, s.dt_s, c.explain_recorder)
-        out.append((_told(found), int(missing.sum()), controller_finding_of(s, found)[1] is None))
-    gridded = [s for s in subjects() if (f := recorder_finding_of(s)) is not None and STEP in f.values]
+        out.append((_answer_of(found), int(missing.sum()), controller_finding_of(s, found)[1] is None))
+    gridded = [s for s in recordings() if (f := recorder_finding_of(s)) is not None and STEP in f.values]
     return [*out, *_answers(gridded[:4], c)]
 
 
 def of_controller(c: Config) -> list[Any]:
-    """What clock and controller did."""
-    kept = [thinned(s) for s in subjects()]
-    made = (replace(s, limits=c.explain) for s in [*subjects(), *kept])
-    return [(_told(controller_finding_of(s, None)[0]), s.every_scan) for s in made]
+    """Findings of clock and controller."""
+    thin = [thinned(s) for s in recordings()]
+    made = (replace(s, limits=c.explain) for s in [*recordings(), *thin])
+    return [(_answer_of(controller_finding_of(s, None)[0]), s.every_scan) for s in made]
 
 
 def of_effects(c: Config) -> list[Any]:
-    """The answers to some cases: verdict, effects and what is lacking."""
-    return _answers(subjects()[: CASES : CASES // EXPLAINED], c)
+    """The answers for some cases: verdict, effects and missing information."""
+    return _answers(recordings()[: CASES : CASES // EXPLAINED], c)
 
 
 def _answers(asked: list[Recording], c: Config) -> list[Any]:

@@ -1,4 +1,4 @@
-"""The stages that limits act on, asked about the samples of limits_samples.py; each gives its answers as a list."""
+"""The stages that limits act on, run on the samples of limits_samples.py; each returns its answers as a list."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ def of_quality(c: Config) -> list[Any]:
     def answer(r: Raw) -> Any:
         p = prepare(r.spec, r.series, c.quality)
         masked = (int(p.record.bad.sum()), int(p.record.mask("saturated").sum()))
-        told = (p.op_known, p.notes, at_limits(p.record, c.quality) is not None)
-        return len(p.record), masked, *told, round(p.compressed_share, 6)
+        confidences = (p.op_known, p.notes, at_limits(p.record, c.quality) is not None)
+        return len(p.record), masked, *confidences, round(p.compressed_share, 6)
 
     def unfit(r: Raw) -> Any:
         found = tried(lambda: assess(prepare(r.spec, r.series, c.quality), None, c).verdict.needs)
@@ -69,7 +69,8 @@ def of_quality(c: Config) -> list[Any]:
 
 
 def of_oscillation(c: Config) -> list[Any]:
-    """Periods and shares of each loop, and of records in which nothing oscillates, and cycles too fast to be told."""
+    """Periods and shares of each loop, the same for records in which nothing oscillates, and cycles too fast to
+    detect."""
 
     def answer(r: LoopRecord) -> Any:
         found = detect(r, c.oscillation)
@@ -80,7 +81,7 @@ def of_oscillation(c: Config) -> list[Any]:
     return [answer(r) for r in (*(p.record for _, p in ready()), *nothing())]
 
 
-def _told(v: Any) -> Any:
+def _answer_of(v: Any) -> Any:
     """A verdict as an answer."""
     return (
         v
@@ -90,16 +91,16 @@ def _told(v: Any) -> Any:
 
 
 def of_cause(c: Config) -> list[Any]:
-    """Cause, fault, lacks and confidences: of all loops by what was measured of them, or of a few fitted anew."""
+    """Cause, fault, needs and confidences: of all loops from their measures, or of a few loops fitted again."""
     if all(getattr(c.cause, n) == getattr(DEFAULT.cause, n) for n in OF_FITS) and c is not DEFAULT:
         dead = [dead_valve(r, c.cause) is not None for r in wound()]
-        return [*dead, *(_told(verdict_by_measures(m, p, counting(f), c)) for p, f, m in measured())]
+        return [*dead, *(_answer_of(verdict_by_measures(m, p, counting(f), c)) for p, f, m in measured())]
     busy = sorted(detected(), key=lambda t: counting(t[2]) is None)[:REFITTED]
-    return [_told(tried(lambda t=t: cause_of(t[1], t[2], t[0].stated, c, t[0].spec.type))) for t in busy]
+    return [_answer_of(tried(lambda t=t: cause_of(t[1], t[2], t[0].stated, c, t[0].spec.type))) for t in busy]
 
 
 def of_settings(c: Config) -> list[Any]:
-    """Whether stated settings are told to be wrong, right and wrong ones."""
+    """Whether stated settings are reported as wrong, for right and wrong ones."""
     out = []
     for r, p, f in detected()[:SETTINGS]:
         first = counting(f)
@@ -111,7 +112,7 @@ def of_settings(c: Config) -> list[Any]:
 
 
 def of_advice(c: Config) -> list[Any]:
-    """Action and settings of the simulated loops, in whole records and as hints."""
+    """Action and settings for the simulated loops, from whole records and as hints."""
     out = []
     for sketch, found in advised():
         own = spec("L", sketch.kind, kp=sketch.kp, ti=sketch.ti)
@@ -133,31 +134,33 @@ def of_advice(c: Config) -> list[Any]:
 
 
 def _is_hidden(dt_s: int, c: Config) -> bool:
-    """Whether a loop with an integral time of 20 s is said to be recorded too coarsely at an interval [s]."""
-    calm = simulate(replace(ADVISED[4], stickband=0.0, slip_jump=0.0, ti=20.0), 6.0)
-    stamp = START_S + np.arange(0.0, calm.pv.size, dt_s)
-    trends = {f"L.{name.upper()}": series(stamp, getattr(calm, name)[::dt_s]) for name in ("sp", "pv", "op")}
+    """Whether a loop with an integral time of 20 s is reported as recorded too coarsely at an interval [s]."""
+    steady = simulate(replace(ADVISED[4], stickband=0.0, slip_jump=0.0, ti=20.0), 6.0)
+    stamp = START_S + np.arange(0.0, steady.pv.size, dt_s)
+    trends = {
+        f"L.{name.upper()}": series(stamp, getattr(steady, name)[::dt_s]) for name in ("sp", "pv", "op")
+    }
     made = prepare(spec("L"), trends, c.quality)
     return assess(made, Pid(0.1, 20.0), c).needs is not None
 
 
 def of_plant(c: Config) -> list[Any]:
-    """Groups, sources and followers of coupled plants, and what is said of each follower."""
+    """Groups, sources and followers of coupled plants, and the answer for each follower."""
     out: list[Any] = []
     for loops in plants():
         by_name = {x.name: x for x in loops}
-        waves = [w for x in loops for w in waves_of(x.name, x.found, x.end_s, c.plant)]
-        traced = trace(waves, {x.name: x.peer for x in loops}, c.plant)
+        oscillations = [w for x in loops for w in waves_of(x.name, x.found, x.end_s, c.plant)]
+        traced = trace(oscillations, {x.name: x.peer for x in loops}, c.plant)
         out += [(t.group.loops, t.source, tuple(likely(t, c.plant))) for t in traced]
-        for loop, (source, wave) in sorted(followers_of(traced).items()):
+        for loop, (source, oscillation) in sorted(followers_of(traced).items()):
             first = counting(by_name[loop].found)
             swing = Swing(0.0, first.oscillating_pct) if first else Swing()
             own, known = by_name[loop].confidence, {"usable_h": 8.0}
             alone = Finding(loop, "", Status.OK, swing=swing, confidence=own, known=known)
             sure = following(alone, source, swing, (SignKind.FOLLOWS, ()), c.plant).confidence
-            shown = swing_of(alone, source, wave, c.plant) != swing
-            told = {k: round(v) for k, v in sure.items()}
-            out.append((loop, source.loop, told, c.plant.follower_sign, shown))
+            shown = swing_of(alone, source, oscillation, c.plant) != swing
+            confidences = {k: round(v) for k, v in sure.items()}
+            out.append((loop, source.loop, confidences, c.plant.follower_sign, shown))
     return out
 
 
@@ -181,7 +184,7 @@ def of_weeks(c: Config) -> list[Any]:
 
 
 def of_changes(c: Config) -> list[Any]:
-    """Whether a step of a controller's behaviour is seen."""
+    """Whether a step in the behaviour of a controller is detected."""
     out = []
     for seed, hours in enumerate(weeks()):
         rng = np.random.default_rng(seed)
@@ -206,4 +209,4 @@ STAGES: dict[str, Callable[[Config], list[Any]]] = {
     "explain_recorder": of_recorder,
     "explain_controller": of_controller,
 }
-"""Sections of the limits, and what asks the stage that each belongs to."""
+"""Sections of the limits, and the function that runs the stage of each."""

@@ -69,7 +69,7 @@ def spec_of(d: Drawn, stated: bool = True) -> LoopSpec:
     return replace(plain, kp=c.kp, ti=c.ti_s, scan_s=c.scan_s) if stated else plain
 
 
-def told(
+def night_rows(
     loops: list[Drawn],
     records: dict[str, Recording],
     jobs: int,
@@ -110,7 +110,7 @@ def line(d: Drawn, row: dict[str, Any], said: str) -> str:
 
 def _count(loops: list[Drawn], way: str, seed: int, counts: Counter[str], asked: Any) -> None:
     """Count what is said of one plant's loops, recorded in one way."""
-    rows = told(loops, {d.name: recorded(run(d), way, d.seed) for d in loops}, asked.jobs)
+    rows = night_rows(loops, {d.name: recorded(run(d), way, d.seed) for d in loops}, asked.jobs)
     for d in loops:
         row = rows[d.name]
         said = f"{row['cause']}/{row['valve_fault']}" if row["status"] == "ok" else row["status"]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.world.__main__ import right, told
+from benchmarks.world.__main__ import right, night_rows
 from benchmarks.world.draw import HOURS, KINDS, Drawn, drawn, run, wander
 from benchmarks.world.recorder import WAYS, Recording, recorded
 from benchmarks.world.simulate import Floats, Trends, Valve
@@ -132,11 +132,11 @@ def main() -> None:
     for seed in asked.seed:
         for kind in asked.kinds:
             loops = drawn(seed, asked.each, (kind,))
-            plain = told(loops, {d.name: varied(d, "plain") for d in loops}, asked.jobs)
+            plain = night_rows(loops, {d.name: varied(d, "plain") for d in loops}, asked.jobs)
             counts["plain"].update(right=sum(right(d, plain[d.name]) for d in loops))
             for way in asked.ways:
                 records = {d.name: varied(d, "plain" if way == UNSTATED else way) for d in loops}
-                rows = told(loops, records, asked.jobs, stated=way != UNSTATED)
+                rows = night_rows(loops, records, asked.jobs, stated=way != UNSTATED)
                 for d in loops:
                     found = _compared(d, way, plain[d.name], rows[d.name], asked.show)
                     counts[way].update(found, changed=int(bool(found)), right=int(right(d, rows[d.name])))

@@ -19,7 +19,7 @@ from analyzer.loop.assess import assess
 from analyzer.loop.decisions import Action
 from analyzer.loop.record.judged_stretch import controller_of
 from analyzer.loop.record.quality import prepare
-from benchmarks.world.__main__ import export, spec_of, told
+from benchmarks.world.__main__ import export, spec_of, night_rows
 from benchmarks.world.draw import Drawn, drawn, run
 from benchmarks.world.recorder import Recording, recorded
 from benchmarks.world.settings import outcome
@@ -70,7 +70,7 @@ def promises(kind: str, seeds: list[int], each: int, way: str, jobs: int) -> lis
     for seed in seeds:
         loops = drawn(seed, each, (kind,))
         records = {d.name: recorded(run(d), way, d.seed) for d in loops}
-        rows = told(loops, records, jobs)
+        rows = night_rows(loops, records, jobs)
         for d in loops:
             row = rows[d.name]
             if row["kp_new"] is None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.world.__main__ import told
+from benchmarks.world.__main__ import night_rows
 from benchmarks.world.draw import Drawn, drawn, run
 from benchmarks.world.recorder import recorded
 from benchmarks.world.simulate import Controller, sensitivity
@@ -70,7 +70,7 @@ def advised(
     told_of, typed = {}, {d.name: d.controller for d in loops}
     for night in range(nights):
         now = [replace(d, controller=typed[d.name]) for d in loops]
-        rows = told(now, {d.name: recorded(run(d, night, alike=True), way, d.seed) for d in now}, jobs)
+        rows = night_rows(now, {d.name: recorded(run(d, night, alike=True), way, d.seed) for d in now}, jobs)
         for d in now:
             row = rows[d.name]
             if row["kp_new"] is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from benchmarks.world.__main__ import told
+from benchmarks.world.__main__ import night_rows
 from benchmarks.world.draw import drawn, run
 from benchmarks.world.recorder import recorded
 
@@ -10,7 +10,7 @@ from benchmarks.world.recorder import recorded
 def row_of(seed: int, kind: str, number: int) -> dict[str, object]:
     """The row of a night for one loop of the world, recorded at 1 s."""
     d = drawn(seed, number + 1, (kind,))[number]
-    return told([d], {d.name: recorded(run(d), "plain", d.seed)}, 1)[d.name]
+    return night_rows([d], {d.name: recorded(run(d), "plain", d.seed)}, 1)[d.name]
 
 
 def test_a_stem_that_jumps_by_its_whole_stickband_is_found() -> None:
