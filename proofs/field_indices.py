@@ -81,8 +81,8 @@ class Labelled:
                 return "abstains"
             if index not in ours:
                 return counts(self.row["oscillating_pct"] or 0.0)
-            answers, faults = ours[index]
-            return None if answers == Fault.UNDECIDED else answers in faults
+            answer, faults = ours[index]
+            return None if answer == Fault.UNDECIDED else answer in faults
         found = {x["index"]: x["finds"] for x in indices(self.row)}
         return found.get(index, "abstains")
 

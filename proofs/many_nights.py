@@ -1,11 +1,10 @@
-"""Beliefs over nine nights beside what each night says alone: python -m proofs.many_nights [--seed 971 972]
-[--jobs 2]
+"""Beliefs over nine nights compared with each night alone: python -m proofs.many_nights [--seed 971 972] [--jobs 2]
 
-Plants of 26 loops, nine nights of twelve hours, load and noise new each night, faults half as large as a cycle
-needs to be plain; the physics of the sample mill, which shares no code with the estimators. Counted are named
-causes and actions that change from a night to the next, the integral time advised from the third night on,
-causes that are right on the first and on the last night, and sound valves blamed. Writes many_nights.md here,
-both what is told and what each night would have said by itself.
+Each plant has 26 loops and nine nights of twelve hours, with new load and noise each night. The faults are half as
+large as needed for a clear cycle. The physics is that of the sample mill, which shares no code with the estimators.
+The table counts named causes and actions that change from one night to the next. It shows the integral time advised
+from the third night on, and causes that are right on the first and on the last night. It also counts valves that are
+blamed without a fault. Writes many_nights.md here, with the reported answers and the answers of each night alone.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ from physics import run, swing, wander
 OUT = Path(__file__).with_suffix(".md")
 LOOPS, NIGHTS, HOURS, EVERY_S = 26, 9, 12, 2
 WARM_S = 3600
-"""Left out before each night, so that it begins in full swing [s]."""
+"""Time before each night that is not recorded, so that the oscillation is fully developed [s]."""
 KINDS, KIND_SHARES = ("flow", "pressure", "temperature", "level"), (0.3, 0.2, 0.25, 0.25)
 CAUSES, CAUSE_SHARES = ("backlash", "stiction", "tuning", "load", "healthy"), (0.3, 0.15, 0.12, 0.13, 0.3)
 RIGHT = {"backlash": Cause.VALVE, "stiction": Cause.VALVE, "tuning": Cause.TUNING, "load": Cause.LOAD}
@@ -47,12 +46,12 @@ NAMED = (Cause.VALVE, Cause.TUNING, Cause.LOAD)
 WORN = (Fault.BACKLASH, Fault.STICTION)
 COLUMNS = ("loop", "cause", "valve_fault", "action", "ti_new", "status")
 SETTLED = 2
-"""Night, counted from 0, from which on advice is to stay."""
+"""Night, counted from 0, from which on advice should not change."""
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """A loop of a plant and what is wrong with it; seconds, percent of spans."""
+    """A loop of a plant and its fault; seconds, percent of spans."""
 
     tag: str
     kind: str
@@ -71,7 +70,7 @@ class Drawn:
 
     @property
     def is_worn(self) -> bool:
-        """Whether its valve is."""
+        """Whether its valve is worn."""
         return self.cause in WORN
 
 
@@ -98,7 +97,7 @@ def draw(rng: np.random.Generator, number: int) -> Drawn:
 
 
 def _process(rng: np.random.Generator, kind: str) -> tuple[tuple[float, float, float], float]:
-    """Gain, time constant and dead time [s] of a kind of loop, and its noise [% PV]."""
+    """Gain, time constant and dead time [s] of a type of loop, and its noise [% PV]."""
     ranges = {
         "flow": ((0.7, 1.5), (4, 20), (1, 5), (0.1, 0.3)),
         "pressure": ((0.8, 1.8), (20, 120), (2, 15), (0.06, 0.2)),
@@ -112,8 +111,8 @@ def _process(rng: np.random.Generator, kind: str) -> tuple[tuple[float, float, f
 def _settings(
     rng: np.random.Generator, kind: str, cause: str, process: tuple[float, float, float]
 ) -> tuple[float, float]:
-    """Settings of a loop: SIMC's for most, those with which a faulty valve or a tight tuning cycles for the
-    others."""
+    """Settings of a loop: by SIMC for most; the others have settings with which a faulty valve or a tight tuning
+    cycles."""
     gain, t, dead = process
     slow = rng.uniform(1.0, 3.0) * dead
     kp, ti = t / (gain * (slow + dead)), min(t, 4 * (slow + dead))
@@ -131,7 +130,7 @@ def _settings(
 
 
 def _ultimate(process: tuple[float, float, float], ti: float) -> float:
-    """Gain at which a PI loop is just stable."""
+    """Gain at the stability limit of a PI loop."""
     gain, t, dead = process
     s = 1j * np.logspace(-4, 1, 4000)
     response = gain / (1 + s * t) * np.exp(-s * dead) * (1 + 1 / (s * ti))
@@ -140,7 +139,7 @@ def _ultimate(process: tuple[float, float, float], ti: float) -> float:
 
 
 def simulated(loop: Drawn, seed: Sequence[int]) -> Trends:
-    """One night of a loop, a value every EVERY_S seconds."""
+    """One night of a loop, one value every EVERY_S seconds."""
     n, rng = HOURS * 3600 + WARM_S, np.random.default_rng(list(seed))
     sp = np.full(n, 50.0)
     for at in rng.integers(0, n, 3):
@@ -160,7 +159,7 @@ def _recorded(x: Floats) -> Floats:
 
 
 def nights_of(seed: int, jobs: int) -> tuple[list[Drawn], Store, tempfile.TemporaryDirectory[str]]:
-    """A plant whose nights were run one after another into one store."""
+    """A plant whose nights are run one after another into one store."""
     rng = np.random.default_rng(seed)
     plant = [draw(rng, k) for k in range(LOOPS)]
     folder = tempfile.TemporaryDirectory()
@@ -176,9 +175,9 @@ def nights_of(seed: int, jobs: int) -> tuple[list[Drawn], Store, tempfile.Tempor
 
 @dataclass
 class Counts:
-    """What is counted over plants: loops, pairs of nights, causes that change, those that were named, actions, causes
-    right on the first and on the last night, nights in which sound valves are blamed and healthy loops advised, and
-    largest over smallest integral time of each loop."""
+    """Counts over plants: loops, pairs of nights, changes of the cause, changes of a named cause, changes of the
+    action, causes right on the first and on the last night, nights in which a valve without a fault is blamed, nights
+    with advice for a loop without a fault, and largest over smallest integral time of each loop."""
 
     loops: int = 0
     pairs: int = 0
@@ -192,7 +191,7 @@ class Counts:
     ratios: tuple[float, ...] = ()
 
     def add(self, loop: Drawn, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Count one loop's nights, oldest first."""
+        """Count the nights of one loop, oldest first."""
         causes, actions = [r["cause"] for r in rows], [r["action"] for r in rows]
         right = RIGHT.get(loop.cause, Cause.NONE)
         self.loops += 1
@@ -220,24 +219,24 @@ class Counts:
 
 @dataclass
 class Sides:
-    """What is told, and what each night says alone, over plants; and the loops of which not every night says what is
-    true."""
+    """Counts over plants of the reported answers and of the answers of each night alone; and the loops for which not
+    all of them are right."""
 
-    told: Counts = field(default_factory=Counts)
+    reported: Counts = field(default_factory=Counts)
     alone: Counts = field(default_factory=Counts)
     loops: list[tuple[str, ...]] = field(default_factory=list)
 
     def add(self, seed: int, plant: Sequence[Drawn], store: Store) -> None:
         """Count one plant."""
-        told, alone = (
+        over_nights, alone = (
             [_by_loop(read("nights", n, COLUMNS)) for n in store.nights()] for read in _readers(store)
         )
         for loop in plant:
-            self.told.add(loop, [n[loop.tag] for n in told])
+            self.reported.add(loop, [n[loop.tag] for n in over_nights])
             self.alone.add(loop, [n[loop.tag] for n in alone])
-            said = [" ".join(str(n[loop.tag]["cause"]) for n in side) for side in (alone, told)]
-            if set(" ".join(said).split()) != {RIGHT.get(loop.cause, Cause.NONE)}:
-                self.loops.append((str(seed), loop.tag, loop.cause, *said))
+            answers = [" ".join(str(n[loop.tag]["cause"]) for n in side) for side in (alone, over_nights)]
+            if set(" ".join(answers).split()) != {RIGHT.get(loop.cause, Cause.NONE)}:
+                self.loops.append((str(seed), loop.tag, loop.cause, *answers))
 
 
 def _readers(store: Store) -> tuple[Callable[..., list[dict[str, Any]]], ...]:
@@ -264,16 +263,17 @@ def main() -> None:
     )
     publish(
         __file__,
-        "Beliefs over nine nights beside what each night says alone",
+        "Beliefs over nine nights compared with each night alone",
         command(__file__, seed=given.seed),
         about,
-        f"{found.told.loops} loops. Changes in percent of the pairs of nights, of any cause and of a named one "
-        "(valve, tuning or load); Ti, largest over smallest from the third night on, in the median loop and worst; "
-        "loops whose cause is right on the first and the last night; nights in which a sound valve is blamed, and in "
-        "which a healthy loop is advised.",
-        table(heads, [found.told.cells("told"), found.alone.cells("each night alone")]),
-        "Loops of which not every night says, alone and together, what is true:",
-        table("plant | loop | truth | each night alone | told", found.loops),
+        f"{found.reported.loops} loops. Changes are in percent of the pairs of nights, for any cause and for a named "
+        "one (valve, tuning or load). Ti ratio is largest over smallest from the third night on, in the median and "
+        "in the worst loop. Right are loops with the right cause on the first and on the last night. Blamed and "
+        "advised are nights in which a valve without a fault is blamed, and in which a loop without a fault has "
+        "advice.",
+        table(heads, [found.reported.cells("reported"), found.alone.cells("each night alone")]),
+        "Loops for which not every answer is right, of each night alone and over the nights:",
+        table("plant | loop | truth | each night alone | reported", found.loops),
     )
 
 

@@ -21,7 +21,7 @@ from proofs.nulls import FAMILIES, record
 
 
 def judged(case: tuple[str, int]) -> tuple[str, bool, bool]:
-    """Family, whether an oscillation was claimed, whether the valve was blamed."""
+    """Family, whether an oscillation was reported, whether the valve was blamed."""
     family, seed = case
     pv, op = record(family, seed)
     stamp = np.arange(pv.size, dtype=float)
@@ -37,8 +37,8 @@ def judged(case: tuple[str, int]) -> tuple[str, bool, bool]:
     return family, claimed, verdict.cause == "valve"
 
 
-def told(records: int, jobs: int) -> str:
-    """A Markdown table: family, records, oscillation claimed, valve blamed."""
+def table_of(records: int, jobs: int) -> str:
+    """A Markdown table: family, records, oscillation reported, valve blamed."""
     cases = [(family, seed) for family in FAMILIES for seed in range(records)]
     with Pool(jobs) as pool:
         results = pool.map(judged, cases, chunksize=50)
@@ -52,9 +52,9 @@ def told(records: int, jobs: int) -> str:
 
 
 def main() -> None:
-    """Run all records and write the table beside this file."""
+    """Run all records and write the table next to this file."""
     options = command_line(__doc__, records=1000, jobs=2)
-    text = told(options.records, options.jobs)
+    text = table_of(options.records, options.jobs)
     publish(__file__, "Negative controls", command(__file__, records=options.records), text)
 
 

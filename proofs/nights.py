@@ -1,9 +1,10 @@
-"""Two weeks night by night, advice beside truth: python -m proofs.nights [--jobs 2]
+"""Two weeks of nights, with the advice compared with the truth: python -m proofs.nights [--jobs 2]
 
-Each night of the sample mill is a run of its own, one after another into one store: with loops.csv alone, as a plant
-does it that keeps no list of changes (from 2026-03-09 on it is stale for the seven loops retuned that day), and with
-changes.csv. Every pair of settings that is advised is typed into the true loop, and the night's load and noise run
-once more under both; each morning's news stand beside the truth. Writes nights.md here.
+Each night of the sample mill is a separate run; all runs go into one store. One series uses loops.csv alone, like a
+plant without a list of changes. From 2026-03-09 on this file is out of date for the seven loops retuned on that day.
+The other series also uses changes.csv. Every advised pair of settings is set in the true loop, and the load and noise
+of the night are simulated again with old and new settings. The tables list the changes reported each morning with the
+truth. Writes nights.md here.
 """
 
 from __future__ import annotations
@@ -41,14 +42,15 @@ from mill import DAY_S, MILL, RETUNED_S, START, Loop, simulate_loop  # noqa: E40
 
 OUT = Path(__file__).with_suffix(".md")
 SETTLE_S = 6 * 3600
-"""Left out at the start of a night, so that what the settings before did is over [s]."""
+"""Omitted at the start of a night, so that the effect of the previous settings has decayed [s]."""
 HARM = 1.05
-"""Error or travel over that without the advice from which it is harmful [-]."""
+"""Ratio of error or travel with the advice to that without it, above which the advice is harmful [-]."""
 
 
 @dataclass(frozen=True)
 class Advised:
-    """One loop and night: what was said, and error and stem travel under new settings over those without, if any."""
+    """One loop and night: its row, and error and stem travel with new settings over those without, if there are new
+    settings."""
 
     night: str
     loop: str
@@ -58,7 +60,7 @@ class Advised:
 
     @property
     def is_harmful(self) -> bool:
-        """Whether typing the advice in makes the true loop worse."""
+        """Whether the advised settings make the true loop worse."""
         return max(self.error or 0.0, self.travel or 0.0) > HARM
 
 
@@ -71,7 +73,7 @@ def in_force(loop: Loop, night: int) -> tuple[float, float]:
 def figures(
     loop: Loop, settings: tuple[float, float], night: int, sources: dict[str, Any]
 ) -> tuple[float, float]:
-    """Average absolute error and stem travel of the true loop in a night under some settings."""
+    """Average absolute error and stem travel of the true loop in a night with these settings."""
     n = (night + 1) * DAY_S
     trend = simulate_loop(replace(loop, tuning=settings, retuned=None), n, sources)
     last = slice(night * DAY_S + SETTLE_S, n)
@@ -80,7 +82,7 @@ def figures(
 
 
 def typed_in(loop: Loop, spec: LoopSpec, row: dict[str, Any], night: int) -> tuple[float, float]:
-    """Error and travel with the advised settings over those with the settings in force."""
+    """Ratios of error and travel: advised settings over the settings in force."""
     span = loop.unit.hi - loop.unit.lo
     new = controller(replace(spec, kp=row["kp_new"], ti=row["ti_new"]), span)
     assert new is not None
@@ -93,14 +95,16 @@ def typed_in(loop: Loop, spec: LoopSpec, row: dict[str, Any], night: int) -> tup
     return after[0] / before[0], after[1] / max(before[1], 1e-9)
 
 
-def nights(jobs: int, changes: Sequence[TuningChange], news: list[str]) -> Iterator[Advised]:
-    """All loops of all nights, run one after another into one store, with the changes that the plant states; each
-    morning's news go to `news`."""
+def nights(jobs: int, changes: Sequence[TuningChange], overnight: list[str]) -> Iterator[Advised]:
+    """All loops of all nights, run one after another into one store, with the changes that the plant states;
+    `overnight` collects the changes reported each morning."""
     with tempfile.TemporaryDirectory() as folder:
-        yield from _nights(jobs, changes, Store(Path(folder) / "store"), news)
+        yield from _nights(jobs, changes, Store(Path(folder) / "store"), overnight)
 
 
-def _nights(jobs: int, changes: Sequence[TuningChange], store: Store, news: list[str]) -> Iterator[Advised]:
+def _nights(
+    jobs: int, changes: Sequence[TuningChange], store: Store, overnight: list[str]
+) -> Iterator[Advised]:
     export = open_export([SAMPLE / "mill.parquet"])
     specs = match(read_loops(SAMPLE / "loops.csv"), export.tags)[0]
     truth = {loop.tag: loop for loop in MILL}
@@ -109,16 +113,16 @@ def _nights(jobs: int, changes: Sequence[TuningChange], store: Store, news: list
         span = first.timestamp(), first.timestamp() + DAY_S
         batch.run(Plant(export, specs, Config(), span, changes), store, jobs)
         rows = {r["loop"]: r for r in ranked(store, "oscillation_significance")[0]}
-        told_news = news_lines(read_night(store, None, 1, drawn=False)) if night else []
-        news += [f"| {first:%m-%d} | {line} | {truth[line.split()[0]].cause} |" for line in told_news]
+        reports = news_lines(read_night(store, None, 1, drawn=False)) if night else []
+        overnight += [f"| {first:%m-%d} | {line} | {truth[line.split()[0]].cause} |" for line in reports]
         for spec in specs:
             row = rows[spec.loop]
-            told = (None, None) if row["kp_new"] is None else typed_in(truth[spec.loop], spec, row, night)
-            yield Advised(f"{first:%m-%d}", spec.loop, row, *told)
+            ratios = (None, None) if row["kp_new"] is None else typed_in(truth[spec.loop], spec, row, night)
+            yield Advised(f"{first:%m-%d}", spec.loop, row, *ratios)
 
 
 def wrong(found: list[Advised], listed: bool) -> list[str]:
-    """Valves told of loops whose valve is sound, and settings called wrong where those stated are in force."""
+    """Valves reported as worn that have no fault, and stated settings called wrong that are in force."""
     truth = {loop.tag: loop for loop in MILL}
     worn = [
         a
@@ -134,13 +138,16 @@ def wrong(found: list[Advised], listed: bool) -> list[str]:
         if a.row["action"] == Action.CHECK_SETTINGS
         and (listed or a.night < "03-09" or truth[a.loop].retuned is None)
     ]
-    said = [f"{a.loop} on {a.night}" for a in (*worn, *stale)]
-    names = f": {', '.join(said)}" if said else ""
-    return [f"{len(worn)} sound valves told to be worn, {len(stale)} true settings called wrong{names}.", ""]
+    cases = [f"{a.loop} on {a.night}" for a in (*worn, *stale)]
+    names = f": {', '.join(cases)}" if cases else ""
+    return [
+        f"{len(worn)} valves without a fault reported as worn, {len(stale)} true settings called wrong{names}.",
+        "",
+    ]
 
 
-def section(title: str, found: list[Advised], listed: bool, news: list[str]) -> list[str]:
-    """What was said of each loop, and every night in which settings were advised."""
+def section(title: str, found: list[Advised], listed: bool, overnight: list[str]) -> list[str]:
+    """The answers for each loop, and every night with advised settings."""
     advised = [a for a in found if a.error is not None]
     harmful = [a for a in advised if a.is_harmful]
     worst = max((a.error for a in advised if a.error is not None), default=1.0)
@@ -160,7 +167,7 @@ def section(title: str, found: list[Advised], listed: bool, news: list[str]) -> 
     for tag in dict.fromkeys(a.loop for a in found):
         mine = [a for a in found if a.loop == tag]
         parts = [[a for a in mine if (a.night < "03-09") is early] for early in (True, False)]
-        lines.append(f"| {tag} | {truth[tag].cause} | {_said(parts[0])} | {_said(parts[1])} |")
+        lines.append(f"| {tag} | {truth[tag].cause} | {_answers(parts[0])} | {_answers(parts[1])} |")
     lines += [
         "",
         "| night | loop | cause | error under new settings % | stem travel % |",
@@ -171,13 +178,13 @@ def section(title: str, found: list[Advised], listed: bool, news: list[str]) -> 
             f"{100 * (a.error - 1):+.0f} | {100 * (a.travel - 1):+.0f}" if a.error and a.travel else " | "
         )
         lines.append(f"| {a.night} | {a.loop} | {a.row['cause']} | {change} |")
-    return [*lines, "", "| night | news | truth |", "|---|---|---|", *news, ""]
+    return [*lines, "", "| night | reported change | truth |", "|---|---|---|", *overnight, ""]
 
 
-def _said(found: list[Advised]) -> str:
-    """What was said of a loop over some nights, the most frequent first."""
-    said = Counter(f"{a.row['cause'] or a.row['status']}: {a.row['action'] or '–'}" for a in found)
-    return "; ".join(f"{text} ({n})" for text, n in said.most_common())
+def _answers(found: list[Advised]) -> str:
+    """The answers for a loop over some nights, the most frequent first."""
+    cases = Counter(f"{a.row['cause'] or a.row['status']}: {a.row['action'] or '–'}" for a in found)
+    return "; ".join(f"{text} ({n})" for text, n in cases.most_common())
 
 
 def main() -> None:
@@ -185,7 +192,7 @@ def main() -> None:
     jobs = command_line(__doc__, jobs=2).jobs
     about = (__doc__ or "").split("\n\n")[1].replace("\n", " ").replace(" Writes nights.md here.", "")
     lines = [
-        "# Two weeks night by night, advice beside truth",
+        "# Two weeks of nights: advice and truth",
         "",
         "`python -m proofs.nights`",
         "",
@@ -193,9 +200,9 @@ def main() -> None:
         "",
     ]
     for title, changes in (("loops.csv alone", ()), ("changes.csv", read_changes(SAMPLE / "changes.csv"))):
-        news: list[str] = []
-        found = list(nights(jobs, changes, news))
-        lines += section(f"With {title}", found, bool(changes), news)
+        overnight: list[str] = []
+        found = list(nights(jobs, changes, overnight))
+        lines += section(f"With {title}", found, bool(changes), overnight)
     text = "\n".join(lines).rstrip() + "\n"
     OUT.write_text(text)
     print(text)

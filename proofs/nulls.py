@@ -1,7 +1,7 @@
 """Records in which nothing oscillates and no valve is at fault, in six families.
 
-PV is the noise itself; OP is what a PI controller makes of it, so OP moves as in a plant and does nothing.
-Shares no code with detection.
+PV is the noise itself. OP is the output of a PI controller for this error, so OP moves as in a plant but does not act
+on PV. Shares no code with detection.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ def quantized(rng: np.random.Generator, n: int) -> np.ndarray:
 
 
 def compressed(rng: np.random.Generator, n: int) -> np.ndarray:
-    """Coloured noise of which a recorder keeps break points only."""
+    """Coloured noise of which a recorder keeps only the break points."""
     x = lfilter([1.0], [1.0, -0.7], rng.normal(size=n))
     return swinging_door(x, rng.uniform(0.5, 2.0))
 
 
 def swinging_door(x: np.ndarray, deviation: float) -> np.ndarray:
-    """Straight segments that stay within a deviation of the samples, each as long as possible."""
+    """Straight segments within a deviation of the samples, each as long as possible."""
     kept, at = [0], 0
     while at < x.size - 1:
         end = at + 1
@@ -75,7 +75,7 @@ FAMILIES: dict[str, Noise] = {
 
 
 def controller_output(error: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """OP of a PI controller that sees this error, in the middle of its range [%]."""
+    """OP of a PI controller for this error, in the middle of its range [%]."""
     kp, ti = rng.uniform(0.2, 2.0), rng.uniform(10, 100)
     op = kp * (error + np.cumsum(error) / ti)
     spread = max(float(np.std(op)), 1e-9)
@@ -83,7 +83,7 @@ def controller_output(error: np.ndarray, rng: np.random.Generator) -> np.ndarray
 
 
 def record(family: str, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """PV and OP [%] of one null, each of shape (n,), one sample a second."""
+    """PV and OP [%] of one null record, each of shape (n,), one sample a second."""
     rng = np.random.default_rng([seed, list(FAMILIES).index(family)])
     n = int(rng.choice(LENGTHS))
     noise = FAMILIES[family](rng, n)

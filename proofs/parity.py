@@ -1,8 +1,9 @@
 """Do two trees print the same? `python -m proofs.parity OUT` in each of them, then `... A B --what compare`.
 
-The first asks every command of what is in sample_data (and nights of further plants, `--plants FOLDER...`, each with
-loops.csv and its exports) and keeps every help, list, page, picture and table of the store as text; the second ticks
-what is the same byte for byte and tells what is not, with the largest relative change where numbers alone differ.
+The first command runs every command on sample_data, and nights of further plants (`--plants FOLDER...`, each with
+loops.csv and its exports). It saves every help text, list, page, picture and store table as text. The second command
+counts the files that are equal byte for byte and lists the others. Where only numbers differ, it gives the largest
+relative change.
 """
 
 from __future__ import annotations
@@ -46,27 +47,27 @@ LANES = (
     "windup",
 )
 OF_THE_HOUR = re.compile(rb"\d{4}-\d\d-\d\d \d\d:\d\d(?=; times|, ordered)|\n?explain: .* s, trying [^\n]*")
-"""When it was asked, and how long it took."""
+"""Time of a run, and how long it took."""
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
 
 def triage(out: Path, name: str, *words: object) -> None:
-    """What a command prints, kept under a name; its errors beside it."""
+    """Save the output of a command under a name, followed by its errors."""
     start = "import sys; from analyzer.cli import main; main()"
     done = subprocess.run(
         [sys.executable, "-c", start, *map(str, words)], capture_output=True, cwd=ROOT, check=False
     )
-    told = (
+    printed = (
         done.stdout
         + (b"\n-- stderr\n" + done.stderr if done.stderr else b"")
         + f"\n-- exit {done.returncode}\n".encode()
     )
     (out / name).parent.mkdir(parents=True, exist_ok=True)
-    (out / name).write_bytes(told.replace(str(out).encode(), b"OUT").replace(str(ROOT).encode(), b"ROOT"))
+    (out / name).write_bytes(printed.replace(str(out).encode(), b"OUT").replace(str(ROOT).encode(), b"ROOT"))
 
 
 def tables_of(store: Path, out: Path) -> None:
-    """Every table of a store as CSV, in the order of loops and times: workers end as they can."""
+    """Every table of a store as CSV, sorted by loop and time, because workers end in any order."""
     for folder in sorted({p.parent for p in store.rglob("*.parquet")}):
         whole = pd.concat([pd.read_parquet(p) for p in sorted(folder.glob("*.parquet"))])
         whole = whole.drop(columns=[c for c in whole.columns if c in ("version", "written", "took_s")])
@@ -78,7 +79,7 @@ def tables_of(store: Path, out: Path) -> None:
 
 
 def night(out: Path, exports: list[Path], loops: Path, *more: object) -> Path:
-    """A night in a store of its own, and the lists, mails and pages that tell it."""
+    """A night in its own store, with its lists, mails and pages."""
     store = out / "store"
     triage(out, "run.txt", "run", *exports, "--loops", loops, "--store", store, "--jobs", 2, *more)
     for format_ in ("table", "csv", "json", "markdown"):
@@ -105,7 +106,7 @@ def night(out: Path, exports: list[Path], loops: Path, *more: object) -> Path:
 
 
 def sample(out: Path) -> None:
-    """Every command, asked of the sample mill."""
+    """Every command, run on the sample mill."""
     mill, loops, changes = SAMPLE / "mill.parquet", SAMPLE / "loops.csv", SAMPLE / "changes.csv"
     for name in COMMANDS:
         triage(out, f"help-{name}.txt", name, "--help")
@@ -138,7 +139,7 @@ def sample(out: Path) -> None:
 
 
 def explained(out: Path, loop: str, day: tuple[object, ...]) -> None:
-    """A loop of a day explained in every format, and its model run open and closed."""
+    """A loop of a day explained in every format, and its model simulated in open and in closed loop."""
     model = out / f"{loop}.json"
     for format_ in ("text", "json", "html", "markdown"):
         where = ("--out", out / f"explain-{loop}-{format_}") if format_ in ("html", "markdown") else ()
@@ -152,8 +153,8 @@ def explained(out: Path, loop: str, day: tuple[object, ...]) -> None:
             pd.read_parquet(target).to_csv(target.with_suffix(".csv"))
 
 
-def kept(out: Path) -> dict[str, bytes]:
-    """All that was kept, by its path; Parquet stands there as CSV."""
+def saved_files(out: Path) -> dict[str, bytes]:
+    """All saved files by their path; Parquet is saved as CSV."""
     files = (
         p
         for p in sorted(out.rglob("*"))
@@ -163,7 +164,7 @@ def kept(out: Path) -> dict[str, bytes]:
 
 
 def difference(a: bytes, b: bytes) -> str:
-    """What differs: words, or numbers alone and by how much at most."""
+    """The difference: words, or numbers only with their largest change."""
     if a == b:
         return ""
     (x, y) = (t.decode("utf-8", "replace") for t in (a, b))
@@ -179,8 +180,8 @@ def difference(a: bytes, b: bytes) -> str:
 
 
 def compared(a: Path, b: Path) -> bool:
-    """Whether two days print the same; what does not is told."""
-    before, after = kept(a), kept(b)
+    """Whether two trees print the same; differences are printed."""
+    before, after = saved_files(a), saved_files(b)
     differ = {n: difference(before[n], after[n]) for n in before.keys() & after.keys()}
     rows = [(n, d) for n, d in sorted(differ.items()) if d]
     rows += [(n, "only in the first") for n in sorted(before.keys() - after.keys())]
@@ -192,13 +193,13 @@ def compared(a: Path, b: Path) -> bool:
 
 
 def main() -> None:
-    """Ask, or compare."""
-    asked = command_line(__doc__, folders="+", what="run", plants=[Path()])
-    if asked.what == "compare":
-        sys.exit(0 if compared(*asked.folders) else 1)
-    out = asked.folders[0].resolve()
+    """Run all commands, or compare."""
+    options = command_line(__doc__, folders="+", what="run", plants=[Path()])
+    if options.what == "compare":
+        sys.exit(0 if compared(*options.folders) else 1)
+    out = options.folders[0].resolve()
     sample(out)
-    for plant in asked.plants:
+    for plant in options.plants:
         if plant != Path():
             night(
                 out / "-".join(plant.resolve().parts[-2:]),

@@ -1,10 +1,12 @@
-"""Whether a plain loop leaves less than the one `explain` shows: python -m proofs.plain_loop [FOLDER ...]
+"""Is the misfit of the baseline loop that `explain` shows the smallest possible? python -m proofs.plain_loop [FOLDER
+...]
 
-Simulated loops (a closed PI loop with big set-point steps, an OP at its limit, a slow drift, or steps in manual; 200
-of each) and every recording of the folders. A lag with dead time, a constant and where PV began is fitted to PV by
-least squares in free run, by code that shares nothing with the fit, from twelve starts over all time scales. Told is
-the misfit of the plain loop shown over that of the best of these; it should nowhere be more than 1.05. A time
-constant of over a quarter of a record is no settling process. Writes proofs/plain_loop.md.
+The loops are simulated (a closed PI loop with large set point steps, an OP at its limit, a slow drift, or steps in
+manual; 200 of each), and every recording of the folders is added. A lag with dead time, a constant and an initial
+value of PV is fitted to PV by least squares in free run. This code is independent of the package's fit and uses
+twelve starting points over all time scales. The table gives the misfit of the baseline loop over that of the best of
+these; the ratio should never exceed 1.05. A time constant longer than a quarter of a record is not a settling
+process. Writes proofs/plain_loop.md.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ N = 2000
 
 
 def simulated(kind: str, seed: int) -> Recording:
-    """A lag with dead time of random constants under a PI controller or by hand, written out sample by sample."""
+    """A lag with dead time of random constants under a PI controller or in manual, computed sample by sample."""
     rng = np.random.default_rng(seed)
     gain, lag, dead = rng.uniform(0.3, 3.0), 10.0 ** rng.uniform(0.5, 2.3), int(rng.integers(1, 30))
     kp, ti = 0.4 * lag / (gain * (dead + 0.3 * lag)), max(lag, 4.0)
@@ -55,7 +57,7 @@ def simulated(kind: str, seed: int) -> Recording:
 
 
 def rested(x: Floats, window: int) -> Floats:
-    """x less its mean, or less a straight line in each window, as the page draws it."""
+    """x minus its mean, or minus a straight line in each window, as on the page."""
     if window <= 0 or window >= x.size:
         return x - x.mean()
     parts = np.array_split(np.arange(x.size), x.size // window)
@@ -70,10 +72,10 @@ def response(op: Floats, lag: float, dead: float) -> Floats:
 
 
 def least_squares(pv: Floats, op: Floats, window: int) -> float:
-    """Rms that the best lag with dead time, gain, constant and start leaves in free run [% PV]."""
+    """Smallest rms residual in free run of a lag with dead time, gain, constant and initial value [% PV]."""
     aim = rested(pv, window)
 
-    def left(z: Floats) -> float:
+    def residual(z: Floats) -> float:
         lag, dead = float(np.exp(np.clip(z[0], -1.0, np.log(pv.size / 4)))), min(abs(z[1]), 0.2 * pv.size)
         faded = np.exp(-np.arange(op.size) / lag)
         x = np.stack([rested(response(op, lag, dead), window), rested(faded, window)])
@@ -81,17 +83,17 @@ def least_squares(pv: Floats, op: Floats, window: int) -> float:
 
     starts = [(t, d) for t in np.geomspace(2.0, pv.size / 6, 6) for d in (0.0, min(0.5 * t, 0.05 * pv.size))]
     tops = [[[np.log(t), d], [np.log(t) + 0.5, d], [np.log(t), d + max(0.2 * t, 1.0)]] for t, d in starts]
-    found = [minimize(left, s[0], method="Nelder-Mead", options={"initial_simplex": s}).fun for s in tops]
+    found = [minimize(residual, s[0], method="Nelder-Mead", options={"initial_simplex": s}).fun for s in tops]
     return float(min(found))
 
 
 def ratio(proof: HeldOut, pv: Floats, op: Floats) -> float:
-    """Misfit of the plain loop shown over that of the best found here."""
+    """Misfit of the baseline loop shown over that of the best fit here."""
     return float(proof.overall[0].rmse / least_squares(pv, op, proof.window))
 
 
 def of_simulated(kind: str, seed: int) -> float:
-    """The same of one simulated loop."""
+    """The ratio for one simulated loop."""
     s = simulated(kind, seed)
     inputs = inputs_of(s)
     p, fit = prepared(inputs, s.pv - inputs.level, s.usable)
@@ -99,7 +101,7 @@ def of_simulated(kind: str, seed: int) -> float:
 
 
 def of_recording(path: Path) -> tuple[str, float | None]:
-    """The same of one recording; None where it cannot be explained."""
+    """The ratio for one recording; None where it cannot be explained."""
     loops = path.parent / "loops.csv"
     plant = api.read(path, loops=loops if loops.exists() else None)
     spec = next((s for s in plant.specs if s.loop == path.stem), plant.specs[0])
@@ -118,7 +120,7 @@ def summary(name: str, ratios: list[float]) -> list[str]:
 
 
 def main() -> None:
-    """Ask all, write the table."""
+    """Compute all ratios, write the table."""
     a = command_line(__doc__, folders="*", loops=200, seed=5000, jobs=2)
     rows = []
     with Pool(a.jobs) as pool:
@@ -132,7 +134,7 @@ def main() -> None:
             rows.append(summary(folder.name, [r for _, r in found if r is not None]))
     text = table("loops | how many | median ratio | largest | over 1.05", rows)
     wide = "\n".join(f"- {name}: {r:.3f}" for name, r in each if r > 1.05)
-    title = "The plain loop shown beside a least-squares lag with dead time"
+    title = "The baseline loop shown and a least-squares lag with dead time"
     publish(__file__, title, f"Seed {a.seed}.", text, *([wide] if wide else []))
 
 

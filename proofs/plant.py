@@ -37,11 +37,12 @@ START_S = 1_772_409_600.0
 
 @dataclass(frozen=True)
 class Sketch:
-    """A loop and what is wrong with it: seconds, percent of spans; see sample_data/physics.py.
+    """A loop and its fault: seconds, percent of spans; see sample_data/physics.py.
 
-    cause is what the simulation puts in; load_std, load_s an Ornstein-Uhlenbeck load at the process input [% OP]
-    and its correlation time [s]; sine, sine_s a sinusoidal load [% OP] and its period [s]; moves set point steps
-    of that size [% PV] every hour and a half.
+    cause: the simulated cause; load_std, load_s: an Ornstein-Uhlenbeck load at the process input [% OP] and its
+    correlation time [s].
+    sine, sine_s: a sinusoidal load [% OP] and its period [s]; moves: size of set point steps [% PV] every hour
+    and a half.
     """
 
     cause: str
@@ -67,7 +68,7 @@ class Sketch:
 
 @dataclass(frozen=True)
 class Trends:
-    """What a historian would keep of a loop, one value a second, shape (n,) each [% of span]."""
+    """The trends of a loop as a historian records them, one value a second, shape (n,) each [% of span]."""
 
     sp: Floats
     pv: Floats
@@ -76,7 +77,7 @@ class Trends:
 
 
 def simulate(sketch: Sketch, hours: float = 3.0, seed: int = 1, extra: Floats | None = None) -> Trends:
-    """Run a sketch; `extra` is a further load at the process input [% OP], shape (n,)."""
+    """Simulate a sketch; `extra` is a further load at the process input [% OP], shape (n,)."""
     n = int(hours * 3600)
     rng = np.random.default_rng(seed)
     sp = np.full(n, 50.0)
@@ -93,7 +94,7 @@ def simulate(sketch: Sketch, hours: float = 3.0, seed: int = 1, extra: Floats | 
 
 
 def series(stamp_s: Floats, value: Floats, bad: np.ndarray | None = None) -> Series:
-    """Raw samples of one tag, all good where nothing else is said."""
+    """Raw samples of one tag, all good unless `bad` is given."""
     return Series(stamp_s, value, np.zeros(value.size, dtype=bool) if bad is None else bad)
 
 
@@ -104,14 +105,14 @@ def spec(loop: str = "L", kind: str = "", **stated: object) -> LoopSpec:
 
 
 def prepared(trends: Trends, kind: str = "", loop: str = "L") -> Prepared:
-    """The trends as the nightly batch sees them."""
+    """The trends as the nightly batch prepares them."""
     stamp = START_S + np.arange(trends.pv.size, dtype=float)
     found = {f"{loop}.{name.upper()}": series(stamp, getattr(trends, name)) for name in ("sp", "pv", "op")}
     return prepare(spec(loop, kind), found, QualityLimits())
 
 
 def record(pv: Floats, sp: Floats | float = 50.0, op: Floats | None = None, dt_s: float = 1.0) -> LoopRecord:
-    """A record of given trends, all good, OP standing at 50 % where none is given."""
+    """A record of given trends, all good; OP is constant at 50 % where none is given."""
     n = pv.size
     fixed = np.broadcast_to(np.asarray(sp, dtype=float), (n,)).copy()
     still = np.full(n, 50.0) if op is None else op
@@ -119,14 +120,15 @@ def record(pv: Floats, sp: Floats | float = 50.0, op: Floats | None = None, dt_s
 
 
 def peer(cause: Cause, evidence: float = 0.0, tuning_pct: float = 0.0) -> Finding:
-    """A loop with a verdict of its own, as the plant-wide pass takes it: evidence of its valve's fault [nat],
-    confidence in its tuning [%]."""
+    """A loop with its own verdict, for the plant-wide pass: evidence of its valve's fault [nat], confidence in its
+    tuning [%]."""
     known = {"evidence": evidence}
     return Finding("", "", Status.OK, cause=cause, confidence={Cause.TUNING: tuning_pct}, known=known)
 
 
 def write_export(path: Path, loops: dict[str, Trends], start_s: float = START_S, dt_s: float = 1.0) -> Path:
-    """Trends of many loops as one wide Parquet export with a column a tag, in groups of some loops' columns."""
+    """Trends of many loops as one wide Parquet export with one column a tag, in row groups of the columns of some
+    loops."""
     n = next(iter(loops.values())).pv.size
     stamp = np.round((start_s + dt_s * np.arange(n)) * 1e6).astype("datetime64[us]")
     columns: dict[str, object] = {"timestamp": pa.array(stamp)}
@@ -143,7 +145,8 @@ CONFIG = Config()
 def night_of(
     tags: Mapping[str, Floats], specs: Sequence[LoopSpec], every_s: float, columns: Sequence[str], jobs: int
 ) -> dict[str, Mapping[str, Any]]:
-    """What a night tells of loops whose trends, shape (n,) by tag, are kept every so many seconds: rows by loop."""
+    """The answer of a night for loops with these trends, shape (n,) by tag, one value every `every_s` seconds: rows
+    by loop."""
     n = next(iter(tags.values())).size
     stamp = np.round((START_S + every_s * np.arange(n)) * 1e6).astype("datetime64[us]")
     with tempfile.TemporaryDirectory() as folder:

@@ -1,8 +1,9 @@
-"""Who shares an oscillation and where it starts: python -m proofs.plant_wide [--plants 200] [--seed 2000]
+"""Which loops share an oscillation and where it starts: python -m proofs.plant_wide [--plants 200] [--seed 2000]
 
-Plants of proofs/coupled, of seeds that no limit was set on (1 to 39 and 100 to 124 were): sources that spread through
-filters, delays, mixing and recycles, and loops that cycle by themselves with nearly the same period. Every loop is
-assessed as in a night, then the plant-wide pass is asked. Writes proofs/plant_wide.md.
+The plants are those of proofs/coupled, of seeds on which no limit was set (1 to 39 and 100 to 124 were used for
+limits). They have sources whose oscillation spreads through filters, delays, mixing and recycles, and loops that
+oscillate independently with nearly the same period. Every loop is assessed as in a night; then the plant-wide pass
+runs. Writes proofs/plant_wide.md.
 """
 
 from __future__ import annotations
@@ -33,12 +34,12 @@ from proofs.coupled.draw import Drawn, Recorded, draw
 OUT = Path(__file__).with_suffix(".md")
 START_S = 1_772_409_600.0
 CLEAR, SHOWS = 1.5, 1.25
-"""Swell of a follower's error that is clear, and that shows."""
+"""Ratio of a follower's error to that without the source: from 1.5 it is clear, from 1.25 it shows."""
 Truth = Mapping[str, Any]
 
 
 def recorded(x: Recorded) -> tuple[LoopSpec, dict[str, Series]]:
-    """One loop as loops.csv and the export have it."""
+    """One loop as in loops.csv and the export."""
     stamp = START_S + x.stamp_s
     none = np.zeros(stamp.size, dtype=bool)
     series = {f"{x.name}.{n}": Series(stamp, v, none) for n, v in (("SP", x.sp), ("PV", x.pv), ("OP", x.op))}
@@ -49,7 +50,7 @@ def recorded(x: Recorded) -> tuple[LoopSpec, dict[str, Series]]:
 
 
 def assessed(x: Recorded, config: Config) -> tuple[Finding, tuple[Any, ...]] | None:
-    """Finding and waves of one loop; None where it cannot be assessed."""
+    """Finding and oscillations of one loop; None where it cannot be assessed."""
     spec, series = recorded(x)
     try:
         found, _ = assess_loop(spec, prepare(spec, series, config.quality), config, advising=False)
@@ -59,7 +60,7 @@ def assessed(x: Recorded, config: Config) -> tuple[Finding, tuple[Any, ...]] | N
 
 
 def reached(truth: Mapping[str, Truth]) -> dict[str, set[str]]:
-    """For every source the loops that it is coupled to, however far."""
+    """For every source, the loops coupled to it directly or indirectly."""
     below: dict[str, set[str]] = {}
     for name, t in truth.items():
         for parent in t["coupled_to"]:
@@ -81,7 +82,7 @@ def scored(
     traced: Mapping[str, Finding],
     shared: Sequence[Mapping[str, Any]],
 ) -> Counter[str]:
-    """Counts of what was right on one plant."""
+    """Counts of right and wrong answers for one plant."""
     truth, k = drawn.truth, Counter[str]()
     rows, after = ({n: night_row(f) for n, f in loops.items()} for loops in (known, traced))
     groups: dict[str, list[Mapping[str, Any]]] = {}
@@ -132,9 +133,9 @@ def plant(job: tuple[int, int | None, float | None]) -> Counter[str]:
     config, drawn = Config(), draw(seed, loops, hours=hours)
     known = {x.name: a for x in drawn.loops if (a := assessed(x, config)) is not None}
     alone = {name: finding for name, (finding, _) in known.items()}
-    waves = [w for _, own in known.values() for w in own]
+    oscillations = [w for _, own in known.values() for w in own]
     begun = time.perf_counter()
-    k = scored(drawn, alone, *traced_night(alone, waves, config.plant))
+    k = scored(drawn, alone, *traced_night(alone, oscillations, config.plant))
     k["loops"], k["plants"] = len(drawn.loops), 1
     k["milliseconds"] = round(1000 * (time.perf_counter() - begun))
     return k
@@ -145,7 +146,7 @@ def _share(k: Counter[str], part: str, whole: str) -> str:
 
 
 def table(k: Counter[str], command: str) -> str:
-    """What the counts say, as Markdown."""
+    """The counts as Markdown."""
     lines = [
         ("source in first place, of groups found", _share(k, "first", "groups found"), "85 %"),
         ("source among the first three, of groups found", _share(k, "among three", "groups found"), "97 %"),
@@ -171,7 +172,7 @@ def table(k: Counter[str], command: str) -> str:
 
 
 def main() -> None:
-    """Draw, ask, count, write."""
+    """Draw, assess, count, write."""
     parser = parser_of(__doc__, plants=200, seed=2000, jobs=1, out=OUT)
     parser.add_argument("--loops", type=int, help="Loops of a plant; drawn from 30 to 300 where not given.")
     parser.add_argument(

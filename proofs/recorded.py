@@ -1,8 +1,9 @@
-"""What sampling, quantisation and compression leave of each cause: python -m proofs.recorded [--records 8]
+"""Which causes remain identifiable after sampling, quantisation and compression: python -m proofs.recorded [--records
+8]
 
-Four loops whose cause is known are simulated at 1 s by the sample mill's physics and then recorded: thinned to fewer
-samples a cycle, rounded to a grid, or archived by a swinging door and read back by straight lines, each in parts of
-the cycle's own amplitude. Writes recorded.md here and docs/figures/recorded.png.
+Four loops with known causes are simulated at 1 s by the sample mill's physics and then recorded. They are thinned to
+fewer samples a cycle, rounded to a grid, or archived by a swinging door and read by linear interpolation. Grid and
+deviation are relative to the amplitude of the cycle. Writes recorded.md here and docs/figures/recorded.png.
 """
 
 from __future__ import annotations
@@ -35,9 +36,9 @@ SKETCHES = {
 SAMPLES = (60.0, 30.0, 20.0, 15.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0)
 """Samples a cycle."""
 GRIDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
-"""Step of the grid of PV and OP over their amplitudes."""
+"""Step of the grid of PV and OP, relative to their amplitudes."""
 DOORS = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4)
-"""Deviation of the swinging door over the amplitudes."""
+"""Deviation of the swinging door, relative to the amplitudes."""
 LONGEST_S = 600
 """Longest straight line that the historian draws [s]."""
 NAMES = ("valve", "tuning", "load")
@@ -47,7 +48,7 @@ WAYS = {"samples a cycle": SAMPLES, "grid over amplitude": GRIDS, "deviation ove
 
 @dataclass(frozen=True)
 class Cell:
-    """One loop under one way of recording."""
+    """One loop, recorded in one way."""
 
     name: str
     way: str
@@ -56,7 +57,8 @@ class Cell:
 
 @dataclass(frozen=True)
 class Answer:
-    """Of one record: whether it was assessed, oscillation found, the cause, the width named over the true one."""
+    """Of one record: whether it was assessed, whether an oscillation was found, the cause, the estimated width over
+    the true one."""
 
     assessed: bool
     found: bool
@@ -66,7 +68,7 @@ class Answer:
 
 @cache
 def drawn(name: str, seed: int) -> tuple[Trends, float]:
-    """Trends at 1 s and the period of their cycle [s], as it is found in them."""
+    """Trends at 1 s and the measured period of their cycle [s]."""
     trends = simulate(SKETCHES[name], HOURS, seed)
     found = detect(prepared(trends).record, CONFIG.oscillation).first
     return trends, found.period_s if found is not None else 300.0
@@ -76,22 +78,24 @@ def recorded(cell: Cell, seed: int) -> tuple[np.ndarray, list[np.ndarray]]:
     """Stamps [s] and SP, PV, OP as a historian keeps them."""
     trends, period = drawn(cell.name, seed)
     step = max(round(period / cell.much), 1) if cell.way == "samples a cycle" else 1
-    kept = [x[::step] for x in (trends.sp, trends.pv, trends.op)]
-    sizes = [0.0, *(float(np.std(x)) * np.sqrt(2) for x in kept[1:])]
+    samples = [x[::step] for x in (trends.sp, trends.pv, trends.op)]
+    sizes = [0.0, *(float(np.std(x)) * np.sqrt(2) for x in samples[1:])]
     if cell.way == "grid over amplitude":
         steps = [cell.much * s for s in sizes]
-        kept = [x if q == 0 else np.round(x / q) * q for x, q in zip(kept, steps, strict=True)]
+        samples = [x if q == 0 else np.round(x / q) * q for x, q in zip(samples, steps, strict=True)]
     if cell.way == "deviation over amplitude":
         doors = [cell.much * s for s in sizes]
-        kept = [x if d == 0 else swinging_door(x, d, LONGEST_S) for x, d in zip(kept, doors, strict=True)]
-    return START_S + step * np.arange(kept[0].size, dtype=float), kept
+        samples = [
+            x if d == 0 else swinging_door(x, d, LONGEST_S) for x, d in zip(samples, doors, strict=True)
+        ]
+    return START_S + step * np.arange(samples[0].size, dtype=float), samples
 
 
 def answered(job: tuple[Cell, int]) -> Answer:
-    """What the night says of one record."""
+    """The answer of the night for one record."""
     cell, seed = job
-    stamp, kept = recorded(cell, seed)
-    found = {f"L.{role}": series(stamp, x) for role, x in zip(("SP", "PV", "OP"), kept, strict=True)}
+    stamp, samples = recorded(cell, seed)
+    found = {f"L.{role}": series(stamp, x) for role, x in zip(("SP", "PV", "OP"), samples, strict=True)}
     sketch = SKETCHES[cell.name]
     try:
         a = assess(prepare(spec("L"), found, CONFIG.quality), sketch.controller, CONFIG)
@@ -100,13 +104,13 @@ def answered(job: tuple[Cell, int]) -> Answer:
     first = a.oscillations.first
     if a.needs is not None:
         return Answer(False, False, "", None)
-    told = first is not None and counts(first.oscillating_pct)
+    oscillates = first is not None and counts(first.oscillating_pct)
     width = None
     if a.verdict.cause is Cause.VALVE and a.verdict.measured is not None:
         m = a.verdict.measured
         best = m.stick_slip if m.stick_slip is not None and a.verdict.fault == "stiction" else m.play
         width = float(best.valve.stickband) / (sketch.backlash or sketch.stickband)
-    return Answer(True, told, str(a.verdict.cause), width)
+    return Answer(True, oscillates, str(a.verdict.cause), width)
 
 
 def line(cell: Cell, answers: Sequence[Answer]) -> list[str]:
@@ -121,7 +125,7 @@ def line(cell: Cell, answers: Sequence[Answer]) -> list[str]:
 
 
 def draw(results: dict[Cell, list[Answer]]) -> None:
-    """Right and wrong causes against how it was recorded."""
+    """Right and wrong causes against the way of recording."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -146,7 +150,7 @@ def draw(results: dict[Cell, list[Answer]]) -> None:
 
 
 def main() -> None:
-    """Ask all, write table and picture."""
+    """Assess all records, write table and picture."""
     options = command_line(__doc__, records=8, jobs=2)
     cells = [Cell(name, way, much) for way, levels in WAYS.items() for name in SKETCHES for much in levels]
     jobs = [(cell, seed) for cell in cells for seed in range(options.records)]
@@ -157,15 +161,16 @@ def main() -> None:
         results.setdefault(cell, []).append(found)
     parts = [
         f"{command(__file__, records=options.records)}, drawn in docs/figures/recorded.png",
-        f"Records of {HOURS:g} h. Not assessed: the night says what the recording lacks, and nothing else. Width is "
-        "that of the valve's fault over the true one, the median where the valve is named.",
+        f"Records of {HOURS:g} h. Not assessed: the night only reports what the recording lacks. Width is the "
+        "estimated width of the valve's fault over the true one; the median of the records in which the valve is "
+        "named.",
     ]
     for way, levels in WAYS.items():
         heads = f"loop | {way} | oscillation found % | right cause % | wrong cause % | not assessed % | width"
         mine = (Cell(name, way, much) for name in SKETCHES for much in levels)
         parts += [f"## {way.capitalize()}", table(heads, (line(cell, results[cell]) for cell in mine))]
     draw(results)
-    publish(__file__, "What the recorder leaves of each cause", *parts)
+    publish(__file__, "Which causes remain identifiable in recorded data", *parts)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What one change of settings does on a true plant: travel, error, and rejection of a load step."""
+"""The effect of one change of settings on a true plant: travel, error, and rejection of a load step."""
 
 from __future__ import annotations
 
@@ -9,26 +9,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from proofs.retuning_plant import Outside, Rig, Trends, held, outside, run, sound
+from proofs.retuning_plant import Outside, Rig, Trends, held, outside, run, without_fault
 
 SETTLE = 0.25
-"""Share of the time after the change that is left for the loop to settle."""
+"""Share of the time after the change in which the loop settles; it is not measured."""
 STATED_PEAK, STATED_INTEGRAL = 2.0, 3.5
-"""Largest deviation after a load step over that of the nominal tuning, and the error's integral over that of the
-nominal gain with Ti = max(T, nominal Ti): the factors that a proposal may have (tuning/limits.py)."""
+"""Permitted factors of a proposal (tuning/limits.py). The first is for the largest deviation after a load step,
+relative to the nominal tuning. The second is for the error's integral, relative to the nominal gain with Ti = max(T,
+nominal Ti)."""
 STATED_INTEGRAL_RAMP = 10.0
-"""The second on an integrating level."""
+"""The second factor on an integrating level."""
 GRID = 9
-"""Points in Kp and in Ti of the search with everything known."""
+"""Points in Kp and in Ti of the search on the true plant."""
 ERROR_MOST = 1.05
-"""Error after over error before that no loop may exceed [-]."""
+"""Largest permitted ratio of the error after to the error before [-]."""
 Settings = tuple[float, float]
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Figures:
-    """Stem travel [%/h] and average absolute error [% PV] of one stretch."""
+    """Stem travel [%/h] and average absolute error [% PV] of one section."""
 
     travel: float
     error: float
@@ -36,8 +37,8 @@ class Figures:
 
 @dataclass(frozen=True)
 class Rejection:
-    """Answer to a unit load step at the valve, friction and play left out: largest deviation, integral of its
-    absolute value [% PV, % PV s], and whether it dies away."""
+    """Answer to a unit load step at the valve, without friction and backlash: largest deviation, integral of its
+    absolute value [% PV, % PV s], and whether it decays."""
 
     peak: float
     integral: float
@@ -46,9 +47,10 @@ class Rejection:
 
 @dataclass(frozen=True)
 class Outcome:
-    """One loop: what was said, and the true plant under the old, the new, and the rule's settings.
+    """One loop: its row, and the true plant under the old settings, the new ones, and those of the rule.
 
-    known: the best of a search on the true plant itself, within the same limits; None for loops without a fault.
+    known: the best result of a search on the true plant itself, within the same limits; None for loops without a
+    fault.
     """
 
     rig: Rig
@@ -87,21 +89,21 @@ class Outcome:
 
     @property
     def failures(self) -> list[str]:
-        """What the proposal must not do and does."""
+        """The requirements that the proposal violates."""
         if self.new is None or self.rejection is None:
             return []
         most = STATED_INTEGRAL_RAMP if self.rig.lag == 0 else STATED_INTEGRAL
-        said = {
+        violated = {
             "unstable": not self.rejection.dies,
             "error": self.error > ERROR_MOST,
             "sleepy (peak)": self.peak > 1.001 * STATED_PEAK,
             "sleepy (integral)": self.integral > 1.001 * most,
         }
-        return [name for name, holds in said.items() if holds]
+        return [name for name, holds in violated.items() if holds]
 
 
 def nominal(rig: Rig) -> Settings:
-    """SIMC on the true plant, closed-loop time constant 1.5 effective delays."""
+    """SIMC on the true plant, with a closed-loop time constant of 1.5 effective delays."""
     lag = rig.lag + 0.5 * rig.second if rig.lag > 0 else math.inf
     return 1.0 / (rig.slope * 2.5 * rig.delay), min(lag, 10.0 * rig.delay)
 
@@ -111,21 +113,21 @@ def rejection(rig: Rig, settings: Settings, horizon: float) -> Rejection:
     n = int(min(max(horizon / rig.scan, 400), 400_000))
     load = np.ones(n)
     load[:3] = 0.0
-    t = held(sound(rig), Outside(load, np.zeros(n)), settings)
+    t = held(without_fault(rig), Outside(load, np.zeros(n)), settings)
     off = np.abs(t.pv - 50.0)
-    left = float(off[-n // 8 :].max())
-    return Rejection(float(off.max()), float(off.sum() * rig.scan), left < 0.2 * float(off.max()))
+    remaining = float(off[-n // 8 :].max())
+    return Rejection(float(off.max()), float(off.sum() * rig.scan), remaining < 0.2 * float(off.max()))
 
 
 def figures(rig: Rig, t: Trends, first: int) -> Figures:
-    """Travel and error from one scan on."""
+    """Travel and error from scan `first` on."""
     stem, pv = t.stem[first:], t.pv[first:]
     hours = pv.size * rig.scan / 3600
     return Figures(float(np.abs(np.diff(stem)).sum()) / hours, float(np.mean(np.abs(pv - 50.0))))
 
 
 def changed(rig: Rig, settings: Settings) -> Trends:
-    """Both recordings in a row, the settings typed in between them."""
+    """Both recordings one after the other; the settings change between them."""
     n = rig.scans
     kp, ti = np.full(2 * n, rig.kp), np.full(2 * n, rig.ti)
     kp[n:], ti[n:] = settings
@@ -133,13 +135,13 @@ def changed(rig: Rig, settings: Settings) -> Trends:
 
 
 def admissible(rig: Rig, settings: Settings, slowest: Rejection, horizon: float) -> bool:
-    """Whether settings are stable and reject a load step no worse than stated."""
+    """Whether settings are stable and reject a load step within the permitted factors."""
     r = rejection(rig, settings, horizon)
     return r.dies and r.peak <= slowest.peak and r.integral <= slowest.integral
 
 
 def best_known(rig: Rig, old: Figures, slowest: Rejection, horizon: float, first: int) -> Figures:
-    """The least travel that a search on the true plant finds within the same limits, error up to +5 %."""
+    """The least travel in a search on the true plant within the same limits, with an error of up to +5 %."""
     gain, ti = nominal(rig)
     least = old
     for kp in gain * np.geomspace(0.3, 1.6, GRID):
@@ -152,7 +154,8 @@ def best_known(rig: Rig, old: Figures, slowest: Rejection, horizon: float, first
 
 
 def outcome(rig: Rig, row: dict[str, Any], new: Settings | None) -> Outcome:
-    """The settings typed in, and beside them the rule with true and identified T, and the best of all known."""
+    """The outcome of the new settings, of the rule with true and identified T, and of the best settings with
+    everything known."""
     now, first = (rig.kp, rig.ti), int((1 + SETTLE) * rig.scans)
     found = row["time_constant_s"] or 0.0
     tried = [now, new or now, (rig.kp, max(rig.ti, rig.lag)), (rig.kp, max(rig.ti, found))]

@@ -1,8 +1,9 @@
-"""Loops for the proof of the advice: valves with real friction, second lags, load, noise; none of the package's code.
+"""Loops for the proof of the advice: valves with real friction, second lags, load, noise; without code of the
+package.
 
-The stem is the concealed recordings' (Karnopp's friction with mass, a stiff contact across a gap), the process is
-two lags, or an integrator and a lag, behind a pipe, integrated by fourth-order Runge-Kutta steps; the controller
-is a PI in position form with its own scan, and the historian rounds what it keeps.
+The stem is that of the concealed recordings (Karnopp's friction with mass, a stiff contact across a gap). The process
+is two lags, or an integrator and a lag, behind a pipe, integrated by fourth-order Runge-Kutta steps. The controller
+is a PI in position form with its own scan. The historian rounds what it keeps.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ STEPS = 10
 ACTUATOR = 0.4
 """Lag of the actuator [scans]."""
 FAULT_SHARE = 3.0
-"""Error with the valve's fault over the error without it from which a loop cycles clearly."""
+"""Ratio of the error with the valve's fault to that without it, from which a loop cycles clearly."""
 CYCLES = 20
-"""Periods after which a loop without noise and load must still cycle to count as cycling."""
+"""Number of periods after which a loop without noise and load must still cycle."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +35,10 @@ class Rig:
     """One loop: seconds, percent of spans.
 
     kind: backlash, stiction, healthy, load or tight; lag 0: integrator of slope `gain`; second: second lag; gap:
-    play; static, sliding: friction; load, corner: standard deviation [% OP] and correlation time of the load at the
-    valve; noise [% PV]; sine, sine_s: a machine's load [% OP] and its period; resolution of the historian [%].
+    backlash.
+    static, sliding: friction; load, corner: standard deviation [% OP] and correlation time of the load at the
+    valve; noise [% PV].
+    sine, sine_s: an external periodic load [% OP] and its period; resolution of the historian [%].
     """
 
     name: str
@@ -76,13 +79,13 @@ class Rig:
 
     @property
     def width(self) -> float:
-        """Play, or stickband [% OP]."""
+        """Width of backlash, or stickband [% OP]."""
         return self.gap if self.gap > 0 else self.static + self.sliding
 
 
 @dataclass(frozen=True)
 class Outside:
-    """What acts from outside, one value a scan, each shape (n,): load [% OP], noise [% PV]."""
+    """External disturbances, one value a scan, each shape (n,): load [% OP], noise [% PV]."""
 
     load: Floats
     noise: Floats
@@ -108,7 +111,7 @@ def _slopes(x: float, z: float, feed: float, lag: float, second: float, gain: fl
 def _advance(
     x: float, z: float, feed: float, dt: float, lag: float, second: float, gain: float
 ) -> tuple[float, float]:
-    """Vessel and second lag one classic Runge-Kutta step on."""
+    """Vessel and second lag after one classic Runge-Kutta step."""
     a, p = _slopes(x, z, feed, lag, second, gain)
     b, q = _slopes(x + 0.5 * dt * a, z + 0.5 * dt * p, feed, lag, second, gain)
     c, r = _slopes(x + 0.5 * dt * b, z + 0.5 * dt * q, feed, lag, second, gain)
@@ -126,7 +129,8 @@ def _run(
     valve: tuple[float, float, float],
     scan: float,
 ) -> Floats:
-    """PV, OP and stem, shape (3, n), about the rest at 50 %; Kp and Ti may change from scan to scan."""
+    """PV, OP and stem, shape (3, n), relative to the initial state at 50 %; Kp and Ti may change from scan to
+    scan."""
     gain, lag, second, dead = process
     gap, static, sliding = valve
     dt, n = scan / STEPS, load.size
@@ -161,7 +165,7 @@ def _run(
 
 
 def run(rig: Rig, outside: Outside, kp: Floats, ti: Floats) -> Trends:
-    """The loop about a set point of 50 % under Kp [% OP / % PV] and Ti [s] at each scan, shape (n,)."""
+    """The loop at a set point of 50 % with Kp [% OP / % PV] and Ti [s] at each scan, shape (n,)."""
     process = (rig.gain, rig.lag, max(rig.second, 0.2 * rig.scan), rig.dead)
     valve = (rig.gap, rig.static, rig.sliding)
     pv, op, stem = 50.0 + _run(outside.load, outside.noise, kp, ti, process, valve, rig.scan)
@@ -179,7 +183,7 @@ def wander(rng: np.random.Generator, n: int, corner: float) -> Floats:
 
 
 def outside(rig: Rig, n: int) -> Outside:
-    """Load and noise of a rig for `n` scans, the same for the same rig and n."""
+    """Load and noise of a rig for `n` scans; the same for equal rig and n."""
     rng = np.random.default_rng([rig.seed, 7])
     load = rig.load * wander(rng, n, rig.corner / rig.scan)
     phase = 2 * np.pi * np.arange(n) * rig.scan / rig.sine_s + rng.uniform(0, 6)
@@ -188,45 +192,46 @@ def outside(rig: Rig, n: int) -> Outside:
 
 
 def still(n: int) -> Outside:
-    """Nothing acts but one push of the load that sets the stem off."""
+    """No disturbance except one load pulse that moves the stem."""
     load = np.zeros(n)
     load[10 : n // 20] = 8.0
     return Outside(load, np.zeros(n))
 
 
 def cycles(rig: Rig) -> bool:
-    """Whether the loop without noise and load keeps a limit cycle going at its present settings."""
+    """Whether the loop without noise and load keeps a limit cycle at its present settings."""
     n = int(CYCLES * 6 * rig.ti / rig.scan) + 2000
     stem = held(rig, still(n), (rig.kp, rig.ti)).stem[-n // 4 :]
     return float(np.ptp(stem)) > 0.1 * rig.width and float(np.abs(np.diff(stem)).sum()) > rig.width
 
 
 def held(rig: Rig, outside: Outside, settings: tuple[float, float]) -> Trends:
-    """The loop under one pair of settings throughout."""
+    """The loop with one pair of settings throughout."""
     n = outside.load.size
     return run(rig, outside, np.full(n, settings[0]), np.full(n, settings[1]))
 
 
-def sound(rig: Rig) -> Rig:
-    """The same loop with nothing wrong in its valve."""
+def without_fault(rig: Rig) -> Rig:
+    """The same loop with a valve without a fault."""
     return replace(rig, gap=0.0, static=0.0, sliding=0.0)
 
 
 def matters(rig: Rig) -> bool:
-    """Whether the valve's fault, not load and noise, makes most of the error."""
+    """Whether the valve's fault, and not load and noise, causes most of the error."""
     acting = outside(rig, 2 * rig.scans)
     with_it, without = (
-        float(np.mean(np.abs(held(one, acting, (rig.kp, rig.ti)).pv - 50.0))) for one in (rig, sound(rig))
+        float(np.mean(np.abs(held(one, acting, (rig.kp, rig.ti)).pv - 50.0)))
+        for one in (rig, without_fault(rig))
     )
     return with_it > FAULT_SHARE * without
 
 
 def ultimate(rig: Rig) -> float:
-    """Gain over the present one at which the sound loop without load begins to swing for ever [-]."""
+    """Stability limit of the loop without fault and load, as a factor on the present gain [-]."""
     low, high = 1.0, 20.0
     while high / low > 1.01:
         middle = math.sqrt(low * high)
-        pv = held(sound(rig), still(4000), (middle * rig.kp, rig.ti)).pv
+        pv = held(without_fault(rig), still(4000), (middle * rig.kp, rig.ti)).pv
         swings = np.ptp(pv[-800:]) > 0.95 * np.ptp(pv[-2400:-1600]) and np.ptp(pv[-800:]) > 1e-3 * np.ptp(pv)
         low, high = (low, middle) if swings else (middle, high)
     return low
@@ -237,7 +242,7 @@ def _log(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def _frame(rng: np.random.Generator, name: str, kind: str, ratios: tuple[float, float], ramp: bool) -> Rig:
-    """Process, controller at the nominal tuning with scatter, load and noise about a valve of 1 %."""
+    """Process, controller near the nominal tuning, load and noise, for a valve fault of 1 %."""
     scan = float(rng.choice([1.0, 1.0, 2.0, 5.0]))
     dead = scan * rng.uniform(2.0, 8.0)
     second = dead * rng.uniform(0.2, 1.0)
@@ -276,8 +281,8 @@ def _stiction(rng: np.random.Generator, name: str, ramp: bool) -> Rig:
     return replace(rig, static=0.5 * band * (1 + share), sliding=0.5 * band * (1 - share))
 
 
-def _sound(rng: np.random.Generator, name: str, kind: str) -> Rig:
-    """A loop without fault: healthy, shaken by a machine, or tightly tuned."""
+def _drawn_without_fault(rng: np.random.Generator, name: str, kind: str) -> Rig:
+    """A loop with a valve without a fault: no disturbance, with an external periodic load, or tightly tuned."""
     rig = _sized(_frame(rng, name, kind, (2.0, 60.0), False), rng.uniform(1.0, 4.0))
     if kind == "load":
         return replace(rig, sine=5.0 * rig.load, sine_s=rig.delay * _log(rng, 8.0, 40.0))
@@ -289,7 +294,7 @@ COUNTS = {"backlash": (20, 4), "stiction": (10, 2), "healthy": (8, 0), "load": (
 
 
 def drawn(seed: int, counts: dict[str, tuple[int, int]] = COUNTS) -> Iterator[Rig]:
-    """All rigs of a seed; valve loops that do not cycle are drawn anew."""
+    """All rigs of a seed; valve loops that do not cycle are drawn again."""
     rng = np.random.default_rng([seed, 2])
     for kind, (lags, ramps) in counts.items():
         for k in range(lags + ramps):
@@ -299,6 +304,6 @@ def drawn(seed: int, counts: dict[str, tuple[int, int]] = COUNTS) -> Iterator[Ri
 def _one(rng: np.random.Generator, kind: str, name: str, ramp: bool) -> Rig:
     makers = {"backlash": _backlash, "stiction": _stiction}
     while True:
-        rig = makers[kind](rng, name, ramp) if kind in makers else _sound(rng, name, kind)
+        rig = makers[kind](rng, name, ramp) if kind in makers else _drawn_without_fault(rng, name, kind)
         if kind not in makers or (cycles(rig) and matters(rig)):
             return rig

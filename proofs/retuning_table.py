@@ -1,4 +1,4 @@
-"""What the proof of the advice prints and draws, from its outcomes."""
+"""Tables and figure of the proof of the advice, from its outcomes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _cut(values: Sequence[float]) -> str:
 
 
 def _ratios(found: Sequence[Outcome], name: str) -> list[float]:
-    """Stem travel left under other settings than the proposed [-]."""
+    """Remaining share of the stem travel under other settings than the proposed [-]."""
     return [getattr(o, name).travel / max(o.old.travel, 1e-9) for o in found if getattr(o, name) is not None]
 
 
@@ -31,32 +31,36 @@ def groups(found: Sequence[Outcome]) -> str:
     ]
     for kind in KINDS:
         mine = [o for o in found if o.rig.kind == kind]
-        told = [o for o in mine if o.new is not None]
-        worst = 100 * (max((o.error for o in told), default=1.0) - 1)
-        better = sum(o.error < 1 for o in told)
+        tuned = [o for o in mine if o.new is not None]
+        worst = 100 * (max((o.error for o in tuned), default=1.0) - 1)
+        better = sum(o.error < 1 for o in tuned)
         cells = (
-            [_cut([o.travel for o in some]) for some in (mine, told)]
-            + [f"{better} of {len(told)}", f"{worst:+.0f}"]
-            if told
+            [_cut([o.travel for o in some]) for some in (mine, tuned)]
+            + [f"{better} of {len(tuned)}", f"{worst:+.0f}"]
+            if tuned
             else [""] * 4
         )
-        others = [_cut(_ratios(mine, n)) if told else "" for n in ("rule", "rule_found", "known")]
-        lines.append(f"| {kind} | {len(mine)} | {len(told)} | {' | '.join(cells + others)} |")
+        others = [_cut(_ratios(mine, n)) if tuned else "" for n in ("rule", "rule_found", "known")]
+        lines.append(f"| {kind} | {len(mine)} | {len(tuned)} | {' | '.join(cells + others)} |")
     return "\n".join(lines)
 
 
 def rejections(found: Sequence[Outcome]) -> str:
     """Load-step rejection of all proposals: median and largest factors."""
-    told = [o for o in found if o.new is not None]
-    ramps = [o.integral for o in told if o.rig.lag == 0]
-    lags = [o.integral for o in told if o.rig.lag > 0]
-    rows = {"largest deviation": [o.peak for o in told], "integral, lags": lags, "integral, levels": ramps}
+    tuned = [o for o in found if o.new is not None]
+    ramps = [o.integral for o in tuned if o.rig.lag == 0]
+    lags = [o.integral for o in tuned if o.rig.lag > 0]
+    rows = {
+        "largest deviation": [o.peak for o in tuned],
+        "integral, lags": lags,
+        "integral, levels": ramps,
+    }
     body = [f"| {n} | {np.median(v):.2f} | {max(v):.2f} |" for n, v in rows.items() if v]
     return "\n".join(["| after a load step | median factor | largest |", "|---|---|---|", *body])
 
 
 def each(found: Sequence[Outcome]) -> str:
-    """A line for each loop that is at fault."""
+    """A line for each loop with a fault."""
     lines = [
         "| loop | fault % OP | T over delay | cause | Kp, Ti | new | travel left % | error % | peak | integral |"
         " fails in |",
@@ -79,15 +83,15 @@ def _line(o: Outcome) -> str:
 
 
 def failures(found: Sequence[Outcome]) -> str:
-    """How many proposals do what they must not."""
-    told = [o for o in found if o.new is not None]
+    """How many proposals violate each requirement."""
+    tuned = [o for o in found if o.new is not None]
     names = ("unstable", "error", "sleepy (peak)", "sleepy (integral)")
-    counts = [f"{n} {sum(n in o.failures for o in told)}" for n in names]
-    return f"Of {len(told)} proposals: {', '.join(counts)}; error counts from {100 * (ERROR_MOST - 1):.0f} % more."
+    counts = [f"{n} {sum(n in o.failures for o in tuned)}" for n in names]
+    return f"Of {len(tuned)} proposals: {', '.join(counts)}; error counts from {100 * (ERROR_MOST - 1):.0f} % more."
 
 
 def draw(found: Sequence[Outcome], path: Path) -> None:
-    """Travel left against error, for the proposals and for the rule."""
+    """Remaining travel against error, for the proposals and for the rule."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8.6, 4.4), layout="constrained")

@@ -1,8 +1,9 @@
-"""Whether statsmodels' robust covariance would do for before/after, beside blocks of days: false changes and power.
+"""Is statsmodels' robust covariance enough for before/after? A comparison with blocks of days: false changes and
+power.
 
-python -m proofs.robust_covariance: hourly figures of two spans of seven days with a rhythm of the day and days
-that drift, unchanged or moved by a fifth; how often each way calls them changed at 95 %. Prints the table of
-robust_covariance.md.
+python -m proofs.robust_covariance: hourly figures of two spans of seven days with a daily rhythm and days that drift.
+They are unchanged or changed by a fifth. The table shows how often each method reports a change at 95 %. Prints the
+table of robust_covariance.md.
 """
 
 from __future__ import annotations
@@ -19,13 +20,13 @@ DAYS, HOURS = 7, 24
 DRIFTS = (0.0, 0.4, 0.8)
 """Correlation of one day with the next."""
 MOVE = 0.2
-"""A true change, in the mean."""
+"""A true change of the mean."""
 SERIES = 400
 LEVEL = 0.95
 
 
 def hours(rng: np.random.Generator, drift: float) -> Floats:
-    """Both spans' hourly figures, shape (2 DAYS HOURS,): mean 1, days that scatter by 8 %, hours by 10 %."""
+    """Hourly figures of both spans, shape (2 DAYS HOURS,): mean 1; days scatter by 8 %, hours by 10 %."""
     days = np.zeros(2 * DAYS)
     level = rng.normal()
     for k in range(days.size):
@@ -39,14 +40,15 @@ def hours(rng: np.random.Generator, drift: float) -> Floats:
 
 
 def by_blocks(y: Floats) -> bool:
-    """The project's way: blocks of days, widened by Student and by what drift the days allow."""
+    """The method of this project: blocks of days, with an interval widened by Student's t and by the possible drift
+    between days."""
     one = np.ones(DAYS * HOURS)
     found = difference(Side(y[: one.size], one), Side(y[one.size :], one), LEVEL)
     return not found.low <= 0.0 <= found.high
 
 
 def by_hac(lags: int) -> Callable[[Floats], bool]:
-    """Least squares on a step with Newey and West's covariance, statsmodels."""
+    """Least squares of a step with the covariance of Newey and West, statsmodels."""
 
     def called(y: Floats) -> bool:
         step = np.repeat([0.0, 1.0], DAYS * HOURS)
@@ -59,7 +61,7 @@ def by_hac(lags: int) -> Callable[[Floats], bool]:
 
 
 def by_daily_glsar(y: Floats) -> bool:
-    """Daily means with an autoregression of order one between days, statsmodels."""
+    """Daily means with a first-order autoregression between days, statsmodels."""
     daily = y.reshape(-1, HOURS).mean(axis=1)
     fit = sm.GLSAR(daily, sm.add_constant(np.repeat([0.0, 1.0], DAYS)), 1).iterative_fit(8)
     return bool(fit.pvalues[1] < 1 - LEVEL)
@@ -74,7 +76,7 @@ WAYS = {
 
 
 def table() -> str:
-    """Shares called changed, by way and drift, unchanged and moved."""
+    """Shares reported as changed, by method and drift, unchanged and changed."""
     lines = [
         "| way | " + " | ".join(f"unchanged, days {d:g}" for d in DRIFTS) + " | moved by a fifth, days 0 |",
         "|---|" + "---|" * (len(DRIFTS) + 1),

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.world.__main__ import right, night_rows
+from benchmarks.world.__main__ import night_rows, right
 from benchmarks.world.draw import HOURS, KINDS, Drawn, drawn, run, wander
 from benchmarks.world.recorder import WAYS, Recording, recorded
 from benchmarks.world.simulate import Floats, Trends, Valve

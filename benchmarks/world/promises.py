@@ -19,7 +19,7 @@ from analyzer.loop.assess import assess
 from analyzer.loop.decisions import Action
 from analyzer.loop.record.judged_stretch import controller_of
 from analyzer.loop.record.quality import prepare
-from benchmarks.world.__main__ import export, spec_of, night_rows
+from benchmarks.world.__main__ import export, night_rows, spec_of
 from benchmarks.world.draw import Drawn, drawn, run
 from benchmarks.world.recorder import Recording, recorded
 from benchmarks.world.settings import outcome
