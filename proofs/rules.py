@@ -1,9 +1,10 @@
-"""What each rule of the verdict on one record is worth: python -m proofs.rules [--loops 1200] [--seed 13000000]
+"""The effect of each rule of the verdict on one record: python -m proofs.rules [--loops 1200] [--seed 13000000]
 
-Loops of proofs/untidy are judged with all rules, and with each left out or a threshold moved. Counted are cycles
-found of those that show; causes right and wrong of the clear ones, and of all that show (proofs/untidy_loops.py);
-valves blamed that move freely; healthy loops of which anything is named. A rule whose absence makes nothing worse is
-not worth its lines, unless something else than these draws holds it (HELD). Writes proofs/rules.md.
+Loops of proofs/untidy are assessed with all rules, and again without one rule or with one threshold changed. The
+table counts the oscillations found of those that show. It counts right and wrong causes of the clear loops, and of
+all that show (proofs/untidy_loops.py). It also counts freely moving valves that are blamed, and loops without a fault
+for which a cause is named. A rule whose omission makes no count worse is not necessary, unless other data need it
+(HELD). Writes proofs/rules.md.
 """
 
 from __future__ import annotations
@@ -30,15 +31,15 @@ from proofs.untidy_loops import NAMED, clear, recorded, shows
 WHOLE = Config()
 HEADS = "rule | found | clear right | clear wrong | shown right | shown wrong | free valves blamed | healthy named"
 Rule = tuple[Mapping[tuple[ModuleType, str], Callable[..., Any]], Config]
-"""What stands in a function's place, and the limits."""
+"""Replacements of functions, and the limits."""
 
 
 def _never(*_: Any, **__: Any) -> None:
-    """A rule that asks for nothing."""
+    """A rule that never applies."""
 
 
 def _always(*_: Any, **__: Any) -> bool:
-    """A rule that is content."""
+    """A rule that always accepts."""
     return True
 
 
@@ -48,7 +49,7 @@ def _limits(section: str, **changed: float) -> Rule:
 
 RULES: Mapping[str, Rule] = {
     "all": ({}, WHOLE),
-    "a set point's response asked for at rest alone": _limits("oscillation", sensitive=1e9),
+    "a set point's response required at rest alone": _limits("oscillation", sensitive=1e9),
     "no set point's response": ({(oscillation, "_lasts"): _always}, WHOLE),
     "no cycle of few samples": _limits("oscillation", samples_few=WHOLE.oscillation.samples),
     "no swing between limits": _limits("oscillation", swing_least=1e9),
@@ -56,8 +57,8 @@ RULES: Mapping[str, Rule] = {
     "stickbands of any size": _limits("cause", least_size=0.0),
     "likely valves of compressed trends": ({(cause, "compressed"): _never}, WHOLE),
     "causes of compressed trends": ({(fitness, "compressed"): _never}, WHOLE),
-    "PV that stands and jumps": ({(fitness, "pv_that_jumps"): _never}, WHOLE),
-    "plays within PV's grid": ({(assess, "hidden_by_grid"): lambda *_: False}, WHOLE),
+    "PV that sticks and jumps": ({(fitness, "pv_that_jumps"): _never}, WHOLE),
+    "backlash within PV's grid": ({(assess, "hidden_by_grid"): lambda *_: False}, WHOLE),
     "calm loops whose stretches do not agree": ({(cause, "agrees"): _always}, WHOLE),
     "calm loops with one sign": _limits("cause", signs=1),
 }
@@ -65,7 +66,7 @@ RULES: Mapping[str, Rule] = {
 
 @contextmanager
 def _under(places: Mapping[tuple[ModuleType, str], Callable[..., Any]]) -> Iterator[None]:
-    """Functions in other ones' places, for a while."""
+    """Replace functions temporarily."""
     before = {place: getattr(*place) for place in places}
     for (module, name), other in places.items():
         setattr(module, name, other)
@@ -78,16 +79,17 @@ def _under(places: Mapping[tuple[ModuleType, str], Callable[..., Any]]) -> Itera
 
 @dataclass(frozen=True)
 class Judged:
-    """A drawn loop: its cause, whether that shows and is clear; by rule, whether a cycle was found and what named."""
+    """A drawn loop: its cause, whether the cause shows and is clear; by rule, whether a cycle was found and the named
+    cause."""
 
     cause: str
     shows: bool
     clear: bool
-    said: Mapping[str, tuple[bool, str]]
+    answers: Mapping[str, tuple[bool, str]]
 
 
 def judged(seed: int) -> Judged | None:
-    """A loop's verdicts; None of one without a good sample."""
+    """A loop's verdicts; None for a loop without a good sample."""
     drawn, fits = draw(seed), {}
     prepared, stated = recorded(drawn, WHOLE)
     if not prepared.record.at_work.any():
@@ -116,48 +118,48 @@ def judged(seed: int) -> Judged | None:
 
 
 def counts(name: str, loops: list[Judged]) -> list[int]:
-    """The columns of a rule."""
-    ill = [(x, *x.said[name]) for x in loops if x.cause != "healthy"]
+    """The counts of a rule, by column."""
+    ill = [(x, *x.answers[name]) for x in loops if x.cause != "healthy"]
     named = [(x, cause == NAMED[x.cause]) for x, _, cause in ill if cause not in ("undecided", "none")]
     shown = [right for x, right in named if x.shows]
-    plain = [right for x, right in named if x.clear]
-    free = (x.said[name][1] for x in loops if x.cause in ("healthy", "tuning", "load"))
-    well = (x.said[name][1] for x in loops if x.cause == "healthy")
+    clear_ones = [right for x, right in named if x.clear]
+    free = (x.answers[name][1] for x in loops if x.cause in ("healthy", "tuning", "load"))
+    well = (x.answers[name][1] for x in loops if x.cause == "healthy")
     return [
         sum(found for x, found, _ in ill if x.shows),
-        *(sum(plain), len(plain) - sum(plain), sum(shown), len(shown) - sum(shown)),
+        *(sum(clear_ones), len(clear_ones) - sum(clear_ones), sum(shown), len(shown) - sum(shown)),
         sum(cause == "valve" for cause in free),
         sum(cause not in ("undecided", "none") for cause in well),
     ]
 
 
 HELD = """\
-What holds the rules that gain nothing in these draws stands elsewhere:
+Some rules do not improve the counts of these draws. Other data need them:
 
-- *stickbands of any size*: without it a healthy slow loop's valve is blamed in a record of a day
-  (tests/analyzer/loop/test_cause.py); the draws hold none as long.
-- *PV that stands and jumps*: without it a valve is blamed behind a sensor that sticks
+- *stickbands of any size*: without it the valve of a slow loop without a fault is blamed in a record of a day
+  (tests/analyzer/loop/test_cause.py); the draws include no record of this length.
+- *PV that sticks and jumps*: without it a valve is blamed behind a sensor that sticks
   (tests/analyzer/loop/test_sticking_sensor.py); the draws have no such sensor.
-- *plays within PV's grid*: four of seven healthy valves that were told on calm loops stood on few steps of a grid
-  (cause.grid_covered in analyzer/limits.toml).
-- *likely valves of compressed trends*: two of 30 such cycles of another cause looked like valves
+- *backlash within PV's grid*: seven valves without a fault were blamed in loops that do not oscillate; four of these
+  trends covered few steps of a grid (cause.grid_covered in analyzer/limits.toml).
+- *likely valves of compressed trends*: two of 30 such cycles of another cause resembled valve faults
   (cause.compressed_pct).
 - *loads on a coarse grid*: of 24 valves on a grid of 0.4 and 0.8 of PV's amplitude (proofs/recorded.py, seeds 0 to
-  5) 7 are told as loads without it; so are 12 of 12 loads, undecided with it.
-- *tight loops that are robust*: it speaks of 2 of 240 loops (../shared/recordings: isdb, refinery, field;
-  ../shared/wild). Without it one is called too tight and robust in one text (field, BOX17); of the other (W31026)
-  the tuning is at fault.
+  5) 7 are reported as loads without it. 12 of 12 loads are reported as loads without it, and undecided with it.
+- *tight loops that are robust*: it applies to 2 of 240 loops (../shared/recordings: isdb, refinery, field;
+  ../shared/wild). Without it one text calls a loop both too tight and robust (field, BOX17). For the other loop
+  (W31026) the tuning is the true cause.
 """
 
 
 def main() -> None:
-    """Judge all loops and write the table beside this file."""
+    """Assess all loops and write the table next to this file."""
     options = command_line(__doc__, loops=1200, seed=13_000_000, jobs=2)
     with Pool(options.jobs) as pool:
         every = pool.map(judged, range(options.seed, options.seed + options.loops), chunksize=10)
     loops = [x for x in every if x is not None]
-    show, plain, well = (sum(test(x) for x in loops) for test in TESTS)
-    said = f"Of {len(loops)} loops {show} show their cause, {plain} clearly; {well} are healthy."
+    show, clear_ones, well = (sum(test(x) for x in loops) for test in TESTS)
+    said = f"Of {len(loops)} loops {show} show their cause, {clear_ones} clearly; {well} have no fault."
     text = table(HEADS, [[name, *counts(name, loops)] for name in RULES])
     publish(
         __file__,

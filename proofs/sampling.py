@@ -1,10 +1,10 @@
 """Worn valves by the interval of the rows: python -m proofs.sampling FOLDER ... [--every 1 10 30] [--seed 51 52]
 
-Folders of plants as ../shared/plants has them (export.parquet, loops.csv, truth.json); with --seed worn valves of
-benchmarks/world. One row in so many is kept of each loop whose valve is worn, and the loop is assessed. Counted are
-loops whose cycle has fifteen rows or more at that interval: named as the valve's fault, width of the play or
-stickband within 15 %, slope within 25 %, dead time within 30 % or half a row, and the 90 % interval of the width
-holding the truth. Writes proofs/sampling.md.
+The folders hold plants as ../shared/plants does (export.parquet, loops.csv, truth.json). With --seed, worn valves of
+benchmarks/world are added. Of each loop with a worn valve one row of every --every is kept, and the loop is assessed.
+Loops count whose cycle has fifteen rows or more at that interval. The table counts: the valve's fault named, width of
+backlash or stickband within 15 %, slope within 25 %, dead time within 30 % or half a row, and the 90 % interval of
+the width containing the truth. Writes proofs/sampling.md.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from identification.errors import NotAssessedError
 from proofs.common import command, command_line, publish
 
 ROWS = 15
-"""Rows a cycle from which a loop counts."""
+"""Least number of rows a cycle with which a loop counts."""
 WORN = 8
-"""Valves with play, and as many that stick, of one draw of the world."""
+"""Number of valves with backlash, and of valves with stick-slip, in one draw of the world."""
 KINDS = ("named", "width", "slope", "dead time", "interval")
 
 
 def judged(name: str, export: Path, loops: Path, truth: dict[str, float], every: int) -> Counter[str]:
-    """What of one loop is right; nothing where its cycle has too few rows or is not seen."""
+    """The right answers for one loop; empty where its cycle has too few rows or is not found."""
     try:
         found = api.assess(api.read(export, loops=loops).loop(name))
     except NotAssessedError:
@@ -102,7 +102,7 @@ def settings(d: Drawn) -> dict[str, float]:
 
 
 def main() -> None:
-    """Count each plant at each interval and write the table beside this file."""
+    """Count each plant at each interval and write the table next to this file."""
     options = command_line(__doc__, folders="*", every=[1, 10, 30], seed=[], jobs=2)
     lines = ["| plant | every | loops | " + " | ".join(KINDS) + " |", "|---|--:|" + "--:|" * (1 + len(KINDS))]
     for folder in options.folders:

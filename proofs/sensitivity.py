@@ -1,8 +1,9 @@
-"""How small and how short an oscillation is found and explained: python -m proofs.sensitivity [--records 24]
+"""How small and how short an oscillation can be to be found and explained: python -m proofs.sensitivity [--records
+24]
 
-A level loop with play in its valve and a pressure loop that a machine swings are simulated at noise from an eighth
-of the amplitude to three times it, and over few and many periods. Writes sensitivity.md here and
-docs/figures/sensitivity.png.
+Two loops are simulated: a level loop with backlash in its valve, and a pressure loop with an external periodic load.
+The noise is from an eighth of the amplitude to three times it, and the record has few to many periods. Writes
+sensitivity.md here and docs/figures/sensitivity.png.
 """
 
 from __future__ import annotations
@@ -33,13 +34,13 @@ SKETCHES = {
 RATIOS = (0.3, 0.5, 0.6, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 8.0)
 """Amplitude of the cycle over the standard deviation of the noise on PV, white at 1 s.
 
-Of the cycle as it is without noise. Noise that the controller passes on at every scan dithers the stem through the
-play; noise on the recorded PV alone, as where the controller filters, leaves the cycle as it is.
+The amplitude is that without noise. Noise that the controller passes on at every scan moves the stem through the
+backlash (dither). Noise on the recorded PV alone, as with a filtering controller, does not change the cycle.
 """
 PERIODS = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0, 40.0, 80.0)
-"""Periods that the record holds."""
+"""Periods in the record."""
 AT_PERIODS, AT_RATIO = 30.0, 3.0
-"""Periods of the records whose noise varies; amplitude over noise of those whose length does."""
+"""Periods of the records with varying noise; amplitude over noise of the records with varying length."""
 COLOURS = dict(zip(SKETCHES, ("#b3342d", "#d98a2b", "#1f6f9f"), strict=True))
 
 
@@ -74,7 +75,7 @@ def clean(name: str) -> tuple[float, float]:
 
 
 def made(cell: Cell, seed: int) -> Trends:
-    """The end of a longer record, so that the cycle has begun and its phase is any."""
+    """The end of a longer record, so that the cycle is developed and has a random phase."""
     period, amplitude = clean(cell.name)
     n = int(cell.periods * period)
     rng = np.random.default_rng([seed, 1])
@@ -103,7 +104,7 @@ def cells() -> list[Cell]:
 
 
 def shares(records: int, jobs: int) -> list[Share]:
-    """Shares of every cell over so many records."""
+    """Shares of every cell over `records` records."""
     cases = [(cell, seed) for cell in cells() for seed in range(records)]
     with get_context("spawn").Pool(jobs) as pool:
         results = pool.map(judged, cases, chunksize=8)
@@ -117,7 +118,7 @@ def shares(records: int, jobs: int) -> list[Share]:
     return out
 
 
-def told(found: Sequence[Share]) -> str:
+def table_of(found: Sequence[Share]) -> str:
     """A Markdown table of all cells."""
     heads = "loop | amplitude over noise | periods | oscillation found % | right cause % | wrong cause %"
     rows = (
@@ -129,7 +130,7 @@ def told(found: Sequence[Share]) -> str:
 
 
 def draw(found: Sequence[Share], path: Path) -> None:
-    """Two panels: against amplitude over noise, and against the periods seen."""
+    """Two panels: against amplitude over noise, and against the number of periods."""
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -181,18 +182,19 @@ def draw(found: Sequence[Share], path: Path) -> None:
 
 
 def main() -> None:
-    """Run all records, write the table beside this file and the picture."""
+    """Run all records, write the table and the picture."""
     options = command_line(__doc__, records=12, jobs=2)
     found = shares(options.records, options.jobs)
     shown = f"{command(__file__, records=options.records)}, drawn in docs/figures"
     about = (
-        "Amplitude is that of the cycle without noise; noise is white at 1 s. Passed on to OP at every scan it\n"
-        "dithers the stem through the play, and below an amplitude of about twice the noise there is no cycle left\n"
-        f"to find. Records of varying noise hold {AT_PERIODS:g} periods; those of varying length have an amplitude\n"
-        f"{AT_RATIO:g} times the noise."
+        "Amplitude is that of the cycle without noise; noise is white at 1 s. Where the controller passes it on to\n"
+        "OP at every scan, it moves the stem through the backlash (dither). Below an amplitude of about twice the\n"
+        "noise there is then no cycle. "
+        f"Records of varying noise have {AT_PERIODS:g} periods; those of varying length\n"
+        f"have an amplitude {AT_RATIO:g} times the noise."
     )
     draw(found, FIGURE)
-    publish(__file__, "What is found, and what is explained", shown, about, told(found))
+    publish(__file__, "What is found, and what is explained", shown, about, table_of(found))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
-"""Are stated settings told from the controller's where they differ? python -m proofs.settings [--seed 71 72]
+"""Are stated settings reported as wrong where they differ from the controller's? python -m proofs.settings [--seed 71
+72]
 
-Controllers of many kinds (proofs/settings_plant.py, which shares no code with the package) are recorded with the
-settings stated as they are, and stated wrong. Writes settings.md here.
+Controllers of many kinds (proofs/settings_plant.py, which shares no code with the package) are recorded. Their
+settings are stated correctly, and stated wrong. Writes settings.md here.
 """
 
 from __future__ import annotations
@@ -35,11 +36,11 @@ STATED: dict[str, Callable[[Pid], Pid]] = {
     "without Td": lambda c: replace(c, td_s=0.0),
     "sign turned": lambda c: replace(c, kp=-c.kp),
 }
-"""What the controller is stated to be."""
+"""The stated settings of the controller."""
 
 
-def told(seed: int, count: int) -> list[tuple[str, dict[str, bool]]]:
-    """For each loop of a seed its kind, and whether each way to state its settings is told as wrong."""
+def reported(seed: int, count: int) -> list[tuple[str, dict[str, bool]]]:
+    """For each loop of a seed its kind, and whether each way to state its settings is reported as wrong."""
     config, made = Config(), recordings(seed, count)
     out = []
     with tempfile.TemporaryDirectory() as name:
@@ -69,8 +70,8 @@ def told(seed: int, count: int) -> list[tuple[str, dict[str, bool]]]:
 
 def main() -> None:
     """Count over all loops of some seeds and write the table."""
-    asked = command_line(__doc__, seed=[71, 72], loops=60)
-    rows = [row for seed in asked.seed for row in told(seed, asked.loops)]
+    options = command_line(__doc__, seed=[71, 72], loops=60)
+    rows = [row for seed in options.seed for row in reported(seed, options.loops)]
     kinds = sorted({kind for kind, _ in rows})
 
     def cells(label: str) -> list[str]:
@@ -82,9 +83,9 @@ def main() -> None:
     publish(
         __file__,
         "Are stated settings those of the controller?",
-        command(__file__, seed=asked.seed, loops=asked.loops),
-        "Loops of which the stated settings are told as not the controller's; of the first row each one is a false "
-        "alarm.",
+        command(__file__, seed=options.seed, loops=options.loops),
+        "Loops whose stated settings are reported as not those of the controller; in the first row each report is a "
+        "false alarm.",
         text,
     )
 

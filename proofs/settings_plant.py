@@ -1,8 +1,9 @@
-"""Recordings of controllers of many kinds, simulated with no code of the package, for the check of settings.
+"""Recordings of controllers of many kinds, simulated without code of the package, for the check of settings.
 
-Controllers are P, PI and PID in ideal, series or parallel form, position algorithm, derivative of the error or of PV
-behind a filter, PV filtered or not, scanned faster than the log, with it, or slower; OP is clamped and rounded; PV is
-noisy and quantised; the set point rests, steps, ramps or follows a wave; some are in manual for a while.
+Controllers are P, PI and PID in ideal, series or parallel form, as position algorithm. The derivative acts on the
+error or on PV behind a filter; PV is filtered or not. The scan is faster than the log, equal to it, or slower. OP is
+clamped and rounded; PV is noisy and quantised. The set point is constant, steps, ramps or oscillates. Some loops are
+in manual for a time.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import pandas as pd
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """One recording: its columns, its row of loops.csv with the true settings, and what kind of controller it is."""
+    """One recording: its columns, its row of loops.csv with the true settings, and the kind of its controller."""
 
     tag: str
     trends: pd.DataFrame
@@ -26,7 +27,7 @@ class Recorded:
 
 
 def _controller(rng: np.random.Generator, lag_s: float, dead_s: float, gain: float) -> dict[str, float | str]:
-    """Settings by internal model rules, from tight to lazy, in the form of the maker."""
+    """Settings by internal model control, from tight to slow, in the form of the controller."""
     kind = str(rng.choice(["P", "PI", "PI", "PID", "PID"]))
     closed = dead_s * rng.uniform(0.6, 4.0)
     kp = lag_s / (gain * (closed + dead_s)) * rng.uniform(0.7, 1.2)
@@ -46,7 +47,7 @@ def _controller(rng: np.random.Generator, lag_s: float, dead_s: float, gain: flo
 
 
 def _parts(c: dict[str, float | str]) -> tuple[float, float, float]:
-    """Proportional, integral and derivative gain of the law, all on the error."""
+    """Proportional, integral and derivative gain of the control law, all on the error."""
     kp, ti, td = float(c["kp"]), float(c["ti"]), float(c["td"])
     if c["form"] == "series":
         return kp * (1.0 + td / ti), kp / ti, kp * td
@@ -54,7 +55,7 @@ def _parts(c: dict[str, float | str]) -> tuple[float, float, float]:
 
 
 def _set_point(rng: np.random.Generator, n: int, scan_s: float, slow_s: float) -> np.ndarray:
-    """A set point that rests, steps, ramps or waves, about 50 %."""
+    """A set point that is constant, steps, ramps or oscillates, about 50 %."""
     t = np.arange(n) * scan_s
     kind = rng.choice(["rests", "rests", "steps", "ramps", "waves"])
     if kind == "rests":
@@ -69,13 +70,13 @@ def _set_point(rng: np.random.Generator, n: int, scan_s: float, slow_s: float) -
 
 
 def _loads(rng: np.random.Generator, n: int, scan_s: float, slow_s: float) -> np.ndarray:
-    """What the process is loaded with [% OP]: a slow walk, steps, at times a wave."""
+    """The load of the process [% OP]: a slow random walk, steps, sometimes a sine."""
     walk = np.cumsum(rng.standard_normal(n)) * math.sqrt(scan_s / slow_s) * rng.uniform(0.2, 1.0)
     walk -= np.linspace(0, walk[-1], n) * 0.7
     at = rng.random(n) < scan_s / (60 * slow_s)
     steps = np.cumsum(np.where(at, rng.uniform(-6, 6, n), 0.0))
-    wave = rng.choice([0.0, rng.uniform(1, 5)])
-    moved = walk + steps + wave * np.sin(2 * np.pi * np.arange(n) * scan_s / (slow_s * rng.uniform(5, 20)))
+    sine = rng.choice([0.0, rng.uniform(1, 5)])
+    moved = walk + steps + sine * np.sin(2 * np.pi * np.arange(n) * scan_s / (slow_s * rng.uniform(5, 20)))
     return np.clip(moved, -45, 45)
 
 
@@ -96,7 +97,7 @@ def _loop(
     sp, load = _set_point(rng, n, scan_s, lag_s), _loads(rng, n, scan_s, lag_s)
     noise = rng.standard_normal(n) * rng.choice([0.003, 0.02, 0.08])
     pv_step, op_step = rng.choice([0.0, 0.02, 0.1]), rng.choice([0.0, 0.1, 100.0 / 255.0])
-    play = rng.choice([0.0, 0.0, rng.uniform(0.3, 3.0)])
+    backlash = rng.choice([0.0, 0.0, rng.uniform(0.3, 3.0)])
     top = rng.choice([100.0, 100.0, 50.0 + rng.uniform(2, 12)])
     manual = np.zeros(n, dtype=bool)
     if rng.random() < 0.3:
@@ -126,17 +127,17 @@ def _loop(
                 integral = trial
             op = _rounded(min(max(kp * e + integral + kd * slope, 0.0), top), op_step)
         ops[k] = op
-        stem = min(max(stem, op - play / 2), op + play / 2) if play else op
+        stem = min(max(stem, op - backlash / 2), op + backlash / 2) if backlash else op
     return sp, pvs, ops, manual
 
 
 def recordings(seed: int, count: int) -> list[Recorded]:
-    """So many recordings of one seed."""
+    """`count` recordings of one seed."""
     return [_recording(np.random.default_rng([seed, k]), f"S{seed}K{k:03d}") for k in range(count)]
 
 
 def _recording(rng: np.random.Generator, tag: str) -> Recorded:
-    """One loop at a scan of its own, logged every so many scans, or oftener than it is scanned."""
+    """One loop at its own scan, logged every few scans, or more often than it is scanned."""
     log_s = float(rng.choice([1.0, 2.0, 5.0]))
     scans, held = [(1, 1), (1, 1), (3, 1), (10, 1), (1, 2)][int(rng.integers(5))]
     dead_s = log_s * 10 ** rng.uniform(0.5, 1.3)
@@ -154,6 +155,6 @@ def _recording(rng: np.random.Generator, tag: str) -> Recorded:
 
 
 def _stated_times(c: dict[str, float | str]) -> dict[str, float]:
-    """Integral and derivative time as the form states them: in the parallel one they are gains of their own."""
+    """Integral and derivative time as the form states them; in the parallel form they are separate gains."""
     kp, ti, td = float(c["kp"]), float(c["ti"]), float(c["td"])
     return {"ti": ti / kp, "td": kp * td} if c["form"] == "parallel" else {"ti": ti, "td": td}

@@ -1,10 +1,11 @@
 """Overrides, split ranges and batches: python -m proofs.shared [--seed 301 302 303 304] [--jobs 2]
 
-Plants of six overrides, six split ranges and six batch loops (proofs/shared_plant.py), twelve hours every two
-seconds. Counted are: who has a valve (within two percent of the time), windup told where an output winds up and not
-where it follows; the change-over of a split range (within two percent of the output), the answer to a half (within a
-factor of 1.35 where it is told); faults told at the valve that has them, of those that swell the loop's error by .3;
-phases of a programme with their repetitions; and what is blamed that is sound. Writes shared.md here.
+Each plant has six overrides, six split ranges and six batch loops (proofs/shared_plant.py), twelve hours, recorded
+every two seconds. The table counts right answers. Overrides: which loop has the valve (within two percent of the
+time), and windup reported where an output winds up and not where it follows. Split ranges: the change-over (within
+two percent of the output), and the answer to a half (within a factor of 1.35 where it is reported). Faults: those
+reported at the faulty valve, of faults that increase the loop's error by .3. Batches: phases of a programme with
+their repetitions. It also counts blamed loops without a fault. Writes shared.md here.
 """
 
 from __future__ import annotations
@@ -39,17 +40,17 @@ COLUMNS = (
 )
 Row = Mapping[str, Any]
 SHOWS = 1.3
-"""Spread of the error over that without the fault from which a fault shows."""
+"""Ratio of the error's spread to that without the fault, from which a fault shows."""
 
 
-def told(built: Plant, jobs: int) -> dict[str, Row]:
-    """What a night tells of a plant's loops."""
+def night_rows(built: Plant, jobs: int) -> dict[str, Row]:
+    """The rows of a night for the loops of a plant."""
     specs, _ = match([LoopSpec(**s) for s in built.stated], built.tags)  # type: ignore[arg-type]
     return night_of(built.tags, specs, EVERY, COLUMNS, jobs)
 
 
 def of_override(row: Row, true: Row) -> dict[str, bool]:
-    """What of a loop that shares a valve is told right."""
+    """Which answers are right for a loop that shares a valve."""
     out = {"share of the valve": abs((row["valve_pct"] or 0.0) - true["share"]) <= 2.0}
     winds = "windup" in (row["lanes"] or "")
     out["windup" if true["winds_up"] else "none where the output follows"] = winds == true["winds_up"]
@@ -57,16 +58,17 @@ def of_override(row: Row, true: Row) -> dict[str, bool]:
 
 
 def of_half(row: Row, true: Row) -> dict[str, bool]:
-    """What of a half of a split range is told right."""
+    """Which answers are right for a half of a split range."""
     out = {"change-over": abs((row["split_at_pct"] or math.inf) - true["at"]) <= 2.0}
     if row["half_slope"] is not None:
         off = abs(math.log(max(row["half_slope"] * true["lag"] / true["gain"], 1e-3)))
-        out["answer to a half, where told"] = off <= math.log(1.35)
+        out["answer to a half, where reported"] = off <= math.log(1.35)
     return out
 
 
 def of_batch(row: Row, true: Row) -> dict[str, bool]:
-    """What of a loop of a programme is told right: a phase that is up by the first step, in every batch but one."""
+    """Whether the answer is right for a loop with a programme: a phase that rises by the first step, in all batches
+    except one."""
     found = json.loads(row["phases"] or "[]")
     rise = [p for p in found if abs(p["end"] - p["begin"] - true["rise"]) < 1.0]
     return {"phases": bool(rise) and len(rise[0]["start_s"]) >= true["batches"] - 1}
@@ -76,7 +78,7 @@ OF = {"override": of_override, "half": of_half, "batch": of_batch}
 
 
 def counted(built: Plant, rows: Mapping[str, Row]) -> tuple[Counter[str], list[tuple[str, ...]]]:
-    """What is asked and right in one plant, what is wrong, and the loops of which something is."""
+    """Tested and right answers of one plant, wrong answers, and the loops with a missed or wrong answer."""
     out: Counter[str] = Counter()
     missed = []
     for loop, true in built.truth.items():
@@ -87,21 +89,21 @@ def counted(built: Plant, rows: Mapping[str, Row]) -> tuple[Counter[str], list[t
         if worn and true["swell"] >= SHOWS:
             answers[f"worn valve of a {kind} loop"] = blamed
         for name, right in answers.items():
-            out[f"asked {kind}: {name}"] += 1
+            out[f"tested {kind}: {name}"] += 1
             out[f"right {kind}: {name}"] += right
         wrong = {
-            "sound valves blamed": blamed and not worn and true["cause"] not in FAULT,
+            "valves without a fault blamed": blamed and not worn and true["cause"] not in FAULT,
             "controllers of a split range blamed for a half's valve": kind == "split" and blamed,
-            "hand-overs told as cycles": kind in ("override", "half")
+            "hand-overs reported as cycles": kind in ("override", "half")
             and true["cause"] == "healthy"
             and (row["oscillating_pct"] or 0.0) >= 50.0,
-            "sound loops retuned": true["cause"] == "healthy" and row["action"] == Action.RETUNE,
+            "loops without a fault retuned": true["cause"] == "healthy" and row["action"] == Action.RETUNE,
         }
         out.update({f"wrong {name}": int(is_so) for name, is_so in wrong.items()})
         bad = [name for name, right in answers.items() if not right] + [k for k, v in wrong.items() if v]
         if bad:
-            said = (row["cause"], row["action"], row["source_loop"])
-            missed.append((loop, f"{kind}: {true['cause']}", "; ".join(bad), *(str(x or "") for x in said)))
+            shown = (row["cause"], row["action"], row["source_loop"])
+            missed.append((loop, f"{kind}: {true['cause']}", "; ".join(bad), *(str(x or "") for x in shown)))
     return out, missed
 
 
@@ -112,20 +114,20 @@ def main() -> None:
     missed = []
     for seed in given.seed:
         built = plant(seed)
-        found, more = counted(built, told(built, given.jobs))
+        found, more = counted(built, night_rows(built, given.jobs))
         total.update(found)
         missed += [(str(seed), *m) for m in more]
         print(f"plant {seed} done", file=sys.stderr)
-    asked = sorted(k.removeprefix("asked ") for k in total if k.startswith("asked "))
+    tested = sorted(k.removeprefix("tested ") for k in total if k.startswith("tested "))
     wrong = sorted(k.removeprefix("wrong ") for k in total if k.startswith("wrong "))
     publish(
         __file__,
         "Overrides, split ranges and batches",
         command(__file__, seed=given.seed),
         (__doc__ or "").split("\n\n")[1].replace("\n", " ").split(" Writes shared.md")[0],
-        table("told | asked | right", [(k, total[f"asked {k}"], total[f"right {k}"]) for k in asked]),
+        table("answer | tested | right", [(k, total[f"tested {k}"], total[f"right {k}"]) for k in tested]),
         table("wrong | loops", [(k, total[f"wrong {k}"]) for k in wrong]),
-        "Loops of which something is missed or wrong:",
+        "Loops with a missed or wrong answer:",
         table("plant | loop | truth | what | cause | action | source", missed),
     )
 

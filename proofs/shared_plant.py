@@ -1,7 +1,8 @@
-"""Loops that share a valve, or a process: overrides, split ranges, and batches of a programme, with the truth beside.
+"""Loops that share a valve or a process: overrides, split ranges, and batches of a programme, with the truth.
 
 Shares no code with the analyzer. Controllers are PI in position form; the one without the valve winds up, or follows
-the valve (external reset). Valves stick after He's law or play. Percent of spans, seconds, a scan a second.
+the valve (external reset). Valves stick by He's model, or have backlash. Percent of spans, seconds, one scan a
+second.
 """
 
 from __future__ import annotations
@@ -16,23 +17,23 @@ from proofs.structure_plant import stem_after, wander
 
 Floats = NDArray[np.float64]
 EVERY = 2
-"""Scans of which one is recorded."""
+"""Every EVERY-th scan is recorded."""
 WARM = 3600
 """Scans before the recording."""
 FAULT = {"stick": (0.0, 1.0, 0.6), "play": (1.0, 0.0, 0.0)}
-"""Play, stickband and slip jump of a faulty valve, over its width."""
+"""Backlash, stickband and slip jump of a faulty valve, relative to its width."""
 
 
 @dataclass
 class Plant:
-    """Trends by tag, rows of loops.csv, and what is true, by loop."""
+    """Trends by tag, rows of loops.csv, and the truth, by loop."""
 
     tags: dict[str, Floats] = field(default_factory=dict)
     stated: list[dict[str, object]] = field(default_factory=list)
     truth: dict[str, dict[str, object]] = field(default_factory=dict)
 
     def keep(self, loop: str, trends: dict[str, Floats], stated: dict[str, object], **true: object) -> None:
-        """Keep what is recorded of a loop, rounded as historians round, and its truth."""
+        """Keep the recorded trends of a loop, rounded as by a historian, and its truth."""
         for role, x in trends.items():
             self.tags[f"{loop}.{role}"] = np.round(x[WARM::EVERY], 3 if role != "OP" else 2)
         self.stated.append({"loop": loop, "pv_lo": 0.0, "pv_hi": 100.0, **stated})
@@ -43,9 +44,10 @@ class Plant:
 def override(
     setting: Floats, sp: Floats, loads: Floats, noises: Floats, valve: Floats, follows: bool
 ) -> tuple[Floats, Floats, Floats]:
-    """PV and OP of two controllers of which the lower output has the valve, shape (2, n), and who has it, shape (n,).
+    """PV and OP of two controllers, shape (2, n), and which of them has the valve, shape (n,). The lower output has
+    the valve.
 
-    setting : gain, lag, dead time, kp, ti of each, shape (2, 5); sp, shape (2,); valve : play, stickband, jump.
+        setting: gain, lag, dead time, kp, ti of each, shape (2, 5); sp, shape (2,); valve: backlash, stickband, jump.
     """
     n = loads.shape[1]
     pv, op, has = np.empty((2, n)), np.empty((2, n)), np.empty(n)
@@ -76,10 +78,11 @@ def override(
 def split(
     setting: Floats, at: float, gains: Floats, sp: Floats, load: Floats, noise: Floats, valves: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """PV and OP of a controller, shape (n,), and the outputs to its two valves, shape (2, n): the first opens as OP
-    falls under `at`, the second as it rises above.
+    """PV and OP of a controller, shape (n,), and the outputs to its two valves, shape (2, n).
 
-    setting : lag, dead time, kp, ti; gains : of the two valves, shape (2,); valves : play, stickband, jump, (2, 3).
+    The first valve opens as OP falls below `at`, the second as it rises above.
+    setting: lag, dead time, kp, ti; gains: of the two valves, shape (2,); valves: backlash, stickband, jump, (2,
+    3).
     """
     n = load.size
     pv, op, out = np.empty(n), np.empty(n), np.empty((2, n))
@@ -103,22 +106,20 @@ def split(
 
 
 def spread(error: Floats, where: NDArray[np.bool_] | None = None) -> float:
-    """Spread of an error after the warm-up, where it counts."""
+    """Spread of an error after the warm-up, over the samples of `where`."""
     late = error[WARM:]
     return float(np.std(late if where is None else late[where[WARM:]]))
 
 
 def override_pair(out: Plant, rng: np.random.Generator, number: int, n: int) -> None:
-    """A flow whose valve a low pressure takes now and then."""
+    """A flow loop whose valve is taken over by a low-pressure loop from time to time."""
     fault = str(rng.choice(["healthy", "healthy", "stick", "play"]))
     follows = bool(rng.random() < 0.5)
     lag, dead = rng.uniform(4.0, 10.0, 2), rng.integers(1, 4, 2).astype(float)
     gain = np.array([rng.uniform(0.8, 1.5), -rng.uniform(0.8, 1.5)])
     kp, ti = 0.4 / gain, lag * rng.uniform(1.0, 2.0)
     setting = np.column_stack((gain, lag, dead, kp, ti))
-    low = np.array(
-        [0.0, -rng.uniform(12.0, 18.0)]
-    )  # the pressure's set point lies well under where it usually is
+    low = np.array([0.0, -rng.uniform(12.0, 18.0)])  # the pressure's set point is well below its usual value
     loads = np.stack((wander(rng, n, 1.0, 1200.0), np.zeros(n)))
     starved = np.zeros(n)
     for begin in range(int(rng.integers(3600, 7200)), n, int(rng.integers(9000, 16000))):
@@ -128,7 +129,7 @@ def override_pair(out: Plant, rng: np.random.Generator, number: int, n: int) -> 
     width = rng.uniform(2.0, 4.5)
     valve = width * np.array(FAULT.get(fault, (0.0, 0.0, 0.0)))
     pv, op, has = override(setting, 50.0 + low, loads, noises, valve, follows)
-    sound = override(setting, 50.0 + low, loads, noises, np.zeros(3), follows)
+    without_fault = override(setting, 50.0 + low, loads, noises, np.zeros(3), follows)
     for i, name in enumerate((f"FIC{number}", f"PIC{number}")):
         stated = {
             "type": ("flow", "pressure")[i],
@@ -138,14 +139,16 @@ def override_pair(out: Plant, rng: np.random.Generator, number: int, n: int) -> 
         }
         share = 100.0 * float(np.mean(has[WARM:] == i))
         trends = {"SP": np.full(n, 50.0 + low[i]), "PV": pv[i], "OP": op[i]}
-        swell = spread(50.0 + low[i] - pv[i], has == i) / spread(50.0 + low[i] - sound[0][i], sound[2] == i)
+        swell = spread(50.0 + low[i] - pv[i], has == i) / spread(
+            50.0 + low[i] - without_fault[0][i], without_fault[2] == i
+        )
         out.keep(
             name, trends, stated, kind="override", cause=fault, share=share, winds_up=not follows, swell=swell
         )
 
 
 def duty(rng: np.random.Generator, n: int, size: float) -> Floats:
-    """A load that goes from one level to another every hour or two, ten minutes long, now up, now down."""
+    """A load that changes its level every hour or two, with ramps of ten minutes, up and down."""
     goal, out, keep, x = np.zeros(n), np.empty(n), float(np.exp(-1.0 / 600.0)), 0.0
     side, begin = 1.0, 0
     while begin < n:
@@ -158,7 +161,7 @@ def duty(rng: np.random.Generator, n: int, size: float) -> Floats:
 
 
 def split_range(out: Plant, rng: np.random.Generator, number: int, n: int) -> None:
-    """A temperature with a cooling and a heating valve, one of which may be faulty, or far stronger."""
+    """A temperature loop with a cooling and a heating valve; one of them may be faulty, or much stronger."""
     fault = str(rng.choice(["healthy", "stick", "play", "unequal"]))
     lag, dead, at = (
         float(rng.uniform(40.0, 120.0)),
@@ -181,7 +184,7 @@ def split_range(out: Plant, rng: np.random.Generator, number: int, n: int) -> No
         sp[begin:] = 50.0 + rng.uniform(-4.0, 4.0)
     noise = rng.uniform(0.03, 0.08) * rng.standard_normal(n)
     pv, op, halves = split(np.array([lag, dead, kp, ti]), at, gains, sp, load, noise, valves)
-    sound = split(np.array([lag, dead, kp, ti]), at, gains, sp, load, noise, np.zeros((2, 3)))
+    without_fault = split(np.array([lag, dead, kp, ti]), at, gains, sp, load, noise, np.zeros((2, 3)))
     whole = f"TIC{number}"
     stated = {"type": "temperature", "kp": round(kp, 4), "ti": round(ti, 2)}
     out.keep(whole, {"SP": sp, "PV": pv, "OP": op}, stated, kind="split", cause=fault)
@@ -191,13 +194,13 @@ def split_range(out: Plant, rng: np.random.Generator, number: int, n: int) -> No
         out.keep(
             name, trends, {"type": "temperature", "split_of": whole}, kind="half", cause=worn, at=at,
             gain=float(gains[i]), lag=lag,
-            swell=spread(sp - pv, halves[i] > 0.0) / spread(sp - sound[0], sound[2][i] > 0.0),
+            swell=spread(sp - pv, halves[i] > 0.0) / spread(sp - without_fault[0], without_fault[2][i] > 0.0),
         )  # fmt: skip
 
 
 @njit(cache=True)
 def loop(setting: Floats, sp: Floats, load: Floats, noise: Floats, valve: Floats) -> tuple[Floats, Floats]:
-    """PV and OP of a lone loop, shape (n,); setting : gain, lag, dead time, ti, and kp scan by scan after them."""
+    """PV and OP of a single loop, shape (n,); setting: gain, lag, dead time, ti, followed by kp for each scan."""
     n = sp.size
     pv, op = np.empty(n), np.empty(n)
     x, total, stem = -30.0, 20.0, 20.0
@@ -217,7 +220,7 @@ def loop(setting: Floats, sp: Floats, load: Floats, noise: Floats, valve: Floats
 
 
 def batch_loop(out: Plant, rng: np.random.Generator, number: int, n: int) -> None:
-    """A temperature of a programme that is repeated: fill, a step, a ramp, a hold, and back."""
+    """A temperature loop with a repeated programme: fill, a step, a ramp, a hold, and back."""
     fault = str(rng.choice(["healthy", "healthy", "stick", "growing"]))
     lag, dead, gain = (
         float(rng.uniform(50.0, 150.0)),

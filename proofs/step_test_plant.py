@@ -1,7 +1,8 @@
-"""Step tests of known processes, for proofs: a simulator of its own, which shares no code with the packages.
+"""Step tests of known processes, for proofs: an independent simulator, which shares no code with the packages.
 
-Each is drawn by a seed: lag, two lags, integrator or inverse response; one to six moves; noise to a third of the
-answer; drift; play; a sample in 1 to 60 s; stamps that scatter. Processes are integrated by small Euler steps.
+Each test is drawn by a seed: lag, two lags, integrator or inverse response; one to six moves; noise up to a third of
+the response; drift; backlash; one sample in 1 to 60 s; irregular stamps. Processes are integrated by small Euler
+steps.
 """
 
 from __future__ import annotations
@@ -13,21 +14,24 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 FINE = 60
-"""Euler steps in the shortest time of a process."""
+"""Euler steps in the shortest time constant of a process."""
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What was drawn: gain [% PV/% OP], of an integrator its slope [1/s]; lags [s]; dead time [s]; zero of an inverse
-    response [s]; play [% OP]; noise over the answer [-]; moves; sample [s]; scatter of stamps in terms of it; drift
-    over the record in terms of the answer."""
+    """The drawn constants.
+
+    gain [% PV/% OP], for an integrator its slope [1/s]; lags [s]; dead time [s]; zero of an inverse response [s];
+    backlash [% OP]; noise relative to the response [-]; moves; sample [s]; scatter of stamps relative to the
+    sample; drift over the record relative to the response.
+    """
 
     kind: str
     gain: float
     lags_s: tuple[float, ...]
     dead_s: float
     zero_s: float
-    play: float
+    backlash: float
     noise: float
     moves: int
     sample_s: float
@@ -52,7 +56,7 @@ def drawn(seed: int) -> Truth:
     lags = {"lag": (slow,), "integrator": ()}.get(kind, (slow, slow * float(rng.uniform(0.15, 0.7))))
     total = sum(lags) or slow
     moves = int(rng.integers(1, 7))
-    # play is told apart from gain by moves in one direction and by reversals; of fewer moves it is not
+    # moves in one direction and reversals distinguish backlash from gain; fewer moves do not
     play = float(rng.uniform(0.05, 0.3)) if moves >= 4 and rng.random() < 0.4 else 0.0
     sample = float(np.clip(np.exp(rng.uniform(0.0, np.log(60.0))), 1.0, min(60.0, total / 40.0)))
     gain = float(rng.choice([-1.0, 1.0]) * np.exp(rng.uniform(np.log(0.3), np.log(3.0))))
@@ -72,16 +76,18 @@ def drawn(seed: int) -> Truth:
 
 
 def recorded(t: Truth, seed: int) -> Recorded:
-    """The test as a historian has it."""
+    """The test as a historian records it."""
     rng = np.random.default_rng([seed, 1])
     stamps, op, clean, noise = undisturbed(t, rng, t)
     return Recorded(stamps, clean + noise * rng.normal(size=clean.size), op)
 
 
 def undisturbed(t: Truth, rng: np.random.Generator, planned: Truth) -> tuple[Floats, Floats, Floats, float]:
-    """Stamps [s], OP, PV without noise and the size of the noise [%] of a process whose test was planned for another.
+    """Stamps [s], OP, PV without noise and the size of the noise [%] of a process whose test was planned for another
+    one.
 
-    The other process draws the test, so that the derivatives of PV by the constants of a process can be taken.
+    The other process determines the test. Therefore PV can be differentiated with respect to the constants of a
+    process.
     """
     p = planned
     scale = (sum(p.lags_s) + p.dead_s) if p.lags_s else 6.0 * p.dead_s
@@ -96,7 +102,7 @@ def undisturbed(t: Truth, rng: np.random.Generator, planned: Truth) -> tuple[Flo
     op = np.full(clock.size, 45.0)
     for at, way, size in zip(np.cumsum(rests)[:-1], ways, sizes, strict=True):
         op[clock >= at] += way * size
-    stem = behind_play(op, t.play * float(sizes.mean()), float(rng.uniform()))
+    stem = behind_backlash(op, t.backlash * float(sizes.mean()), float(rng.uniform()))
     clean = response(t, stem - stem[0], fine_s)
     answer = abs(p.gain) * float(sizes.mean()) * (float(rests.mean()) if p.kind == "integrator" else 1.0)
     stamps = np.arange(0.0, end_s - p.sample_s, p.sample_s)
@@ -107,7 +113,7 @@ def undisturbed(t: Truth, rng: np.random.Generator, planned: Truth) -> tuple[Flo
 
 
 def best_scatter(t: Truth, seed: int, name: str) -> float:
-    """Smallest standard deviation that an unbiased estimate of a constant can have, by the bound of Cramer and Rao.
+    """Smallest standard deviation of an unbiased estimate of a constant, by the bound of Cramer and Rao.
 
     The noise is white and normal; offset, drift and all constants of the process are unknown (Kay 1993, ch. 3).
     """
@@ -124,11 +130,11 @@ def best_scatter(t: Truth, seed: int, name: str) -> float:
 def _constants(t: Truth) -> list[str]:
     """Names of a process's constants; `lags_s:0` is the first lag."""
     named = ["gain", "dead_s", *(f"lags_s:{k}" for k in range(len(t.lags_s)))]
-    return named + [x for x in ("zero_s", "play") if getattr(t, x) > 0.0]
+    return named + [x for x in ("zero_s", "backlash") if getattr(t, x) > 0.0]
 
 
 def _slope(t: Truth, seed: int, constant: str) -> Floats:
-    """The derivative of PV by a constant, at its stamps."""
+    """The derivative of PV with respect to a constant, at its stamps."""
     name, _, at = constant.partition(":")
     value = t.lags_s[int(at)] if at else getattr(t, name)
     step = 0.02 * abs(value)
@@ -141,18 +147,18 @@ def _slope(t: Truth, seed: int, constant: str) -> Floats:
 
 
 def directions(t: Truth, rng: np.random.Generator) -> Floats:
-    """Ways of the moves: any, behind play with a reversal and two in one direction."""
+    """Directions of the moves: random; with backlash one reversal and two moves in one direction."""
     while True:
         ways = rng.choice([-1.0, 1.0], t.moves)
         if abs(ways.cumsum()).max() > 3:
             continue
         same = (ways[1:] == ways[:-1]).any() and (ways[1:] != ways[:-1]).any()
-        if t.play == 0.0 or same:
+        if t.backlash == 0.0 or same:
             return np.asarray(ways)
 
 
-def behind_play(op: Floats, width: float, begun: float) -> Floats:
-    """The stem within a gap of that width, where it begins at a share of it."""
+def behind_backlash(op: Floats, width: float, begun: float) -> Floats:
+    """The stem behind a backlash of that width; `begun` is its initial position as a share of the gap."""
     out, at = np.empty(op.size), op[0] + (begun - 0.5) * width
     for k, x in enumerate(op):
         at = min(max(at, x - 0.5 * width), x + 0.5 * width)
@@ -161,7 +167,7 @@ def behind_play(op: Floats, width: float, begun: float) -> Floats:
 
 
 def response(t: Truth, moved: Floats, step_s: float) -> Floats:
-    """The process's answer to a late stem, by Euler steps."""
+    """The response of the process to a delayed stem, by Euler steps."""
     if t.kind == "integrator":
         return np.asarray(t.gain * step_s * np.cumsum(moved))
     x, states = moved, []

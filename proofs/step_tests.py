@@ -1,4 +1,4 @@
-"""Simulated step tests read as a night reads them: constants beside the truth, intervals, and signs.
+"""Simulated step tests assessed as in a night: constants compared with the truth, intervals, and signs.
 
     python -m proofs.step_tests --tests 60 --seed 1
 
@@ -25,13 +25,13 @@ from proofs.step_test_plant import Truth, best_scatter, drawn, recorded
 
 RESULT = Path(__file__).with_suffix(".md")
 WITHIN = {"gain": 0.10, "sum of lags": 0.15, "dead time": 0.30}
-"""Errors that count as right, in terms of the truth; a dead time within a sample too."""
+"""Relative errors that count as right; for a dead time also an error of one sample."""
 
 
 @dataclass(frozen=True)
-class Asked:
-    """One constant of one test: its name, truth, estimate with interval, None where there is no model, and whether it
-    counts as right."""
+class Constant:
+    """One constant of one test: its name, truth, estimate with interval (None without a model), and whether it is
+    right."""
 
     name: str
     truth: float
@@ -40,16 +40,16 @@ class Asked:
     high: float
     right: bool
     possible: float = np.nan
-    """Probability that an unbiased normal estimate of the smallest possible scatter is right; dead times only."""
+    """Probability that an unbiased normal estimate with the smallest possible scatter is right; dead times only."""
 
     @property
     def holds(self) -> bool:
-        """Whether the interval holds the truth."""
+        """Whether the interval contains the truth."""
         return self.value is not None and self.low <= self.truth <= self.high
 
 
-def asked(seed: int) -> tuple[Truth, list[Asked]]:
-    """What the program says of one test, beside the truth."""
+def tested(seed: int) -> tuple[Truth, list[Constant]]:
+    """The estimates of one test with their truth."""
     t = drawn(seed)
     r = recorded(t, seed)
     none = np.zeros(r.pv.size, dtype=bool)
@@ -75,16 +75,16 @@ def asked(seed: int) -> tuple[Truth, list[Asked]]:
         )
         e = None if model is None else model.estimates.get(keys.get(name, "dead_time_s"))
         if e is None:
-            out.append(Asked(name, truth, None, 0.0, 0.0, False, can))
+            out.append(Constant(name, truth, None, 0.0, 0.0, False, can))
             continue
-        out.append(Asked(name, truth, e.value, e.low, e.high, abs(e.value - truth) <= near, can))
+        out.append(Constant(name, truth, e.value, e.low, e.high, abs(e.value - truth) <= near, can))
     return t, out
 
 
-def table(found: list[tuple[Truth, list[Asked]]]) -> Iterator[str]:
+def table(found: list[tuple[Truth, list[Constant]]]) -> Iterator[str]:
     """The result as lines of Markdown."""
     every = [a for _, of in found for a in of]
-    yield "| constant | tests | no model | right | interval holds the truth |\n|---|---|---|---|---|"
+    yield "| constant | tests | no model | right | interval contains the truth |\n|---|---|---|---|---|"
     for name, share in WITHIN.items():
         own = [a for a in every if a.name == name]
         some = [a for a in own if a.value is not None]
@@ -96,14 +96,15 @@ def table(found: list[tuple[Truth, list[Asked]]]) -> Iterator[str]:
     gains = [a for a in every if a.name == "gain" and a.value is not None]
     wrong = sum((a.value or 0.0) * a.truth < 0.0 for a in gains)
     some = [a for a in every if a.value is not None]
-    yield f"\nIntervals of all constants: {100 * sum(a.holds for a in some) / len(some):.0f} % hold the truth."
+    yield f"\nIntervals of all constants: {100 * sum(a.holds for a in some) / len(some):.0f} % contain the truth."
     yield f"Wrong signs: {wrong} of {len(gains)}."
     yield (
-        "\nDead times: unbiased estimates with the smallest scatter that the noise of each test allows (the bound of "
-        "Cramer and Rao, with gain, lags, zero, play, offset and drift unknown) would be right in "
+        "\nDead times: the bound of Cramer and Rao gives the smallest scatter that the noise of each test allows, "
+        "with gain, lags, zero, backlash, offset and drift unknown. Unbiased estimates with this scatter would be "
+        "right in "
         f"{100 * possible(every):.0f} %."
     )
-    yield "\n| by noise over the answer | tests | gain right | lags right | dead time right | the noise allows |"
+    yield "\n| by noise over the response | tests | gain right | lags right | dead time right | the noise allows |"
     yield "|---|---|---|---|---|---|"
     for low, high in ((0.0, 0.1), (0.1, 0.2), (0.2, 0.34)):
         part = [of for t, of in found if low <= t.noise < high]
@@ -115,30 +116,30 @@ def table(found: list[tuple[Truth, list[Asked]]]) -> Iterator[str]:
         yield f"| {low:g} to {high:g} | {len(part)} | {' | '.join(cells)} |"
 
 
-def possible(every: Iterable[Asked]) -> float:
-    """Share of dead times that unbiased estimates with the smallest possible scatter would have right."""
+def possible(every: Iterable[Constant]) -> float:
+    """Share of dead times for which unbiased estimates with the smallest possible scatter would be right."""
     shares = [a.possible for a in every if a.name == "dead time"]
     return float(np.mean(shares)) if shares else np.nan
 
 
 def main() -> None:
-    """Print the table, and write it."""
+    """Print the table and write it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--tests", type=int, default=60)
     parser.add_argument("--seed", type=int, nargs="+", default=[1])
     args = parser.parse_args()
     found = []
     for k in (1000 * seed + i for seed in args.seed for i in range(args.tests)):
-        found.append(asked(k))
+        found.append(tested(k))
         print(k, found[-1][0].kind, [(a.name, a.right, a.holds) for a in found[-1][1]], flush=True)
     seeds = " ".join(map(str, args.seed))
     head = f"# Step tests\n\n`python -m proofs.step_tests --tests {args.tests} --seed {seeds}`\n"
     about = (
-        "\nLag, two lags, integrator or inverse response; one to six moves of 4 to 8 %; noise of 1 to 33 % of the "
-        "mean answer; in half of the tests a drift of up to 40 % of it; play of 5 to 30 % of a step in two of five "
-        "tests of four moves and more; a sample in 1 to 60 s, forty in the sum of lags at least, for a record needs "
-        "200; stamps that scatter by "
-        "up to 30 % of a sample.\n\n"
+        "\nThe processes are lag, two lags, integrator or inverse response. A test has one to six moves of 4 to 8 %, "
+        "and noise of 1 to 33 % of the mean response. Half of the tests have a drift of up to 40 % of it. Two of "
+        "five tests with four moves and more have backlash of 5 to 30 % of a step. The sample is 1 to 60 s, with at "
+        "least forty samples in the sum of lags, because a record needs 200. The stamps scatter by up to 30 % of a "
+        "sample.\n\n"
     )
     text = head + about + "\n".join(table(found)) + "\n"
     RESULT.write_text(text, encoding="utf-8")

@@ -1,10 +1,11 @@
-"""Cascades and ratios told from trends alone: python -m proofs.structure [--seed 201 202 203 204 205 206] [--jobs 2]
+"""Cascades and ratios identified from trends alone: python -m proofs.structure [--seed 201 202 203 204 205 206]
+[--jobs 2]
 
-Plants of ten cascades, four ratios and eight lone loops (proofs/structure_plant.py), ten hours every two seconds;
-loops.csv states no master. Counted are masters and leaders that are told, those told of loops that hang on nothing
-or on another; faults told where they are, of those that swell the loop's error by .3; and what is blamed that is
-sound: masters of a valve, for they have none, loops whose valve is sound, and loops without a fault that are to be
-retuned. Writes structure.md here.
+Each plant has ten cascades, four ratios and eight single loops (proofs/structure_plant.py), ten hours, recorded every
+two seconds; loops.csv states no master. The table counts the masters and leaders that are reported, and reported
+links of loops that depend on no loop or on another one. It counts faults reported at the right loop, of faults that
+increase the loop's error by .3. It also counts three kinds of false alarms: a valve fault of a master, which has no
+valve; a blamed valve without a fault; and new settings for a loop without a fault. Writes structure.md here.
 """
 
 from __future__ import annotations
@@ -29,13 +30,13 @@ FAULT = {
     ("lone", "stick", 0): Cause.VALVE,
     ("lone", "play", 0): Cause.VALVE,
 }
-"""The cause of a loop that has a fault of its own, by kind of unit, what is wrong with it, and place in it."""
+"""The cause of a loop with its own fault, by kind of unit, fault, and place in the unit."""
 SHOWS = 1.3
-"""Spread of the error over that without the fault from which a fault shows."""
+"""Ratio of the error's spread to that without the fault, from which a fault shows."""
 
 
-def told(built: Plant, jobs: int) -> dict[str, Mapping[str, Any]]:
-    """What a night tells of a plant's loops."""
+def night_rows(built: Plant, jobs: int) -> dict[str, Mapping[str, Any]]:
+    """The rows of a night for the loops of a plant."""
     stated = [
         spec(str(s["loop"]), str(s["type"]), **{k: s[k] for k in ("pv_lo", "pv_hi", "kp", "ti")})
         for s in built.stated
@@ -46,7 +47,7 @@ def told(built: Plant, jobs: int) -> dict[str, Mapping[str, Any]]:
 def counted(
     built: Plant, rows: Mapping[str, Mapping[str, Any]]
 ) -> tuple[Counter[str], list[tuple[str, ...]]]:
-    """What is right and wrong in one plant, and the loops of which something is wrong."""
+    """Right and wrong answers for one plant, and the loops with a wrong answer."""
     out: Counter[str] = Counter()
     missed = []
     for loop, true in built.truth.items():
@@ -54,8 +55,8 @@ def counted(
         for column, name in (("master", "masters"), ("ratio_of", "leaders")):
             if true[column]:
                 out[name] += 1
-                out[f"{name} told"] += row[column] == true[column]
-            out["links that are not"] += bool(row[column]) and row[column] != true[column]
+                out[f"{name} reported"] += row[column] == true[column]
+            out["links that do not exist"] += bool(row[column]) and row[column] != true[column]
         kind, part = str(true["kind"]), int(str(true["part"]))
         fault = FAULT.get((kind, str(true["cause"]), part))
         fault = fault if float(str(true["swell"])) >= SHOWS else None
@@ -63,14 +64,21 @@ def counted(
         if fault is not None:
             out[f"fault {name}"] += 1
             out[f"right {name}"] += row["cause"] == fault
-        out["masters told a valve"] += kind == "cascade" and part == 0 and row["cause"] == Cause.VALVE
+        out["masters with a reported valve fault"] += (
+            kind == "cascade" and part == 0 and row["cause"] == Cause.VALVE
+        )
         blamed = row["cause"] == Cause.VALVE or row["valve_fault"] in (Fault.BACKLASH, Fault.STICTION)
-        out["sound valves blamed"] += blamed and not true["worn"]
-        out["sound loops retuned"] += true["swell"] == 1.0 and row["action"] == Action.RETUNE
-        bad = ("links that are not", "masters told a valve", "sound valves blamed", "sound loops retuned")
+        out["valves without a fault blamed"] += blamed and not true["worn"]
+        out["loops without a fault retuned"] += true["swell"] == 1.0 and row["action"] == Action.RETUNE
+        bad = (
+            "links that do not exist",
+            "masters with a reported valve fault",
+            "valves without a fault blamed",
+            "loops without a fault retuned",
+        )
         if any(out[k] > before[k] for k in bad) or (fault is not None and row["cause"] != fault):
-            said = (row["cause"], row["action"], row["source_loop"], row["master"] or row["ratio_of"])
-            missed.append((loop, name, *(str(x or "") for x in said)))
+            shown = (row["cause"], row["action"], row["source_loop"], row["master"] or row["ratio_of"])
+            missed.append((loop, name, *(str(x or "") for x in shown)))
     return out, missed
 
 
@@ -81,24 +89,29 @@ def main() -> None:
     missed = []
     for seed in given.seed:
         built = plant(seed)
-        found, more = counted(built, told(built, given.jobs))
+        found, more = counted(built, night_rows(built, given.jobs))
         total += found
         missed += [(str(seed), *m) for m in more]
         print(f"plant {seed} done", file=sys.stderr)
     faults = sorted(k.removeprefix("fault ") for k in total if k.startswith("fault "))
-    bad = ("links that are not", "masters told a valve", "sound valves blamed", "sound loops retuned")
+    bad = (
+        "links that do not exist",
+        "masters with a reported valve fault",
+        "valves without a fault blamed",
+        "loops without a fault retuned",
+    )
     loops = len(given.seed) * 36
     publish(
         __file__,
-        "Cascades and ratios told from trends alone",
+        "Cascades and ratios identified from trends alone",
         command(__file__, seed=given.seed),
         (__doc__ or "").split("\n\n")[1].replace("\n", " ").split(" Writes structure.md")[0],
-        f"{loops} loops. Masters told: {total['masters told']} of {total['masters']}; leaders of a ratio: "
-        f"{total['leaders told']} of {total['leaders']}.",
-        table("fault | loops | told", [(k, total[f"fault {k}"], total[f"right {k}"]) for k in faults]),
+        f"{loops} loops. Masters reported: {total['masters reported']} of {total['masters']}; leaders of a ratio: "
+        f"{total['leaders reported']} of {total['leaders']}.",
+        table("fault | loops | reported", [(k, total[f"fault {k}"], total[f"right {k}"]) for k in faults]),
         table("wrong | loops", [(k, total[k]) for k in bad]),
-        "Loops of which something is missed or wrong:",
-        table("plant | loop | truth | cause | action | source | hangs on", missed),
+        "Loops with a missed or wrong answer:",
+        table("plant | loop | truth | cause | action | source | depends on", missed),
     )
 
 

@@ -1,9 +1,9 @@
-"""What is found and told on untidy loops: python -m proofs.untidy_loops [--loops 300] [--seed 4]
+"""What is found and reported on untidy loops: python -m proofs.untidy_loops [--loops 300] [--seed 4]
 
-Loops of proofs/untidy, of seeds that no threshold was set on (1 to 3 were). A loop shows its cause where the error
-swings 1.5 times as far as without it, in three quarters of the record, over five cycles of four samples, and returns
-to .15; the cause is clear where it swings twice as far, in eight samples a cycle and without compression. Writes
-proofs/untidy_loops.md.
+The loops are those of proofs/untidy, of seeds that set no threshold (1 to 3 did). A loop shows its cause where the
+error is 1.5 times as large as without it, in three quarters of the record, over five cycles of four samples, with a
+rhythm of at least .15. The cause is clear where the error is twice as large, with eight samples a cycle and without
+compression. Writes proofs/untidy_loops.md.
 """
 
 from __future__ import annotations
@@ -25,33 +25,33 @@ from proofs.common import command, command_line, publish, table
 from proofs.untidy.draw import CAUSES, Drawn, draw
 
 NAMED = {"stiction": "valve", "backlash": "valve", "tuning": "tuning", "load": "load", "healthy": "none"}
-SAID = ("valve", "tuning", "load", "undecided", "none")
+VERDICTS = ("valve", "tuning", "load", "undecided", "none")
 
 
 def shows(drawn: Drawn) -> bool:
     """Whether the cause shows in the recorded error."""
     t = drawn.truth
-    plain = t["swell"] >= 1.5 and t["steady"] >= 0.75 and t["rhythm"] >= 0.15
-    return t["cause"] == "healthy" or (plain and t["cycles"] >= 5 and t["samples_a_cycle"] >= 4)
+    clear_ones = t["swell"] >= 1.5 and t["steady"] >= 0.75 and t["rhythm"] >= 0.15
+    return t["cause"] == "healthy" or (clear_ones and t["cycles"] >= 5 and t["samples_a_cycle"] >= 4)
 
 
 def clear(drawn: Drawn) -> bool:
-    """Whether it shows so plainly that the cause should be told."""
+    """Whether it shows so clearly that the cause should be reported."""
     t = drawn.truth
     return shows(drawn) and t["swell"] >= 2 and t["samples_a_cycle"] >= 8 and not t["packed"]
 
 
 def judged(seed: int) -> tuple[str, bool, bool, bool, str]:
-    """Cause, whether it shows, whether it is clear, whether oscillation is found, cause named."""
+    """Cause, whether it shows, whether it is clear, whether an oscillation is found, named cause."""
     drawn, config = draw(seed), Config()
     prepared, stated = recorded(drawn, config)
     seen, span = detect_where_it_cycles(prepared.record, config.oscillation)
-    found, said = judged_where(prepared, seen, span, stated, config, drawn.kind)
-    return drawn.truth["cause"], shows(drawn), clear(drawn), counting(found) is not None, said.cause
+    found, verdict = judged_where(prepared, seen, span, stated, config, drawn.kind)
+    return drawn.truth["cause"], shows(drawn), clear(drawn), counting(found) is not None, verdict.cause
 
 
 def recorded(drawn: Drawn, config: Config) -> tuple[Prepared, Pid | None]:
-    """A drawn loop as a night has it, with its controller where that is stated."""
+    """A drawn loop as a night reads it, with its controller where that is stated."""
     t = drawn.truth
     stamp = drawn.step_s * np.arange(drawn.pv.size)
     fine = np.zeros(drawn.pv.size, dtype=bool)
@@ -64,28 +64,28 @@ def recorded(drawn: Drawn, config: Config) -> tuple[Prepared, Pid | None]:
     return prepare(spec, series, config.quality), stated
 
 
-def told(results: list[tuple[str, bool, bool, bool, str]]) -> str:
-    """A Markdown table: cause, loops that show it, found, clear ones, what was named of these."""
+def table_of(results: list[tuple[str, bool, bool, bool, str]]) -> str:
+    """A Markdown table: cause, loops that show it, found, clear loops, and the causes named for these."""
     rows = []
     for cause in CAUSES:
         mine = [r for r in results if r[0] == cause and r[1]]
-        plain = [r for r in mine if r[2] or cause == "healthy"]
-        named = [sum(r[4] == s for r in plain) for s in SAID]
-        rows.append([cause, len(mine), sum(r[3] for r in mine), len(plain), *named])
+        clear_ones = [r for r in mine if r[2] or cause == "healthy"]
+        named = [sum(r[4] == s for r in clear_ones) for s in VERDICTS]
+        rows.append([cause, len(mine), sum(r[3] for r in mine), len(clear_ones), *named])
     ill = [r for r in results if r[0] != "healthy"]
     right = sum(r[2] and r[4] == NAMED[r[0]] for r in ill)
-    heads = " | ".join(["cause | show it | oscillation found | clear", *(f"named {s}" for s in SAID)])
+    heads = " | ".join(["cause | show it | oscillation found | clear", *(f"named {s}" for s in VERDICTS)])
     found = f"Found {sum(r[1] and r[3] for r in ill)} of {sum(r[1] for r in ill)}"
     right_of = f"cause right {right} of {sum(r[2] for r in ill)} clear ones."
     return f"{table(heads, rows)}\n\n{found}; {right_of}"
 
 
 def main() -> None:
-    """Judge all loops and write the table beside this file."""
+    """Assess all loops and write the table next to this file."""
     options = command_line(__doc__, loops=300, seed=4, jobs=2)
     seeds = [100_000 * options.seed + k for k in range(options.loops)]
     with Pool(options.jobs) as pool:
-        text = told(pool.map(judged, seeds, chunksize=10))
+        text = table_of(pool.map(judged, seeds, chunksize=10))
     publish(__file__, "Untidy loops", command(__file__, loops=options.loops, seed=options.seed), text)
 
 

@@ -1,5 +1,5 @@
-"""Random loops with a faulty valve, a load and noise, for the tests of the advice; and what the source study asks of
-one with play."""
+"""Random loops with a faulty valve, a load and noise, for the tests of the advice; and the limit-cycle condition of
+the source study for a loop with backlash."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from tuning.harmonic_balance import travel_map
 from tuning.rules import simc
 
 SLOPE, DELAY, BAND = 0.15, 0.25, 0.15
-"""Half widths of what slope, dead time and play of a loop may be by, over their values [-]."""
+"""Relative half widths of the uncertainty of slope, dead time and backlash of a loop [-]."""
 BISECTIONS = 24
-"""Halvings of Ti/T in the search for the largest that cycles: far below the two digits of the study's table."""
+"""Bisections of Ti/T in the search for the largest that cycles: far below the two digits of the study's table."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ def load(rng: np.random.Generator, steps: int, swing: float, time_s: float, nois
 
 
 def backlash_case(seed: int, steps: int = 12_000) -> Case:
-    """A lag with T/L of 15 to 200 at SIMC's integral time, which play of 0.5 to 3 % makes cycle."""
+    """A lag with T/L of 15 to 200 at SIMC's integral time, which cycles with a backlash of 0.5 to 3 %."""
     rng = np.random.default_rng(seed)
     delay = rng.uniform(1, 5)
     lag = delay * 10 ** rng.uniform(1.2, 2.3)
@@ -67,7 +67,7 @@ def level_case(seed: int, steps: int = 12_000) -> Case:
 
 
 def corners(loop: Loop) -> tuple[Loop, ...]:
-    """Eight corners of slope, dead time and play around a loop: what else it may be."""
+    """Eight corners of slope, dead time and backlash around a loop: the range of possible loops."""
     return tuple(
         replace(
             loop,
@@ -86,10 +86,10 @@ def _scaled(process: Process, slope: float, delay: float) -> Process:
 
 
 def largest_cycling_ratio(process: Fopdt, gain_share: float = 1.0) -> float:
-    """Largest Ti/T at which play still cycles by harmonic balance under a continuous controller (Figure 6).
+    """Largest Ti/T at which backlash still cycles by harmonic balance under a continuous controller (Figure 6).
 
-    gain_share is Kp over that of the nominal tuning (SIMC with tau_c = 1.5 L). 0 where the loop cycles nowhere
-    between 0.02 and 5, inf where it still cycles at 5.
+    gain_share is Kp over that of the nominal tuning (SIMC with tau_c = 1.5 L). The result is 0 where the loop
+    does not cycle between 0.02 and 5, and inf where it still cycles at 5.
     """
     loop = Loop(process, replace(simc(process), scan_s=0.0), Backlash(1.0))
     kp = np.array([loop.controller.kp * gain_share])

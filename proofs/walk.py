@@ -1,4 +1,4 @@
-"""Does every command give a loop the same answer? A night of the mill and of two plants through rank, tune, explain
+"""Do all commands give the same answer for a loop? A night of the mill and of two plants through rank, tune, explain
 and pages: python -m proofs.walk ../shared/plants/a ../shared/plants/b"""
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ CELLS = (
 )
 """Cells in which all commands have to agree."""
 VALVE_EFFECTS = {"backlash": "backlash", "stiction": "stiction", "positioner": "backlash"}
-"""What an effect of `explain` at the valve says of `valve_fault`."""
+"""The `valve_fault` that corresponds to an effect of `explain` at the valve."""
 
 
-def said(*words: str) -> str:
-    """What a command prints on stdout, nothing where it has too little data; RuntimeError where it fails."""
+def output_of(*words: str) -> str:
+    """The stdout of a command, empty where it has too little data; RuntimeError where it fails."""
     result = CliRunner().invoke(triage, words)
     if result.exit_code not in (0, 2):
         raise RuntimeError(f"triage {' '.join(words)}: {result.exit_code}: {result.output[-300:]}")
@@ -55,13 +55,13 @@ def parted(row: dict[str, Any], other: dict[str, Any], where: str) -> Iterator[s
     yield from (f"{where}: {k} {theirs[k]}, rank {ours[k]}" for k in CELLS if ours[k] != theirs[k])
 
 
-def of_tune(asked: tuple[str, ...], row: dict[str, Any], store: str) -> Iterator[str]:
+def of_tune(export: tuple[str, ...], row: dict[str, Any], store: str) -> Iterator[str]:
     """Contradictions between the row and `tune`, with the night's store and without it."""
     for more in ((), ("--store", store)):
-        text = said("tune", *asked, "--loop", row["loop"], "--format", "json", *more)
+        text = output_of("tune", *export, "--loop", row["loop"], "--format", "json", *more)
         if not text:
             if row["status"] == "ok":
-                yield "tune: says nothing of a loop that was assessed"
+                yield "tune: no answer for a loop that was assessed"
             continue
         found = json.loads(text)
         yield from parted(row, found["decision"], "tune" + (" with the store" if more else ""))
@@ -70,29 +70,29 @@ def of_tune(asked: tuple[str, ...], row: dict[str, Any], store: str) -> Iterator
             yield f"tune: its text lacks the action {row['action']}"
 
 
-def of_explain(asked: tuple[str, ...], row: dict[str, Any], store: str) -> Iterator[str]:
+def of_explain(export: tuple[str, ...], row: dict[str, Any], store: str) -> Iterator[str]:
     """Contradictions between the row and `explain`."""
-    text = said("explain", *asked, "--loop", row["loop"], "--format", "json", "--store", store)
+    text = output_of("explain", *export, "--loop", row["loop"], "--format", "json", "--store", store)
     if not text:
         if row["status"] == "ok":
-            yield "explain: says nothing of a loop that was assessed"
+            yield "explain: no answer for a loop that was assessed"
         return
     found = json.loads(text)
     if "night" in found:
         yield from parted(row, found["night"], "explain")
     named = {VALVE_EFFECTS[e["name"]] for e in found["effects"] if e["name"] in VALVE_EFFECTS}
-    said_so = TOLD["beside_verdict"]["calm_valve"] in " ".join(answer_lines(found))
+    stated_so = TOLD["beside_verdict"]["calm_valve"] in " ".join(answer_lines(found))
     if (
         row["valve_fault"] in ("none", "backlash", "stiction")
         and named - {row["valve_fault"]}
-        and not said_so
+        and not stated_so
     ):
         yield f"explain: {', '.join(sorted(named))} where the night has valve_fault {row['valve_fault']}"
     if found["moved"]:
-        plain, better = held_out(found)
+        baseline, better = held_out(found)
         claimed = "improved model" in "\n".join(answer_lines(found))
-        if claimed and better >= plain:
-            yield f"explain: an improved model whose held-out error rises from {plain:.4g} to {better:.4g}"
+        if claimed and better >= baseline:
+            yield f"explain: an improved model whose held-out error rises from {baseline:.4g} to {better:.4g}"
 
 
 def of_page(page: Page, row: dict[str, Any]) -> Iterator[str]:
@@ -113,43 +113,44 @@ def of_page(page: Page, row: dict[str, Any]) -> Iterator[str]:
 def of_row(row: dict[str, Any]) -> Iterator[str]:
     """Contradictions within the row."""
     if row["action"] == "undecided" and row["cause"] not in ("undecided", None):
-        yield f"rank: action undecided beside the cause {row['cause']}"
+        yield f"rank: action undecided with the cause {row['cause']}"
     if (row["kp_new"] is not None) != (row["action"] == "retune"):
         yield f"rank: action {row['action']} with new Kp {row['kp_new']}"
 
 
-def walked(asked: tuple[str, ...], jobs: int) -> tuple[int, list[tuple[str, str]]]:
-    """How many loops a night has, and each contradiction with its loop."""
+def walked(export: tuple[str, ...], jobs: int) -> tuple[int, list[tuple[str, str]]]:
+    """Number of loops of a night, and each contradiction with its loop."""
     rows: list[tuple[str, str]] = []
     with tempfile.TemporaryDirectory() as folder:
         store = str(Path(folder) / "store")
-        said("run", *asked, "--store", store, "--jobs", str(jobs))
-        ranked = json.loads(said("rank", store, "--format", "json"))
+        output_of("run", *export, "--store", store, "--jobs", str(jobs))
+        ranked = json.loads(output_of("rank", store, "--format", "json"))
         pages = {page.title: page for page in pages_of_night(Store(Path(store)))}
         for row in ranked:
             found = [*of_row(row), *of_page(pages[row["loop"]], row)]
-            found += [*of_tune(asked, row, store), *of_explain(asked, row, store)]
+            found += [*of_tune(export, row, store), *of_explain(export, row, store)]
             rows += [(row["loop"], line) for line in found]
             print(f"{row['loop']}: {'; '.join(found) or 'one answer'}", file=sys.stderr, flush=True)
     return len(ranked), rows
 
 
 def main() -> None:
-    """Walk, and write what differs."""
-    asked = command_line(__doc__, folders="*", jobs=2)
+    """Run all commands on all nights, and write the differences."""
+    options = command_line(__doc__, folders="*", jobs=2)
     exports = {"mill": MILL}
     exports |= {
-        f"plant {f.name}": (str(f / "export.parquet"), "--loops", str(f / "loops.csv")) for f in asked.folders
+        f"plant {f.name}": (str(f / "export.parquet"), "--loops", str(f / "loops.csv"))
+        for f in options.folders
     }
     counts, rows = [], []
     for name, words in exports.items():
-        loops, found = walked(words, asked.jobs)
+        loops, found = walked(words, options.jobs)
         counts.append((name, loops, len({loop for loop, _ in found}), len(found)))
         rows += [(name, *row) for row in found]
     publish(
         __file__,
-        "Does every command give a loop the same answer?",
-        command(__file__, *map(str, asked.folders)),
+        "Do all commands give the same answer for a loop?",
+        command(__file__, *map(str, options.folders)),
         table("export|loops|with a contradiction|contradictions", counts, numbers=True),
         *([table("export|loop|contradiction", rows)] if rows else []),
     )

@@ -1,9 +1,10 @@
-"""Valves that wear, told and foretold beside the truth: python -m proofs.wear [--seed 61] [--nights 60] [--jobs 2]
+"""Valves that wear: reports and forecasts compared with the truth: python -m proofs.wear [--seed 61] [--nights 60]
 
-24 loops whose play grows evenly from .3 to 3 % of OP in sixty nights, and twelve sound ones, twelve hours a
-night, load and noise new each night; the physics of the sample mill. Told are the night from which a valve is
-believed worn, that from which it is told to wear, and the days between which it is foretold to reach 5 % by
-what is known on the night before the last, beside the day on which it would. Writes wear.md here.
+The plant has 24 loops whose backlash grows linearly from .3 to 3 % of OP in sixty nights, and twelve loops without a
+fault. Each night has twelve hours with new load and noise; the physics is that of the sample mill. The table shows
+the first night with a reported worn valve, and the first night with reported wear. It shows the days between which
+the backlash is predicted to reach 5 %, by the data up to the night before the last, and the true day. Writes wear.md
+here.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ from proofs.common import command, command_line, publish, table
 from proofs.many_nights import EVERY_S, Drawn, draw, simulated
 from proofs.plant import START_S, spec, write_export
 
-WEARING, SOUND = 24, 12
-FROM, TO, IN_NIGHTS, FORETOLD = 0.3, 3.0, 60, 5.0
+WEARING, WITHOUT_FAULT = 24, 12
+FROM, TO, IN_NIGHTS, PREDICTED = 0.3, 3.0, 60, 5.0
 COLUMNS = (
     *("loop", "certain_since", "width_pct", "wear_since", "wear_pct_per_month", "valve_fault"),
     *("reaches_pct", "reaches_from", "reaches_by"),
@@ -36,24 +37,24 @@ COLUMNS = (
 
 
 def drawn(seed: int) -> list[Drawn]:
-    """Loops with a play, then sound ones, of the plants of many_nights."""
-    rng, wearing, sound = np.random.default_rng(seed), [], []
+    """Loops with backlash, then loops without a fault, of the plants of many_nights."""
+    rng, wearing, without_fault = np.random.default_rng(seed), [], []
     for number in range(10_000):
         loop = draw(rng, number)
         if loop.cause == "backlash" and len(wearing) < WEARING:
             wearing.append(loop)
-        elif loop.cause == "healthy" and len(sound) < SOUND:
-            sound.append(loop)
-    return [*wearing, *sound]
+        elif loop.cause == "healthy" and len(without_fault) < WITHOUT_FAULT:
+            without_fault.append(loop)
+    return [*wearing, *without_fault]
 
 
 def width(night: float) -> float:
-    """The true play in a night [% OP]."""
+    """The true backlash in a night [% OP]."""
     return FROM + (TO - FROM) * night / IN_NIGHTS
 
 
-def told(seed: int, nights: int, jobs: int) -> tuple[list[Drawn], list[dict[str, Mapping[str, Any]]]]:
-    """The loops, and what is told of them night by night."""
+def nightly(seed: int, nights: int, jobs: int) -> tuple[list[Drawn], list[dict[str, Mapping[str, Any]]]]:
+    """The loops, and the rows of each night."""
     plant = drawn(seed)
     stated = [spec(d.tag, d.kind, kp=d.kp, ti=d.ti, scan_s=1.0) for d in plant]
     found = []
@@ -76,14 +77,14 @@ def day(night: float) -> str:
 
 
 def cells(loop: Drawn, found: Sequence[dict[str, Mapping[str, Any]]]) -> tuple[tuple[str, ...], bool]:
-    """One wearing loop's row, and whether the forecast holds the day."""
+    """The row of one loop with wear, and whether the forecast contains the true day."""
     rows = [n[loop.tag] for n in found]
     worn = next((k for k, r in enumerate(rows) if r["certain_since"]), None)
     wears = next((k for k, r in enumerate(rows) if r["wear_pct_per_month"] is not None), None)
     last = rows[-1]
-    reached = day(IN_NIGHTS * (FORETOLD - FROM) / (TO - FROM))
+    reached = day(IN_NIGHTS * (PREDICTED - FROM) / (TO - FROM))
     first, by = last["reaches_from"] or "", last["reaches_by"] or "9999"
-    held = last["reaches_pct"] == FORETOLD and first <= reached <= by
+    held = last["reaches_pct"] == PREDICTED and first <= reached <= by
     seen = ("–" if k is None else f"{k + 1} ({width(k):.2g} %)" for k in (worn, wears))
     forecast = f"{first} … {last['reaches_by'] or 'not within a year'}" if first else "none"
     pooled = "–" if last["width_pct"] is None else f"{last['width_pct']:.2f}"
@@ -93,7 +94,7 @@ def cells(loop: Drawn, found: Sequence[dict[str, Mapping[str, Any]]]) -> tuple[t
 def main() -> None:
     """Run the nights and write the page."""
     given = command_line(__doc__, seed=61, nights=60, jobs=2)
-    plant, found = told(given.seed, given.nights, given.jobs)
+    plant, found = nightly(given.seed, given.nights, given.jobs)
     rows = [cells(d, found) for d in plant if d.is_worn]
     blamed = sum(
         n[d.tag]["valve_fault"] in ("backlash", "stiction") for d in plant if not d.is_worn for n in found
@@ -101,13 +102,14 @@ def main() -> None:
     wearing = sum(n[d.tag]["wear_pct_per_month"] is not None for d in plant if not d.is_worn for n in found)
     publish(
         __file__,
-        "Valves that wear, told and foretold beside the truth",
+        "Valves that wear: reports and forecasts compared with the truth",
         command(__file__, seed=given.seed, nights=given.nights),
         (__doc__ or "").split("\n\n")[1].replace("\n", " ").split(" Writes wear.md")[0],
-        f"The forecast holds the day in {sum(held for _, held in rows)} of {len(rows)}. Of {SOUND} sound valves "
-        f"{blamed} nights are blamed, {wearing} told to wear.",
+        f"The forecast contains the true day in {sum(held for _, held in rows)} of {len(rows)}. "
+        f"For {WITHOUT_FAULT} valves without a fault {blamed} nights report a valve fault, and {wearing} "
+        "report wear.",
         table(
-            "loop | kind | worn from night (width) | wears from | width at the end | reaches 5 % | truth | held",
+            "loop | kind | worn from night (width) | wears from | width at the end | reaches 5 % | truth | contained",
             [row for row, _ in rows],
         ),
     )

@@ -11,7 +11,7 @@ from identification.experiments.find import Course, Experiment, by_hand, in_auto
 from identification.experiments.intervals import ninety
 from identification.experiments.model import modelled, pooled, together
 from identification.record import LoopRecord
-from proofs.step_test_plant import behind_play
+from proofs.step_test_plant import behind_backlash
 
 
 def step_response(op, lags, dead, gain, dt=1.0, fine=20):
@@ -138,7 +138,7 @@ def test_backlash_is_recovered_where_op_reverses_twice():
     """Backlash of 1.5 % under the moves 40, 45, 50, 44, 39, 45 is recovered within 25 %, and the gain within 5
     %."""
     op = moves(40, 45, 50, 44, 39, 45)
-    stem = behind_play(op, 1.5, 0.5)
+    stem = behind_backlash(op, 1.5, 0.5)
     pv = 50 + step_response(stem, [40.0], 8.0, 1.2) + 0.1 * NOISE[: op.size]
     e = modelled(record(pv, op), whole(record(pv, op))).estimates
     assert e["backlash_pct"].value == pytest.approx(1.5, rel=0.25)
