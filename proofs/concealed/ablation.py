@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Does the right effect beat the best wrong one, on the recording that was fitted and on the later one?
+"""Does the right effect give a lower misfit than the best wrong one, on the fitted recording and on the later one?
 
 ablation.py CASES [--cases 90] [--jobs 2] [--out docs/evidence/PROOF.md]
 
-Every row of the catalogue is fitted to a sealed case, whole and at the size that suits it best: an opponent harder
-than a wrong effect of the right one's size. Rows that share the right one's mark by their nature are no opponents.
-The best row of the right name and the best of any other are then carried to the later recording.
+Every row of the catalogue is fitted to a sealed case, whole and at its best size. This is stricter than a wrong
+effect of the right one's size. Rows that are indistinguishable from the right one are not compared. The best row with
+the right name and the best with any other name are then tested on the later recording.
 """
 
 import argparse
@@ -33,10 +33,11 @@ from identification.mismatch.plain_loop import inputs_of, prepared, without_spik
 from identification.mismatch.selection import Candidate, compete, integrating_or_first_order
 from identification.mismatch.starts import round_of
 from proofs.concealed.proof import interval, place_section, table
-from proofs.concealed.score import KIN, kin
+from proofs.concealed.score import INDISTINGUISHABLE, indistinguishable
 
 ALIKE = 1.02
-"""Ratio of misfits up to which two models do alike: rows that hold the right one as a special case reach it."""
+"""Ratio of misfits up to which two models count as equal; rows that include the right one as a special case reach
+it."""
 LEVELS = ("plain", "masked", "concealed")
 
 
@@ -49,22 +50,22 @@ def loaded(cases: pathlib.Path, tag: str, which: str) -> Case:
 
 
 def chosen(truths: dict, count: int) -> list[str]:
-    """Single effects graded by information whose later recording can tell, the levels in turn."""
+    """Single effects graded by information whose later recording is usable, from each level in turn."""
     rows = {r.name for r in CANDIDATES}
     able = {
-        level: [t for t, v in truths.items() if v["level"] == level and tellable(v, rows)] for level in LEVELS
+        level: [t for t, v in truths.items() if v["level"] == level and usable(v, rows)] for level in LEVELS
     }
     return [t for level in LEVELS for t in able[level][: count // len(LEVELS)]]
 
 
-def tellable(truth: dict, rows: set[str]) -> bool:
-    """Whether a case hides one effect that a row models, and its later recording can tell."""
-    named = any(kin(r, truth["effect"], KIN) for r in rows)
+def usable(truth: dict, rows: set[str]) -> bool:
+    """Whether a case has one effect that a row models, and a later recording that is usable."""
+    named = any(indistinguishable(r, truth["effect"], INDISTINGUISHABLE) for r in rows)
     return named and "later_plain" in truth and "pair" not in truth
 
 
-def left_later(candidate: Candidate, p: object, later: Case) -> float:
-    """Misfit (rms, %) that a candidate leaves on the later recording."""
+def later_misfit(candidate: Candidate, p: object, later: Case) -> float:
+    """Misfit (rms, %) of a candidate on the later recording."""
     data = to_data(later.spec.loop, p.inputs, candidate.fit.model.c, (), 0.0, {})  # type: ignore[attr-defined]
     r = later.prepared.record
     return float(np.std(r.pv - carried(data, r.op, r.pv, r.dt_s)))
@@ -79,11 +80,12 @@ def compared(cases: pathlib.Path, truths: dict, tag: str) -> dict:
         *prepared(inputs, s.pv - inputs.level, without_spikes(s.pv, s.usable)), s
     )
     candidates = compete(round_of(p, plain, s))
-    mine = [r for r in candidates if kin(r.name, truth["effect"], KIN)]
+    mine = [r for r in candidates if indistinguishable(r.name, truth["effect"], INDISTINGUISHABLE)]
     wrong = [
         r
         for r in candidates
-        if not kin(r.name, truth["effect"], KIN) and truth["effect"] not in EFFECTS[r.name].indistinguishable
+        if not indistinguishable(r.name, truth["effect"], INDISTINGUISHABLE)
+        and truth["effect"] not in EFFECTS[r.name].indistinguishable
     ]
     law = recovered_law(Trends(s.sp, s.pv, s.op, s.usable & (s.op > 0.05) & (s.op < 99.95)), s.stated.ti)
     base = truth["base"]
@@ -94,8 +96,8 @@ def compared(cases: pathlib.Path, truths: dict, tag: str) -> dict:
         "wrong": wrong[0].name,
         "net_right": mine[0].penalised,
         "net_wrong": wrong[0].penalised,
-        "later_right": left_later(mine[0], p, later),
-        "later_wrong": left_later(wrong[0], p, later),
+        "later_right": later_misfit(mine[0], p, later),
+        "later_wrong": later_misfit(wrong[0], p, later),
         "kp_error": law.kp / base["Kp"] - 1.0,
         "ti_error": law.kp / law.ki * s.dt_s / base["Ti"] - 1.0,
     }

@@ -23,12 +23,12 @@ def scaled(scene: Scene, factor: float) -> Scene:
 
 
 def noise_before_sensor(scene: Scene, share: float) -> Scene:
-    """The scene with that share of the noise made before the transmitter's damping."""
+    """The scene with that share of the noise added before the transmitter's filter."""
     return both(scene, lambda d: replace(d, pre=d.pre + share * d.post, post=(1 - share) * d.post))
 
 
 def compression(scene: Scene, s: float, rng: Rng) -> Made:
-    """Swinging door; the deviation is `s` times the noise, more or less."""
+    """Swinging door; the deviation is about `s` times the noise."""
     scale = max(float(np.std(scene.fit.post)), 0.05)
     pv, op = 3.0 * s * scale * rng.uniform(0.8, 1.3), 1.5 * s * scale * scene.pi.kp * rng.uniform(0.3, 1.0)
     op = float(np.clip(op, 0.05, 2.0))
@@ -36,13 +36,13 @@ def compression(scene: Scene, s: float, rng: Rng) -> Made:
 
 
 def clock_offset(scene: Scene, s: float, rng: Rng) -> Made:
-    """PV stamped `s` scans late."""
+    """PV with stamps that are `s` scans late."""
     late = s * scene.scan
     return scene.with_historian(late_s=late), {"pv_late_by_s": late}
 
 
 def sampling(scene: Scene, s: float, rng: Rng) -> Made:
-    """Polling that scatters, and on half of the cases a fast ripple that it folds down."""
+    """Polling at irregular times; in half of the cases also a fast ripple, which the polling aliases."""
     if rng.random() < 0.5:
         return scene.with_historian(poll_sd=0.2 * s, stamp_sd=0.0), {"jitter_scans": 0.2 * s}
     period = rng.uniform(40, 120) * scene.scan
@@ -53,21 +53,21 @@ def sampling(scene: Scene, s: float, rng: Rng) -> Made:
 def controller_settings(scene: Scene, s: float, rng: Rng) -> Made:
     """loops.csv states a gain or an integral time that is wrong by the factor `s`."""
     factor = s if rng.random() < 0.5 else 1.0 / s
-    kp, ti = scene.told
+    kp, ti = scene.stated
     if rng.random() < 0.6:
-        return replace(scene, told=(kp * factor, ti)), {"Kp": scene.pi.kp}
-    return replace(scene, told=(kp, ti * factor)), {"Ti": scene.pi.ti}
+        return replace(scene, stated=(kp * factor, ti)), {"Kp": scene.pi.kp}
+    return replace(scene, stated=(kp, ti * factor)), {"Ti": scene.pi.ti}
 
 
 def controller_gap(scene: Scene, s: float, rng: Rng) -> Made:
-    """OP stands while the error is below `s` times what the plain loop's error usually is."""
+    """OP is constant while the error is below `s` times the usual error of the baseline loop."""
     pv, _ = close_loop(scene.plant, scene.pi, scene.fit, scene.scan)
     gap = s * 1.5 * float(np.median(np.abs(scene.fit.sp - pv)))
     return replace(scene, pi=scene.pi._replace(gap=gap)), {"gap": gap}
 
 
 def forced(d: Drive, rng: Rng, share: float, v0: float, style: int) -> Drive:
-    """The drive with spans, together `share` of the record, in which logic rules over the controller."""
+    """The drive with spans, together `share` of the record, in which logic overrides the controller."""
     n, force, limit = len(d.sp), d.force.copy(), d.op_hi.copy()
     for start in rng.uniform(0.03, 0.9, 4):
         span = slice(int(start * n), int((start + share / 4) * n))
@@ -96,7 +96,7 @@ def stepped(d: Drive, at: np.ndarray, sizes: np.ndarray) -> Drive:
 
 
 def load_step(scene: Scene, s: float, rng: Rng) -> Made:
-    """One to three steps of `s` % of OP, up and down in turn."""
+    """One to three steps of `s` % of OP, alternating up and down."""
     count = int(rng.integers(1, 4))
     sizes = s * (-1.0) ** (np.arange(count) + rng.integers(2))
     made = both(scene, lambda d: stepped(d, np.sort(rng.uniform(0.15, 0.9, count)), sizes))
@@ -104,7 +104,7 @@ def load_step(scene: Scene, s: float, rng: Rng) -> Made:
 
 
 def load_oscillation(scene: Scene, s: float, rng: Rng) -> Made:
-    """A sine of `s` % of OP that does not sit at the loop's own period."""
+    """A sine of `s` % of OP with a period different from the loop's own."""
     period = rng.uniform(2.5, 9.0) * (scene.plant.T + 2 * scene.plant.L)
 
     def waved(d: Drive) -> Drive:
@@ -115,7 +115,8 @@ def load_oscillation(scene: Scene, s: float, rng: Rng) -> Made:
 
 
 def supply_variation(scene: Scene, s: float, rng: Rng) -> Made:
-    """Head that wanders slowly by the share `s` (rms): gain and, by a part of the flow at rest, bias."""
+    """A supply head that varies slowly by the share `s` (rms): it changes gain and, by a part of the flow at rest,
+    bias."""
     bias = rng.uniform(0.05, 0.25) * scene.plant.v0
 
     def breathe(d: Drive) -> Drive:

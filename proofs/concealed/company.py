@@ -1,4 +1,4 @@
-"""What surrounds a loop: neighbours in the same export, and loads borrowed from real residuals."""
+"""The surroundings of a loop: neighbours in the same export, and loads taken from real residuals."""
 
 import pathlib
 from dataclasses import replace
@@ -12,7 +12,7 @@ from proofs.concealed.scene import Rng, Scene, draw_plant, drive, log_uniform, s
 
 
 def neighbour_trend(rng: Rng, scene: Scene, n: int) -> np.ndarray:
-    """SP, PV and OP of another loop of that kind, shape (3, n)."""
+    """SP, PV and OP of another loop of the same kind, shape (3, n)."""
     plant = draw_plant(rng, scene.kind)
     pi = tune(rng, plant, scene.scan, log_uniform(rng, 1.0, 5.0))
     d = drive(rng, n, plant, scene.scan, sizes_of(rng, plant, pi, scene.scan))
@@ -20,7 +20,7 @@ def neighbour_trend(rng: Rng, scene: Scene, n: int) -> np.ndarray:
 
 
 def with_neighbour(rng: Rng, scene: Scene) -> Scene:
-    """The scene with another loop beside it in both recordings."""
+    """The scene with another loop next to it in both recordings."""
     trends = tuple(neighbour_trend(rng, scene, len(d.sp)) for d in (scene.fit, scene.later))
     return replace(scene, neighbours=trends)
 
@@ -53,7 +53,7 @@ def stretch(rng: Rng, x: np.ndarray, n: int) -> np.ndarray:
 
 
 def borrow(rng: Rng, scene: Scene, library: list[np.ndarray]) -> Scene:
-    """The scene with its load taken from a residual, of the size that its own had at PV."""
+    """The scene with its load taken from a residual, with the same size at PV as its own load."""
     x = library[rng.integers(len(library))]
 
     def lend(d: Drive) -> Drive:

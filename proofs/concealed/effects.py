@@ -1,4 +1,4 @@
-"""Every catalogue name as one entry: how a strength becomes physics. Parameters are drawn at random."""
+"""The entries of the catalogue: for each name, the physics for a given strength. Parameters are drawn at random."""
 
 import math
 from collections.abc import Callable
@@ -16,10 +16,10 @@ ALL = ("flow", "pressure", "temperature", "level")
 
 @dataclass(frozen=True)
 class Effect:
-    """A name of the catalogue, its block, and its maker.
+    """A name of the catalogue, its block, and its function.
 
-    `low` and `high` bound the strength when information grades it; `sizes` are the strengths of the four
-    levels when size does.
+    `low` and `high` bound the strength when information grades it; `sizes` are the strengths of the four levels when
+    size grades it.
     """
 
     name: str
@@ -33,30 +33,30 @@ class Effect:
 
 
 def lag_of(scene: Scene, s: float) -> float:
-    """`s` time constants [s], but never less than the fine steps can carry."""
+    """`s` time constants [s], but at least the shortest lag that the fine steps allow."""
     return max(s * scene.plant.T, 0.06 * scene.scan)
 
 
 def backlash(scene: Scene, s: float, rng: Rng) -> Made:
-    """Play of `s` % of OP."""
+    """Backlash of `s` % of OP."""
     return scene.with_plant(gap=s), {"backlash": s}
 
 
 def stiction(scene: Scene, s: float, rng: Rng) -> Made:
-    """Stickband `s` %: static and sliding friction add up to it, their difference is the jump."""
+    """Stickband `s` %: the sum of static and sliding friction; their difference is the slip jump."""
     jump = s * rng.uniform(0.4, 0.8)
     made = scene.with_plant(static=0.5 * (s + jump), sliding=0.5 * (s - jump))
     return made, {"stick_S": s, "stick_J": jump}
 
 
 def rate_limit(scene: Scene, s: float, rng: Rng) -> Made:
-    """Slew of 10 % of OP in `s` time constants."""
+    """A slew rate of 10 % of OP in `s` time constants."""
     rate = 10.0 / (s * scene.plant.T)
     return scene.with_plant(rate=rate), {"rate": rate}
 
 
 def saturation(scene: Scene, s: float, rng: Rng) -> Made:
-    """A stop that takes the share `s` of the travel above rest."""
+    """A stop that removes the share `s` of the travel above rest."""
     stop = scene.plant.v0 + (scene.reach[1] - scene.plant.v0) * (1.2 - s)
     return scene.with_plant(stop=stop), {"vmax": stop}
 
@@ -90,20 +90,20 @@ def second_lag(scene: Scene, s: float, rng: Rng) -> Made:
 
 
 def slow_mode(scene: Scene, s: float, rng: Rng) -> Made:
-    """A share `s` of the gain that arrives several time constants late."""
+    """A share `s` of the gain with a delay of several time constants."""
     slow_t = rng.uniform(4.0, 10.0) * scene.plant.T
     return scene.with_plant(slow=s, slow_s=slow_t), {"slow_share": s, "slow_T": slow_t}
 
 
 def inverse_response(scene: Scene, s: float, rng: Rng) -> Made:
-    """A small fast part that opposes the large one: a zero of `s` time constants on the wrong side."""
+    """A small fast response of opposite sign: a right-half-plane zero of `s` time constants."""
     T = scene.plant.T
     beta, fast = s * T, lag_of(scene, 0.25 * s)
     return scene.with_plant(oppose=(beta + fast) / (T - fast), oppose_s=fast), {"inverse": beta}
 
 
 def direction_asymmetry(scene: Scene, s: float, rng: Rng) -> Made:
-    """Time constants up and down whose ratio is exp(s), either way."""
+    """Different time constants up and down; their ratio is exp(s) or its inverse."""
     asym = s * float(rng.choice([-1.0, 1.0]))
     T = scene.plant.T
     return scene.with_plant(asym=asym), {"T_up": T * math.exp(-asym / 2), "T_down": T * math.exp(asym / 2)}
@@ -116,12 +116,12 @@ def nonlinear_gain(scene: Scene, s: float, rng: Rng) -> Made:
 
 
 def sqrt_outflow(scene: Scene, s: float, rng: Rng) -> Made:
-    """Outflow by the root of the head; `s` is PV at rest over that head (1: the head is PV itself)."""
+    """Outflow by the square root of the head; `s` is PV at rest over that head (1: the head is PV itself)."""
     return scene.with_plant(root=s), {"root": s}
 
 
 def overflow(scene: Scene, s: float, rng: Rng) -> Made:
-    """A weir below the highest setpoints; a part of the spill comes back late."""
+    """A weir below the highest set points; a part of the overflow returns later."""
     cap = (scene.reach[3] - scene.plant.y0) * (1.2 - s)
     back = float(rng.choice([0.0, 0.3]))
     made = scene.with_plant(cap=cap, spill=back, spill_s=rng.uniform(0.5, 2.0) * scene.plant.T)
@@ -129,12 +129,12 @@ def overflow(scene: Scene, s: float, rng: Rng) -> Made:
 
 
 def integrator(scene: Scene, s: float, rng: Rng) -> Made:
-    """No self-regulation at all; `s` divides load and noise."""
+    """A process without self-regulation; load and noise are divided by `s`."""
     return acting.scaled(scene.with_plant(leak=0.0), 1.0 / s), {"slope": scene.plant.K / scene.plant.T}
 
 
 def flow_dependent_delay(scene: Scene, s: float, rng: Rng) -> Made:
-    """A pipe whose flow follows the valve by the share `s`."""
+    """A pipe whose flow follows the valve with the share `s`."""
     return scene.with_plant(pipe=s), {"flow_delay": s}
 
 
@@ -145,19 +145,19 @@ def gain_drift(scene: Scene, s: float, rng: Rng) -> Made:
 
 
 def sensor_lag(scene: Scene, s: float, rng: Rng) -> Made:
-    """A damped transmitter of `s` time constants; most of the noise is made before it."""
+    """A transmitter with a filter of `s` time constants; most of the noise is added before the filter."""
     lag = lag_of(scene, s)
     return acting.noise_before_sensor(scene.with_plant(lag=lag), 0.85), {"lag": lag}
 
 
 def quantization(scene: Scene, s: float, rng: Rng) -> Made:
-    """A converter of `s` % steps."""
+    """A converter with steps of `s` %."""
     grid = s * rng.uniform(0.8, 1.25)
     return scene.with_plant(grid=grid), {"quant": grid}
 
 
 def sensor_clipping(scene: Scene, s: float, rng: Rng) -> Made:
-    """A transmitter that ends below (or above) a share `s` of what PV does."""
+    """A transmitter whose range ends below (or above) a share `s` of the PV values."""
     if rng.random() < 0.7:
         clip = scene.plant.y0 + (scene.reach[3] - scene.plant.y0) * (1.2 - s)
         return scene.with_plant(clip_hi=clip), {"pv_clip": clip}

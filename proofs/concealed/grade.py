@@ -1,5 +1,5 @@
-"""How much a recording can tell: doubled log-likelihood gain of one who knows effect and noise over the
-best plain FOPDT, and the strength that brings it to a level."""
+"""The information of a recording: doubled log-likelihood gain of the true model with known noise over the best
+baseline FOPDT, and the strength of an effect that brings it to a level."""
 
 import math
 from collections.abc import Callable
@@ -18,8 +18,8 @@ TOLERANCE = 0.2
 
 
 @dataclass(frozen=True)
-class Plain:
-    """The best plain FOPDT: gain, time constant [s], dead time [s], bias [%]; `energy` is what it misses."""
+class Baseline:
+    """The best baseline FOPDT: gain, time constant [s], dead time [s], bias [%]; `energy` is its residual energy."""
 
     K: float
     T: float
@@ -29,12 +29,12 @@ class Plain:
 
 
 def quiet(d: Drive) -> Drive:
-    """The same drive without load and noise; what an effect adds stays."""
+    """The same drive without load and noise; inputs of an effect are kept."""
     return replace(d, load=0.0 * d.load, pre=0.0 * d.pre, post=0.0 * d.post)
 
 
 def fopdt(op: np.ndarray, T: float, L: float, scan: float) -> np.ndarray:
-    """Response of unit gain to OP, shape (n,), counted from rest and held between scans; any L [s]."""
+    """Response of unit gain to OP, shape (n,), relative to rest; OP is held between scans; any L [s]."""
     d, part = divmod(L / scan, 1.0)
     a, b = math.exp(-scan / T), math.exp(-scan * (1 - part) / T)
     late = np.concatenate([np.zeros(int(d) + 2), op])[: len(op) + 1]
@@ -42,13 +42,13 @@ def fopdt(op: np.ndarray, T: float, L: float, scan: float) -> np.ndarray:
 
 
 def whitener(noise: np.ndarray) -> np.ndarray:
-    """Filter, shape (21,), that turns noise of this colour, shape (n,), white with unit variance."""
+    """Filter, shape (21,), that whitens noise of this spectrum, shape (n,), to unit variance."""
     x = noise - noise.mean()
     lagged = np.column_stack([x[ORDER - i - 1 : len(x) - i - 1] for i in range(ORDER)])
     gram = lagged.T @ lagged
     coef = np.linalg.solve(gram + 1e-9 * np.trace(gram) * np.eye(ORDER), lagged.T @ x[ORDER:])
-    left = x[ORDER:] - lagged @ coef
-    return np.concatenate([[1.0], -coef]) / np.std(left)
+    residual = x[ORDER:] - lagged @ coef
+    return np.concatenate([[1.0], -coef]) / np.std(residual)
 
 
 def project(pv: np.ndarray, op: np.ndarray, T: float, L: float, scan: float, w: np.ndarray) -> tuple:
@@ -61,15 +61,15 @@ def project(pv: np.ndarray, op: np.ndarray, T: float, L: float, scan: float, w: 
     return aim - cols @ k, float(k[0]), float(k[1])
 
 
-def best_plain(
+def best_baseline(
     pv: np.ndarray,
     op: np.ndarray,
     scan: float,
     w: np.ndarray,
     starts: list[tuple[float, float]],
     t_max: float,
-) -> Plain:
-    """The plain FOPDT that leaves the least whitened residual; `starts` are pairs of T and L [s]."""
+) -> Baseline:
+    """The baseline FOPDT with the least whitened residual; `starts` are pairs of T and L [s]."""
     found = []
     for T, L in starts:
         fun = lambda v: project(pv, op, math.exp(v[0]), v[1], scan, w)[0]  # noqa: E731
@@ -81,11 +81,11 @@ def best_plain(
     best = min(found, key=lambda r: r.cost)
     T, L = math.exp(best.x[0]), best.x[1]
     r, k, b = project(pv, op, T, L, scan, w)
-    return Plain(k, T, L, b, float(r @ r))
+    return Baseline(k, T, L, b, float(r @ r))
 
 
 def noise_like(scene: Scene, base: Plant) -> np.ndarray:
-    """Load and noise as they stand in PV [%], shape (n,), at constant OP, with the recorder's rounding."""
+    """Load and noise in PV [%], shape (n,), at constant OP, with the recorder's rounding."""
     own = base._replace(lag=scene.plant.lag, leak=scene.plant.leak)
     d = replace(idle(len(scene.fit.sp), own), load=scene.fit.load, pre=scene.fit.pre, post=scene.fit.post)
     pv = open_loop(own, np.full(len(d.sp), own.v0), d, scene.scan) - own.y0
@@ -95,22 +95,23 @@ def noise_like(scene: Scene, base: Plant) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Grade:
-    """What an effect of some strength leaves for the plain model, and that model."""
+    """The residual energy of the baseline model for an effect of some strength, and that model."""
 
     energy: float
-    plain: Plain
+    plain: Baseline
     op: np.ndarray
     pv: np.ndarray
 
 
 def energy_of(scene: Scene, base: Plant, start: tuple[float, float] | None = None) -> Grade:
-    """Energy of what `scene` has beyond the plain plant `base`, on the OP that its own closed loop makes."""
+    """Energy of the difference between `scene` and the baseline plant `base`, with the OP of the scene's closed
+    loop."""
     pv, op = close_loop(scene.plant, scene.pi, scene.fit, scene.scan)
     clean = open_loop(scene.plant, op, quiet(scene.fit), scene.scan)
     p = scene.plant
     starts = [(p.T, p.L), (1.6 * p.T, p.L + p.T2 + 0.1 * p.T)] if start is None else [start]
     t_max = 0.1 * len(op) * scene.scan if p.leak == 0.0 else 60 * p.T
-    plain = best_plain(clean, op - p.v0, scene.scan, whitener(noise_like(scene, base)), starts, t_max)
+    plain = best_baseline(clean, op - p.v0, scene.scan, whitener(noise_like(scene, base)), starts, t_max)
     return Grade(plain.energy, plain, op, pv)
 
 

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Do the intervals of an effect's parameters hold the truth? The right effect fitted to sealed cases, no other tried.
+"""Do the intervals of an effect's parameters contain the truth? Only the right effect is fitted to each sealed case.
 
-intervals.py OUT.md --each 12 --seed 71 [--keep FILE]: that many cases of every effect with parameters to compare, at
-plain, masked and concealed strength in turn, made by the sealed generator and fitted with the right effect alone.
+intervals.py OUT.md --each 12 --seed 71 [--keep FILE]: that many cases of every effect with comparable parameters, at
+plain, masked and concealed strength in turn. The sealed generator makes the cases.
 """
 
 import argparse
@@ -32,19 +32,19 @@ from proofs.concealed.effects import NAMES
 from proofs.concealed.make import read_residuals, seal
 from proofs.concealed.plan import Case
 from proofs.concealed.proof import share, table
-from proofs.concealed.score import KIN, SHARED, kin, parameters
+from proofs.concealed.score import INDISTINGUISHABLE, SHARED, indistinguishable, parameters
 
 LEVELS = ("plain", "masked", "concealed")
 
 
 def compared_names() -> list[str]:
-    """Effects whose parameters truth and answer share, and that are fitted."""
+    """Effects that are fitted and whose parameters occur in truth and answer."""
     fitted = {v.name for v in CANDIDATES if v.params}
-    return [e.name for e in NAMES if any(kin(e.name, f, KIN) for f in fitted)]
+    return [e.name for e in NAMES if any(indistinguishable(e.name, f, INDISTINGUISHABLE) for f in fitted)]
 
 
 def fitted(cases: pathlib.Path, tag: str, effect: str):
-    """Problem and fit of the right effect on one sealed case."""
+    """Model inputs and fit of the right effect on one sealed case."""
     plant = read(cases / f"{tag}-fit.parquet", cases / "loops.csv")
     source, specs = plant.export, plant.specs
     spec = spec_of(specs, tag)
@@ -53,12 +53,12 @@ def fitted(cases: pathlib.Path, tag: str, effect: str):
     begun = prepared(inputs, s.pv - inputs.level, without_spikes(s.pv, s.usable))
     p, plain = integrating_or_first_order(*begun, s)
     x = round_of(p, plain, s)
-    rows = tuple(v for v in CANDIDATES if kin(v.name, effect, KIN))
+    rows = tuple(v for v in CANDIDATES if indistinguishable(v.name, effect, INDISTINGUISHABLE))
     best = compete(x, rows)[0]
     return x.p, descended(x.p, best.fit.model, FULL_STEPS)
 
 
-def said(p, fit) -> dict:
+def answer_of(p, fit) -> dict:
     """The answer's parameters as the scorer reads them."""
     row = fit.model.added[-1]
     found = parameters_of(p, fit, row)
@@ -66,8 +66,8 @@ def said(p, fit) -> dict:
     return {"effects": [{"name": row.name, "parameters": shown}]}
 
 
-def kept(each: int, seed: int) -> list:
-    """(truth, problem, fit) of every case that could be sealed and fitted."""
+def sealed_fits(each: int, seed: int) -> list:
+    """(truth, model inputs, fit) of every case that could be sealed and fitted."""
     out, rng = [], np.random.default_rng(seed)
     with tempfile.TemporaryDirectory() as folder:
         place = pathlib.Path(folder)
@@ -88,8 +88,8 @@ def kept(each: int, seed: int) -> list:
 
 
 def report(cases: list) -> str:
-    """The table: how many intervals hold the truth, by parameter."""
-    rows = pd.DataFrame([r for truth, p, fit in cases for r in parameters(truth, said(p, fit))])
+    """The table: how many intervals contain the truth, by parameter."""
+    rows = pd.DataFrame([r for truth, p, fit in cases for r in parameters(truth, answer_of(p, fit))])
     lines = [
         [effect, name, len(g), f"{100 * g.error.abs().median():.0f} %", share(g.inside.astype(bool))]
         for (effect, name), g in rows.groupby(["effect", "parameter"])
@@ -105,13 +105,15 @@ def main() -> None:
     ap.add_argument("out", type=pathlib.Path)
     ap.add_argument("--each", type=int, default=12)
     ap.add_argument("--seed", type=int, default=71)
-    ap.add_argument("--keep", type=pathlib.Path, help="keep the fits here, to try other intervals on them")
+    ap.add_argument(
+        "--keep", type=pathlib.Path, help="save the fits in this file, to test other intervals on them"
+    )
     a = ap.parse_args()
-    cases = kept(a.each, a.seed)
+    cases = sealed_fits(a.each, a.seed)
     if a.keep:
         a.keep.write_bytes(pickle.dumps(cases))
     head = (
-        "# Do the intervals of effects hold the truth?\n\n"
+        "# Do the intervals of effects contain the truth?\n\n"
         f"`python proofs/concealed/intervals.py OUT.md --each {a.each} --seed {a.seed}`; intervals are of 90 %.\n\n"
     )
     a.out.write_text(head + report(cases) + "\n")

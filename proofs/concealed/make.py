@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Seals cases: recordings of loops in which at most one or two effects hide, and the truths apart.
+"""Seals cases: recordings of loops that contain at most one or two effects; the truths are in a separate file.
 
 make.py OUT --cases 400 --seed 1
 """
@@ -32,11 +32,11 @@ EFFECTS = CATALOGUE | {e.name: e for e in (*OUTSIDE, *FIRST_DECK, *SECOND_DECK)}
 DECKS = {"outside": OUTSIDE, "first": FIRST_DECK, "second": SECOND_DECK}
 STARTS = (pd.Timestamp("2026-03-02"), pd.Timestamp("2026-03-09"))
 ATTEMPTS = 12
-UNSEEN = 4.0  # energy that the base may hold beyond a FOPDT
+UNSEEN = 4.0  # energy of the baseline relative to a FOPDT, at most
 
 
 def unseen(scene: Scene) -> Scene:
-    """The scene with its small third lag made so small that nothing tells it from dead time."""
+    """The scene with a small third lag that is indistinguishable from dead time."""
     for _ in range(6):
         if energy_of(scene, scene.plant).energy < UNSEEN:
             return scene
@@ -46,7 +46,7 @@ def unseen(scene: Scene) -> Scene:
 
 
 def stage(rng: Rng, case: Case, attempt: int, library: list[np.ndarray]) -> Scene:
-    """The plain scene of a case; later attempts have less load and noise."""
+    """The baseline scene of a case; later attempts have less load and noise."""
     effects = [EFFECTS[name] for name, _ in case.effects]
     kinds = [k for k in ("flow", "pressure", "temperature", "level") if all(k in e.kinds for e in effects)]
     kind = str(rng.choice(kinds))
@@ -65,7 +65,7 @@ def stage(rng: Rng, case: Case, attempt: int, library: list[np.ndarray]) -> Scen
 
 
 def graded(effect: Effect, level: str, scene: Scene, seed: int) -> tuple[float, Grade | None] | None:
-    """Strength, and what it leaves, of an effect at a level; None if the scene cannot carry it."""
+    """Strength and residual of an effect at a level; None if the scene does not allow it."""
     if effect.sizes:
         return effect.sizes[list(LEVELS).index(level)], None
 
@@ -76,7 +76,7 @@ def graded(effect: Effect, level: str, scene: Scene, seed: int) -> tuple[float, 
 
 
 def hide(case: Case, library: list[np.ndarray]) -> tuple[Scene, Scene, list[dict]]:
-    """Plain scene, scene with the effects, and what was hidden, one entry an effect."""
+    """Baseline scene, scene with the effects, and one entry for each hidden effect."""
     for attempt in range(ATTEMPTS):
         rng = np.random.default_rng([case.seed, attempt])
         base = stage(rng, case, attempt, library)
@@ -94,7 +94,7 @@ def hide(case: Case, library: list[np.ndarray]) -> tuple[Scene, Scene, list[dict
 
 
 def later_misfit(scene: Scene, grade: Grade, later: pd.DataFrame, tag: str) -> dict[str, float]:
-    """Misfit (rms, %) of best plain FOPDT and of the true plant on the later recording, bias freed."""
+    """Misfit (rms, %) of the best baseline FOPDT and of the true plant on the later recording, with a free bias."""
     op, pv = (later[f"{tag}.{c}"].to_numpy(float) for c in ("OP", "PV"))
     plain = grade.plain.K * fopdt(op - scene.plant.v0, grade.plain.T, grade.plain.L, scene.scan)
     true = open_loop(scene.plant, op, quiet(scene.later), scene.scan)
@@ -102,12 +102,12 @@ def later_misfit(scene: Scene, grade: Grade, later: pd.DataFrame, tag: str) -> d
 
 
 def comparable(truth: dict) -> bool:
-    """Whether an open-loop run over the later recording can tell; an integrator's would drift off."""
+    """Whether an open-loop simulation over the later recording is usable; that of an integrator would drift."""
     return truth["block"] in ("valve", "process", "sensor") and truth["effect"] != "integrator"
 
 
 def truth_of(case: Case, base: Scene, scene: Scene, entries: list[dict], later: pd.DataFrame) -> dict:
-    """Everything the scorer may know of a case."""
+    """All information that the scorer may use about a case."""
     p, c = scene.plant, scene.pi
     truth = {
         "effect": entries[0]["effect"] if entries else "none",
@@ -145,9 +145,9 @@ def truth_of(case: Case, base: Scene, scene: Scene, entries: list[dict], later: 
 
 
 def rows_of(tag: str, scene: Scene) -> list[dict]:
-    """What the plant knows of the loop, and of its neighbour."""
+    """The rows of loops.csv for the loop and its neighbour."""
     rest = {"scan_s": scene.scan, "pv_lo": 0, "pv_hi": 100, "op_lo": 0, "op_hi": 100}
-    known = {tag: scene.told} | ({f"N{tag[1:]}": (None, None)} if scene.neighbours else {})
+    known = {tag: scene.stated} | ({f"N{tag[1:]}": (None, None)} if scene.neighbours else {})
     return [{"loop": t, "type": scene.kind, "kp": kp, "ti": ti, **rest} for t, (kp, ti) in known.items()]
 
 

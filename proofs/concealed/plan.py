@@ -1,4 +1,5 @@
-"""Which cases a set holds: a third with nothing hidden, singles at four levels, pairs, outside effects."""
+"""The cases of a set: a third without an effect, single effects at four levels, pairs, effects outside the
+catalogue."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ ALONE = {
 
 @dataclass(frozen=True)
 class Case:
-    """One case to seal: its tag, effect names with levels, or an oddity."""
+    """One case to seal: its tag, and its effects with levels, or an oddity."""
 
     tag: str
     effects: tuple[tuple[str, str], ...] = ()
@@ -34,7 +35,7 @@ class Case:
 
 
 def dealt(rng: np.random.Generator, cards: list, count: int) -> list:
-    """`count` cards from as many shuffled decks as it takes."""
+    """`count` cards from as many shuffled decks as necessary."""
     hand: list = []
     while len(hand) < count:
         hand += [cards[i] for i in rng.permutation(len(cards))]
@@ -78,7 +79,7 @@ def plan(cases: int, seed: int) -> list[Case]:
 
 
 def outside_alone(deck: Sequence[Effect], cases: int, seed: int) -> list[Case]:
-    """Cases of a deck of physics outside the catalogue, every kind as often at each of three levels."""
+    """Cases from a deck of physics outside the catalogue; each kind occurs equally often at each of three levels."""
     rng = np.random.default_rng(seed)
     cards = [((e.name, level),) for e in deck for level in ("plain", "masked", "concealed")]
     hand, seeds = dealt(rng, cards, cases), rng.integers(2**31, size=cases)

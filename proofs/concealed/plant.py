@@ -1,4 +1,4 @@
-"""The loop that makes the recordings: imperfect PI, valve, pipe, vessel, transmitter, in fine steps."""
+"""The loop that produces the recordings: imperfect PI, valve, pipe, vessel, transmitter, in fine steps."""
 
 import math
 from dataclasses import dataclass, fields
@@ -14,14 +14,14 @@ STEPS = 10  # fine steps a scan
 
 
 class Plant(NamedTuple):
-    """Physics of one loop; every default is the plain loop. Percent of span and seconds."""
+    """Physics of one loop; the defaults are those of the baseline loop. Percent of span and seconds."""
 
     K: float = 1.0
     T: float = 20.0
     L: float = 3.0
     v0: float = 50.0  # OP at rest
     y0: float = 50.0  # PV at rest
-    gap: float = 0.0  # full play
+    gap: float = 0.0  # full width of backlash
     static: float = 0.0  # friction at rest
     sliding: float = 0.0  # friction in motion
     rate: float = math.inf  # slew [%/s]
@@ -34,7 +34,7 @@ class Plant(NamedTuple):
     split_dead: float = 0.0
     split_ratio: float = 1.0
     split_s: float = 0.0
-    hurry: float = 0.0  # gain that grows with the rate of the move
+    hurry: float = 0.0  # gain that increases with the rate of the move
     T2: float = 0.0
     T3: float = 0.0
     slow: float = 0.0  # share of the slow part
@@ -49,41 +49,41 @@ class Plant(NamedTuple):
     spill: float = 0.0
     spill_s: float = 1.0
     leak: float = 1.0  # 0: integrator
-    pipe: float = 0.0  # share of the pipe's flow that the valve makes
+    pipe: float = 0.0  # share of the pipe's flow that depends on the valve
     drift: float = 0.0  # relative gain change over the record
     echo: float = 0.0
     echo_s: float = 0.0
     helper: float = 0.0  # strength of a hidden second controller
-    recall: float = 0.0  # relative gain change per 10 % of where PV has been
+    recall: float = 0.0  # relative gain change per 10 % of the average past PV
     recall_s: float = 1.0
-    grip: float = 0.0  # the sensor follows only once PV is so far [%] from what it shows
-    switch: float = 0.0  # load [% OP] that is on while PV is high
-    switch_at: float = 0.0  # above y0 [%], half a band to either side
+    grip: float = 0.0  # the sensor changes its value only when PV differs by this much [%]
+    switch: float = 0.0  # load [% OP] that acts while PV is high
+    switch_at: float = 0.0  # above y0 [%], with half a hysteresis band on either side
     switch_band: float = 1.0
     regime: float = 0.0  # relative gain change in a second flow regime
-    regime_at: float = 0.0  # flow above v0 [%] in which it begins, half a band to either side
+    regime_at: float = 0.0  # flow above v0 [%] at which it begins, with half a hysteresis band on either side
     regime_band: float = 1.0
-    detour: float = 0.0  # how much later [s] the flow above v0 arrives
-    tired: float = 0.0  # relative gain lost to 10 % of travel
-    tired_s: float = 1.0  # and regained in this time
-    relay: float = 0.0  # load [% OP] that a relay puts on for a time
-    relay_at: float = 0.0  # when PV passes so far [%] above y0
+    detour: float = 0.0  # additional delay [s] of the flow above v0
+    tired: float = 0.0  # relative gain lost through 10 % of travel
+    tired_s: float = 1.0  # and recovered in this time
+    relay: float = 0.0  # load [% OP] that a relay switches on for a set time
+    relay_at: float = 0.0  # when PV exceeds y0 by this much [%]
     relay_s: float = 1.0
-    hold_s: float = 0.0  # the actuator takes a new position only so often
-    purge: float = 0.0  # share of the time in which the sensor is blown out and stands
-    purge_s: float = 1.0  # how often
-    foam: float = 0.0  # what a moving surface adds to the reading
-    mount: float = 0.0  # share of a swinging mount
+    hold_s: float = 0.0  # interval at which the actuator takes a new position
+    purge: float = 0.0  # share of the time in which the sensor is purged and its value is constant
+    purge_s: float = 1.0  # interval of the purges
+    foam: float = 0.0  # addition to the reading from a moving surface
+    mount: float = 0.0  # share of an oscillating mount
     mount_w: float = 1.0
     mount_z: float = 0.1
-    lag: float = 0.0  # transmitter damping
+    lag: float = 0.0  # filter of the transmitter
     clip_lo: float = -1000.0
     clip_hi: float = 1000.0
     grid: float = 0.0
 
 
 class Pi(NamedTuple):
-    """The controller as it is: gain, integral time [s], PV filter [s], limits, gap, OP resolution [%]."""
+    """The real controller: gain, integral time [s], PV filter [s], limits, gap, OP resolution [%]."""
 
     kp: float = 1.0
     ti: float = 20.0
@@ -92,20 +92,20 @@ class Pi(NamedTuple):
     hi: float = 100.0
     gap: float = 0.0
     res: float = 0.0
-    hold_windup: float = 0.0  # 1: integral stands while at a limit; 0: back-calculated
+    hold_windup: float = 0.0  # 1: integral is constant while at a limit; 0: back-calculated
 
 
 @dataclass(frozen=True)
 class Drive:
-    """What acts on the loop from outside, one value a scan, each shape (n,)."""
+    """The inputs of the loop, one value a scan, each shape (n,)."""
 
     sp: np.ndarray
     load: np.ndarray  # at the vessel's inlet [% OP]
     supply: np.ndarray  # head over nominal head
     pre: np.ndarray  # before the transmitter [% PV]
     post: np.ndarray  # noise of the transmitter [% PV]
-    late: np.ndarray  # scan late by so many fine steps
-    force: np.ndarray  # NaN: automatic; inf: OP stands; else OP is tracked
+    late: np.ndarray  # delay of the scan in fine steps
+    force: np.ndarray  # NaN: automatic; inf: OP is constant; else OP is tracked
     op_hi: np.ndarray  # limit in force [%]
     helper: np.ndarray  # 1: the hidden controller acts
     act: np.ndarray  # load that belongs to an effect [% OP]
@@ -117,7 +117,7 @@ class Drive:
 
 @njit(cache=True)
 def decide(sp: float, pv: float, s: np.ndarray, force: float, hi: float, h: float, c: Any) -> float:
-    """OP [%] from SP and PV [%]; `s` keeps filtered PV, last error, integral and OP."""
+    """OP [%] from SP and PV [%]; `s` holds filtered PV, last error, integral and OP."""
     s[0] += (pv - s[0]) * (1.0 - math.exp(-h / c.filt) if c.filt > 0.0 else 1.0)
     e, last = sp - s[0], s[1]
     s[1] = e
@@ -139,7 +139,7 @@ def decide(sp: float, pv: float, s: np.ndarray, force: float, hi: float, h: floa
 
 @njit(cache=True)
 def stroke(u: float, s: np.ndarray, dt: float, tau: float, p: Any) -> float:
-    """Flow [%] through the valve one step on; `s` keeps the stages' positions, shape (8,)."""
+    """Flow [%] through the valve after one step; `s` holds the stages' positions, shape (8,)."""
     s[0] = slew(s[0], u, p.rate, dt)
     ask = s[0]
     if p.pos_w > 0.0:
@@ -158,7 +158,7 @@ def stroke(u: float, s: np.ndarray, dt: float, tau: float, p: Any) -> float:
 
 @njit(cache=True)
 def aid(now: float, y: float, on: float, dt: float, p: Any) -> float:
-    """Flow [%] of the hidden controller one step on: integral action when it acts, fading when not."""
+    """Flow [%] of the hidden controller after one step: integral action when it acts, decay when not."""
     if on > 0.0:
         return now - p.helper * (y - p.y0) / (p.K * p.T) * dt
     return now * (1.0 - dt / p.T)
@@ -166,13 +166,13 @@ def aid(now: float, y: float, on: float, dt: float, p: Any) -> float:
 
 @njit(cache=True)
 def gripped(shown: float, seen: float, grip: float) -> float:
-    """What a sensor shows that follows only once it is `grip` [%] off, and then at once."""
+    """The value of a sensor that changes only when the true value differs by `grip` [%], and then at once."""
     return seen if abs(seen - shown) >= grip else shown
 
 
 @njit(cache=True)
 def switched(on: float, x: float, at: float, band: float) -> float:
-    """Whether (1, 0) a load is on that PV itself switches, at a deviation [%] with a band about it."""
+    """Whether (1, 0) a load that PV switches is on; it switches at a deviation [%] with a hysteresis band."""
     if x > at + 0.5 * band:
         return 1.0
     return 0.0 if x < at - 0.5 * band else on
@@ -180,14 +180,14 @@ def switched(on: float, x: float, at: float, band: float) -> float:
 
 @njit(cache=True)
 def parted(q: float, flow: np.ndarray, far: int, v0: float) -> float:
-    """Flow [%] of two ways: up to `v0` by the short one, above it by one on which it entered `far` steps in."""
+    """Flow [%] over two paths: up to `v0` over the short one, above it over one with a delay of `far` steps."""
     late = flow[far] if far > 0 else v0
     return min(q, v0) + max(late, v0) - v0
 
 
 @njit(cache=True)
 def timed(left: float, armed: float, x: float, dt: float, p: Any) -> tuple[float, float]:
-    """What is left [s] of a relay's time, and whether it is armed (1, 0), one step on."""
+    """Remaining time [s] of a relay, and whether it is armed (1, 0), after one step."""
     left = max(left - dt, 0.0)
     if x > p.relay_at and armed > 0.0:
         return p.relay_s, 0.0
@@ -196,7 +196,7 @@ def timed(left: float, armed: float, x: float, dt: float, p: Any) -> tuple[float
 
 @njit(cache=True)
 def settle(p: Any, c: Any, sp: float) -> tuple[np.ndarray, np.ndarray]:
-    """Valve stages and controller memory of a loop at rest."""
+    """Valve stages and controller states of a loop at rest."""
     valve = np.zeros(8)
     valve[0] = valve[1] = valve[3] = valve[5] = p.v0
     memory = np.array([p.y0, sp - p.y0, p.v0 - c.kp * (sp - p.y0), p.v0])
@@ -205,7 +205,7 @@ def settle(p: Any, c: Any, sp: float) -> tuple[np.ndarray, np.ndarray]:
 
 @njit(cache=True)
 def run(p: Any, c: Any, rows: np.ndarray, given: np.ndarray, closed: bool, h: float, m: int) -> np.ndarray:
-    """Loop over scans; returns PV as sent and OP as decided, shape (2, n)."""
+    """The loop over all scans; returns PV at the transmitter and OP of the controller, shape (2, n)."""
     n, dt = rows.shape[1], h / m
     total = n * m + m + 1
     flow, passed, past = np.full(total, p.v0), np.zeros(total), np.zeros(total)
@@ -262,11 +262,11 @@ def close_loop(p: Plant, c: Pi, drive: Drive, scan: float) -> np.ndarray:
 
 
 def open_loop(p: Plant, op: np.ndarray, drive: Drive, scan: float) -> np.ndarray:
-    """PV [%], shape (n,), that a recorded OP, shape (n,), makes."""
+    """PV [%], shape (n,), for a recorded OP, shape (n,)."""
     return run(p, Pi(), drive.table(), np.asarray(op, float), False, scan, STEPS)[0]
 
 
 def idle(n: int, p: Plant) -> Drive:
-    """Nothing acts for `n` scans."""
+    """A drive without any input for `n` scans."""
     zero, one = np.zeros(n), np.ones(n)
     return Drive(zero + p.y0, zero, one, zero, zero, zero, zero + np.nan, 100.0 * one, zero, zero)

@@ -1,4 +1,4 @@
-"""Words, tables and the picture of the sealed cases' results."""
+"""Text, tables and the figure of the results on sealed cases."""
 
 import pathlib
 from typing import Any
@@ -21,7 +21,7 @@ def interval(hits: int, of: int, level: float = 0.95) -> tuple[float, float]:
 
 
 def share(hits: pd.Series) -> str:
-    """`7 of 8, 88 % (47–100)`; a dash where there is no case."""
+    """`7 of 8, 88 % (47–100)`; a dash without cases."""
     n, k = len(hits), int(hits.sum())
     if n == 0:
         return "–"
@@ -95,7 +95,7 @@ def oddities(rows: pd.DataFrame) -> str:
 
 
 def confusion(rows: pd.DataFrame) -> str:
-    """What each effect was called, single effects of all levels, commonest first."""
+    """The names given to each effect, single effects of all levels, most frequent first."""
     lines: list[list] = []
     for effect, g in rows[rows.group != "pair"].groupby("effect"):
         counts = g.verdict.value_counts()
@@ -105,7 +105,7 @@ def confusion(rows: pd.DataFrame) -> str:
 
 
 def parameter_table(params: pd.DataFrame) -> str:
-    """Errors and interval coverage of parameters that truth and answer share."""
+    """Errors and interval coverage of the parameters that occur in truth and answer."""
     if params.empty:
         return "No answer shares a parameter with its truth."
     lines: list[list] = []
@@ -126,8 +126,8 @@ def parameter_table(params: pd.DataFrame) -> str:
     return table(["effect", "parameter", "cases", "median error", "largest", "truth within interval"], lines)
 
 
-def plain_loops(rows: pd.DataFrame) -> str:
-    """How well the plain loop's constants come out where nothing, or a load alone, is hidden."""
+def baseline_loops(rows: pd.DataFrame) -> str:
+    """Errors of the baseline model's constants where there is no effect, or only a load."""
     lines: list[list] = []
     groups = {"nothing hidden": "none", "load step": "load-step", "load oscillation": "load-oscillation"}
     for title, effect in groups.items():
@@ -158,18 +158,19 @@ def section(rows: pd.DataFrame, params: pd.DataFrame, picture: str | None) -> st
         "### Parameters",
         parameter_table(params),
         "### The baseline model\nMedian error, and saved models within 5 %. Set points move under load.",
-        plain_loops(rows),
+        baseline_loops(rows),
     ]
     return "\n\n".join(p for p in parts if p) + "\n"
 
 
 def place(proof: pathlib.Path, text: str) -> None:
-    """Put the sealed cases' section into the file, in place of an older one; the rest of the file stays."""
+    """Put the section of the sealed cases into the file, in place of an older one; the rest of the file is
+    unchanged."""
     place_section(proof, "concealed", text)
 
 
 def place_section(proof: pathlib.Path, name: str, text: str) -> None:
-    """Put a named section into the file, in place of an older one; the rest of the file stays."""
+    """Put a named section into the file, in place of an older one; the rest of the file is unchanged."""
     begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
     old = proof.read_text() if proof.exists() else "# Proof\n\n"
     block = f"{begin}\n{text}{end}\n"
@@ -216,7 +217,7 @@ def pooled(ax: Any, info: pd.DataFrame) -> None:
 
 
 def strips(ax: Any, info: pd.DataFrame) -> None:
-    """Every case: its information, and whether the name was right, kin, withheld or wrong."""
+    """Every case: its information, and whether the name was right, indistinguishable, withheld or wrong."""
     names = sorted(info.effect.unique(), reverse=True)
     withheld = info.verdict.isin(ABSTAINED)
     looks = {

@@ -1,4 +1,4 @@
-"""The historian: polls, rounds, leaves out, compresses and stamps what the loop did."""
+"""The historian: polls, rounds, omits, compresses and stamps the values of the loop."""
 
 import numpy as np
 import pandas as pd
@@ -9,7 +9,7 @@ from proofs.concealed.scene import Historian, Rng, Scene
 
 @njit(cache=True)
 def swinging_door(x: np.ndarray, deviation: float) -> np.ndarray:
-    """Indices kept, shape (kept,), so that straight lines stay within `deviation` of `x`, shape (n,)."""
+    """Kept indices, shape (kept,), so that straight lines stay within `deviation` of `x`, shape (n,)."""
     kept = [0]
     low, high = -np.inf, np.inf
     for k in range(1, len(x)):
@@ -26,7 +26,7 @@ def swinging_door(x: np.ndarray, deviation: float) -> np.ndarray:
 
 @njit(cache=True)
 def by_exception(x: np.ndarray, band: float) -> np.ndarray:
-    """Values, shape (n,), of which only changes above `band` are reported."""
+    """Values, shape (n,); only changes above `band` are reported."""
     out = x.copy()
     for k in range(1, len(x)):
         if abs(x[k] - out[k - 1]) <= band:
@@ -35,7 +35,7 @@ def by_exception(x: np.ndarray, band: float) -> np.ndarray:
 
 
 def compress(x: np.ndarray, deviation: float) -> np.ndarray:
-    """What an archive with that deviation gives back at every scan, shape (n,)."""
+    """The values that an archive with that deviation returns at every scan, shape (n,)."""
     if deviation <= 0:
         return x
     kept = swinging_door(x, deviation)
@@ -48,20 +48,20 @@ def rounded(x: np.ndarray, step: float) -> np.ndarray:
 
 
 def poll_times(rng: Rng, n: int, h: Historian) -> np.ndarray:
-    """When each row was polled, in scans, shape (n,), never out of order."""
+    """Polling time of each row, in scans, shape (n,), never decreasing."""
     scatter = np.clip(rng.normal(0, h.poll_sd, n), -0.45, 0.45) if h.poll_sd else np.zeros(n)
     return np.arange(n) + scatter
 
 
 def polled(x: np.ndarray, at: np.ndarray, hold: bool) -> np.ndarray:
-    """`x`, shape (n,), read at `at` [scans]: a held output, or a value that moves between scans."""
+    """`x`, shape (n,), read at `at` [scans]: held between scans, or interpolated."""
     if hold:
         return x[np.clip(np.floor(at + 1e-9).astype(int), 0, len(x) - 1)]
     return np.interp(at, np.arange(len(x)), x)
 
 
 def keep_pv(pv: np.ndarray, at: np.ndarray, scan: float, h: Historian) -> np.ndarray:
-    """PV as the archive gives it back, shape (n,)."""
+    """PV as the archive returns it, shape (n,)."""
     x = polled(pv, at - h.late_s / scan, hold=False)
     x = x + h.alias * np.sin(2 * np.pi * at * (1 + scan / h.alias_s))
     if h.door_pv:
@@ -70,7 +70,7 @@ def keep_pv(pv: np.ndarray, at: np.ndarray, scan: float, h: Historian) -> np.nda
 
 
 def keep_op(op: np.ndarray, at: np.ndarray, h: Historian) -> np.ndarray:
-    """OP as the archive gives it back, shape (n,)."""
+    """OP as the archive returns it, shape (n,)."""
     x = polled(op, at, hold=True)
     return compress(x, h.door_op) if h.door_op else rounded(x, h.op_res)
 

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""What is explained on recordings of real laboratory rigs, from the exports alone.
+"""What `explain` reports for recordings of real laboratory rigs, from the exports alone.
 
 rigs.py FOLDER [--out docs/evidence/PROOF.md]
 
-FOLDER holds TANK-*.parquet, DUCT-*.parquet, PHX-*.parquet, PILOT-*.parquet and DRYER.parquet, without set points
-and without loops.csv (but for the duct's PI loop). The duct's models, plain and improved, are fitted to its open-loop
-step and judged on its PI loop.
+FOLDER holds TANK-*.parquet, DUCT-*.parquet, PHX-*.parquet, PILOT-*.parquet and DRYER.parquet, without set points and
+without loops.csv (except for the duct's PI loop). The duct's models, baseline and improved, are fitted to its
+open-loop step and tested on its PI loop.
 """
 
 import argparse
@@ -40,7 +40,7 @@ def loaded(path: pathlib.Path) -> Case:
 
 
 def line(name: str, e: Explained) -> list[str]:
-    """One rig: verdict, effects, misfit of the plain and the improved loop."""
+    """One rig: verdict, effects, misfit of the baseline and the improved loop."""
     shown = [
         f"{100 * (1 - part['fit_pct'] / 100):.0f} → {100 * (1 - e.said.fit['explained'][key]['fit_pct'] / 100):.0f}"
         for key, part in e.said.fit["baseline"].items()
@@ -49,17 +49,17 @@ def line(name: str, e: Explained) -> list[str]:
 
 
 def misfit(c: Case, model: dict) -> float:
-    """Rms that a model leaves of another recording, in PV's own unit, a constant bias freed."""
+    """Rms misfit of a model on another recording, in PV's own unit, with a free constant bias."""
     r, s = c.prepared.record, c.prepared.scale
     pv, _ = simulated(c, model, r.start_s + r.time_s, False)
     return float(np.std(s.low + r.pv * s.span / 100.0 - pv))
 
 
 def carried_over(step: Explained, loop: Case) -> str:
-    """The duct's plain and improved model, of the step, on the PI loop."""
+    """The duct's baseline and improved model, fitted to the step, on the PI loop."""
     best = step.model()
-    plain = best | to_data("DUCT", step.found.p.inputs, step.found.plain.model.c, (), 0.0, best["scale"])
-    return f"{misfit(loop, plain):.3f} → {misfit(loop, best):.3f}"
+    baseline = best | to_data("DUCT", step.found.p.inputs, step.found.plain.model.c, (), 0.0, best["scale"])
+    return f"{misfit(loop, baseline):.3f} → {misfit(loop, best):.3f}"
 
 
 def section(folder: pathlib.Path) -> str:
@@ -76,9 +76,9 @@ def section(folder: pathlib.Path) -> str:
         table(head, lines),
     ]
     if step is not None and (folder / f"{LOOP}.parquet").exists():
-        told = carried_over(step, loaded(folder / f"{LOOP}.parquet"))
+        misfits = carried_over(step, loaded(folder / f"{LOOP}.parquet"))
         parts.append(
-            f"The duct's models of the step on its PI loop, rms in PV's unit, plain → improved: {told}."
+            f"The duct's models of the step on its PI loop, rms in PV's unit, plain → improved: {misfits}."
         )
     return "\n\n".join(parts) + "\n"
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Asks a triage command to explain every sealed case; opens the truths only after the last answer.
+"""Runs a triage command to explain every sealed case; opens the truths only after the last answer.
 
 run.py CASES OUT --triage "triage" --jobs 2 [--proof docs/evidence/PROOF.md]
 """
@@ -20,51 +20,51 @@ TIMEOUT_S = 300
 
 
 def tags(cases: pathlib.Path) -> list[str]:
-    """Loops with a recording to fit; neighbours have none of their own."""
+    """Loops with a recording to fit; a neighbour has no recording of its own."""
     return sorted(f.name.removesuffix("-fit.parquet") for f in cases.glob("*-fit.parquet"))
 
 
 def call(command: list[str]) -> dict:
-    """Carry a command out; what it said, how it ended and how long it took [s]."""
+    """Run a command; its output, exit status and duration [s]."""
     begun = time.time()
     env = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     try:
         done = subprocess.run(
             command, capture_output=True, text=True, timeout=TIMEOUT_S, env=env, check=False
         )
-        status, said, complaint = done.returncode, done.stdout, done.stderr[-2000:]
+        status, output, complaint = done.returncode, done.stdout, done.stderr[-2000:]
     except subprocess.TimeoutExpired:
-        status, said, complaint = -1, "", f"no answer in {TIMEOUT_S} s"
-    return {"status": status, "said": said, "complaint": complaint, "seconds": time.time() - begun}
+        status, output, complaint = -1, "", f"no answer in {TIMEOUT_S} s"
+    return {"status": status, "output": output, "complaint": complaint, "seconds": time.time() - begun}
 
 
 def put(path: pathlib.Path, text: str) -> None:
-    """Write a file so that it is there whole or not at all."""
+    """Write a file completely or not at all."""
     part = path.with_name(path.name + ".part")
     part.write_text(text)
     part.replace(path)
 
 
-def ask(triage: list[str], cases: pathlib.Path, out: pathlib.Path, tag: str) -> None:
+def explain_case(triage: list[str], cases: pathlib.Path, out: pathlib.Path, tag: str) -> None:
     """Explanation, model and simulation of one case; TAG.log.json is written last and marks it as done."""
     if (out / f"{tag}.log.json").exists():
         return
     loop = ["--loops", str(cases / "loops.csv"), "--loop", tag]
     model, sim = str(out / f"{tag}.model.json"), str(out / f"{tag}.sim.parquet")
     fit, later = (str(cases / f"{tag}-{w}.parquet") for w in ("fit", "later"))
-    told = call([*triage, "explain", fit, *loop, "--save-model", model, "--format", "json"])
-    put(out / f"{tag}.json", told.pop("said"))
+    explained = call([*triage, "explain", fit, *loop, "--save-model", model, "--format", "json"])
+    put(out / f"{tag}.json", explained.pop("output"))
     drawn = call([*triage, "simulate", model, later, *loop, "--out", sim])
-    drawn.pop("said")
-    put(out / f"{tag}.log.json", json.dumps({"explain": told, "simulate": drawn}))
+    drawn.pop("output")
+    put(out / f"{tag}.log.json", json.dumps({"explain": explained, "simulate": drawn}))
 
 
 def run(triage: str, cases: pathlib.Path, out: pathlib.Path, jobs: int) -> None:
-    """Ask about every case that has no answer yet."""
+    """Explain every case that has no answer yet."""
     out.mkdir(parents=True, exist_ok=True)
     todo = tags(cases)
     with ThreadPoolExecutor(jobs) as pool:
-        answers = pool.map(lambda tag: ask(shlex.split(triage), cases, out, tag), todo)
+        answers = pool.map(lambda tag: explain_case(shlex.split(triage), cases, out, tag), todo)
         for i, _ in enumerate(answers, 1):
             print(f"\r{i} of {len(todo)}", end="", file=sys.stderr)
     print(file=sys.stderr)

@@ -1,4 +1,4 @@
-"""A loop before it is recorded: plant, controller, what acts on it, how the historian will keep it."""
+"""A loop before it is recorded: plant, controller, inputs, settings of the historian."""
 
 import math
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ SCANS = (5000, 18000)  # fewest and most a recording has
 
 @dataclass(frozen=True)
 class Historian:
-    """How a recording is kept; every default keeps it as it was."""
+    """The way of recording; with the defaults all values are kept unchanged."""
 
     pv_res: float = 0.01
     op_res: float = 0.01
@@ -29,8 +29,8 @@ class Historian:
     door_pv: float = 0.0  # swinging-door deviation [%]
     door_op: float = 0.0
     poll_sd: float = 0.0  # scatter of the polling [scans], stamps as polled
-    alias: float = 0.0  # fast ripple that the polling folds down [% PV]
-    alias_s: float = 600.0  # period it appears with
+    alias: float = 0.0  # fast ripple that the polling aliases [% PV]
+    alias_s: float = 600.0  # its apparent period
     stamp_sd: float = 0.0  # scatter of the stamps alone [scans]
     gaps: tuple[tuple[float, float], ...] = ()  # start and length as shares of the record
     outlier: float = 0.0
@@ -38,13 +38,13 @@ class Historian:
 
 @dataclass(frozen=True)
 class Scene:
-    """One loop and its two recordings-to-be; `reach` holds OP and PV extremes of the plain loop [%]."""
+    """One loop and its two future recordings; `reach` holds the OP and PV extremes of the baseline loop [%]."""
 
     kind: str
     scan: float
     plant: Plant
     pi: Pi
-    told: tuple[float, float]
+    stated: tuple[float, float]
     fit: Drive
     later: Drive
     historian: Historian
@@ -56,12 +56,12 @@ class Scene:
         return replace(self, plant=self.plant._replace(**changes))
 
     def with_historian(self, **changes: object) -> "Scene":
-        """The same scene, kept otherwise."""
+        """The same scene with other settings of the historian."""
         return replace(self, historian=replace(self.historian, **changes))  # type: ignore[arg-type]
 
 
 def log_uniform(rng: Rng, low: float, high: float) -> float:
-    """One number between `low` and `high`, even in its logarithm."""
+    """A number between `low` and `high`, uniform in its logarithm."""
     return float(math.exp(rng.uniform(math.log(low), math.log(high))))
 
 
@@ -104,7 +104,7 @@ def noise_path(rng: Rng, n: int, size: float, colour: float) -> np.ndarray:
 
 
 def drive(rng: Rng, n: int, plant: Plant, scan: float, sizes: dict[str, float]) -> Drive:
-    """Everything that acts on the loop in one recording of `n` scans."""
+    """All inputs of the loop in one recording of `n` scans."""
     zero = np.zeros(n)
     late = (rng.random(n) < sizes["late"]).astype(float)
     sp = setpoints(rng, n, plant.y0, sizes["settle"], sizes["span"], sizes["ramps"])
@@ -114,7 +114,7 @@ def drive(rng: Rng, n: int, plant: Plant, scan: float, sizes: dict[str, float]) 
 
 
 def tune(rng: Rng, p: Plant, scan: float, speed: float) -> Pi:
-    """A PI tuned by internal-model rules with scatter; `speed` is the closed loop's time over L."""
+    """A PI tuned by internal model control with scatter; `speed` is the closed-loop time over L."""
     wish = speed * (p.L + scan)
     kp = min(p.T / (p.K * (wish + p.L)), 8.0)
     ti = min(p.T, 4.0 * (wish + p.L)) * log_uniform(rng, 0.75, 1.4)
@@ -124,7 +124,7 @@ def tune(rng: Rng, p: Plant, scan: float, speed: float) -> Pi:
 
 
 def draw_plant(rng: Rng, kind: str, y0: tuple[float, float] = (42.0, 58.0)) -> Plant:
-    """A plain loop of that kind with a small third lag that nobody could see."""
+    """A baseline loop of that kind with a third lag that is too small to be identified."""
     scan, t, l, k = KINDS[kind]
     T, L = rng.uniform(*t), rng.uniform(*l)
     return Plant(
@@ -138,7 +138,7 @@ def draw_plant(rng: Rng, kind: str, y0: tuple[float, float] = (42.0, 58.0)) -> P
 
 
 def sizes_of(rng: Rng, plant: Plant, pi: Pi, scan: float) -> dict[str, float]:
-    """How large load and noise are [% PV], how long a setpoint stands [scans]."""
+    """Size of load and noise [% PV], and duration of a set point [scans]."""
     quick = (plant.T / (plant.K * pi.kp) + 2 * plant.L) / scan
     return {
         "load": rng.uniform(0.15, 0.5),
@@ -152,13 +152,13 @@ def sizes_of(rng: Rng, plant: Plant, pi: Pi, scan: float) -> dict[str, float]:
 
 
 def reach_of(plant: Plant, pi: Pi, d: Drive, scan: float) -> tuple[float, float, float, float]:
-    """Lowest and highest OP and PV of the plain loop [%], outliers left aside."""
+    """Lowest and highest OP and PV of the baseline loop [%], without outliers."""
     pv, op = close_loop(plant, pi, d, scan)
     return (*np.quantile(op, [0.0005, 0.9995]), *np.quantile(pv, [0.0005, 0.9995]))  # type: ignore[return-value]
 
 
 def draw_scene(rng: Rng, kind: str, low: bool = False, speed: float | None = None, **sizes: float) -> Scene:
-    """A plain scene, at low PV if so wished; `speed` and `sizes` overrule what is drawn."""
+    """A baseline scene, at low PV if `low`; `speed` and `sizes` replace the drawn values."""
     scan, plant = KINDS[kind][0], draw_plant(rng, kind, (20.0, 32.0) if low else (42.0, 58.0))
     pi = tune(rng, plant, scan, log_uniform(rng, 1.0, 5.0) if speed is None else speed)
     chosen = sizes_of(rng, plant, pi, scan) | sizes

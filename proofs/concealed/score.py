@@ -14,8 +14,8 @@ import pandas as pd
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
 
-TWINS = [{"valve-characteristic", "nonlinear-gain"}]  # one mark when OP alone moves PV
-KIN = [*TWINS, {"sensor-lag", "second-lag"}, {"stiction", "positioner"}]
+SAME_MARK = [{"valve-characteristic", "nonlinear-gain"}]  # indistinguishable when OP alone moves PV
+INDISTINGUISHABLE = [*SAME_MARK, {"sensor-lag", "second-lag"}, {"stiction", "positioner"}]
 ABSTAINED = {"none", "unexplained"}
 SHARED = {  # parameter of the truth: the name that an answer gives it
     "backlash": "backlash_pct",
@@ -47,53 +47,59 @@ SHARED = {  # parameter of the truth: the name that an answer gives it
     "period": "period_s",
     "coupling_gain": "coupling_gain",
 }
-SAID_AS = {"sensor-lag": "second-lag"}  # named alike, since OP and PV cannot tell them apart
+REPORTED_AS = {"sensor-lag": "second-lag"}  # same name, since OP and PV cannot distinguish them
 
 
-def said_of(out: pathlib.Path, tag: str) -> dict:
+def answer_of(out: pathlib.Path, tag: str) -> dict:
     """The answer as given; without one the verdict is `no answer`."""
     try:
-        said = json.loads((out / f"{tag}.json").read_text())
-        return said if isinstance(said, dict) and "verdict" in said else {"verdict": "no answer"}
+        answer = json.loads((out / f"{tag}.json").read_text())
+        return answer if isinstance(answer, dict) and "verdict" in answer else {"verdict": "no answer"}
     except (OSError, ValueError):
         return {"verdict": "no answer"}
 
 
 def recovered(cases: pathlib.Path, out: pathlib.Path, tag: str, truth: dict) -> float:
     """Share of the recoverable misfit power that the answer recovers on the later recording; or NaN."""
-    plain, floor = truth.get("later_plain", 0.0) ** 2, truth.get("later_true", 1.0) ** 2
-    if plain < 1.1 * floor:
+    baseline, floor = truth.get("later_plain", 0.0) ** 2, truth.get("later_true", 1.0) ** 2
+    if baseline < 1.1 * floor:
         return np.nan
     try:
         pv = pd.read_parquet(cases / f"{tag}-later.parquet")[f"{tag}.PV"].to_numpy(float)
-        left = float(np.var(pv - pd.read_parquet(out / f"{tag}.sim.parquet")["PV"].to_numpy(float)))
+        residual = float(np.var(pv - pd.read_parquet(out / f"{tag}.sim.parquet")["PV"].to_numpy(float)))
     except (OSError, KeyError, ValueError):
         return 0.0
-    return float(np.clip((plain - left) / (plain - floor), -1.0, 1.2)) if np.isfinite(left) else 0.0
+    return (
+        float(np.clip((baseline - residual) / (baseline - floor), -1.0, 1.2))
+        if np.isfinite(residual)
+        else 0.0
+    )
 
 
-def kin(a: str, b: str, groups: list[set[str]]) -> bool:
-    """Whether two names are the same or belong to one group."""
+def indistinguishable(a: str, b: str, groups: list[set[str]]) -> bool:
+    """Whether two names are equal or belong to one group."""
     return a == b or any({a, b} <= g for g in groups)
 
 
-def right_name(truth: dict, said: dict) -> tuple[bool, bool]:
-    """Right strictly, and right when kin and named alternatives count too."""
+def right_name(truth: dict, answer: dict) -> tuple[bool, bool]:
+    """Whether the name is right, and whether it is right with indistinguishable effects and named alternatives."""
     due = truth.get("pair", [truth["effect"]])
     if truth.get("outside"):
-        return said["verdict"] == "unexplained", said["verdict"] in ABSTAINED
-    strict = any(kin(said["verdict"], d, TWINS) for d in due)
-    others = [a for e in said.get("effects", [])[:1] for a in e.get("alternatives", [])]
-    return strict, strict or any(kin(said["verdict"], d, KIN) or d in others for d in due)
+        return answer["verdict"] == "unexplained", answer["verdict"] in ABSTAINED
+    strict = any(indistinguishable(answer["verdict"], d, SAME_MARK) for d in due)
+    others = [a for e in answer.get("effects", [])[:1] for a in e.get("alternatives", [])]
+    return strict, strict or any(
+        indistinguishable(answer["verdict"], d, INDISTINGUISHABLE) or d in others for d in due
+    )
 
 
-def parameters(truth: dict, said: dict) -> list[dict]:
-    """Parameters that truth and answer share: relative error, and whether the interval holds the truth."""
+def parameters(truth: dict, answer: dict) -> list[dict]:
+    """Parameters that occur in truth and answer: relative error, and whether the interval contains the truth."""
     found = []
     given = {
         k: v
-        for e in said.get("effects", [])
-        if e["name"] in (truth["effect"], SAID_AS.get(truth["effect"]))
+        for e in answer.get("effects", [])
+        if e["name"] in (truth["effect"], REPORTED_AS.get(truth["effect"]))
         for k, v in e["parameters"].items()
     }
     hidden = dict(truth.get("hidden", {}))
@@ -110,8 +116,8 @@ def parameters(truth: dict, said: dict) -> list[dict]:
     return found
 
 
-def plain_errors(out: pathlib.Path, tag: str, truth: dict) -> dict[str, float]:
-    """Relative errors of the plain loop's gain, time constant and dead time in the saved model."""
+def baseline_errors(out: pathlib.Path, tag: str, truth: dict) -> dict[str, float]:
+    """Relative errors of the baseline model's gain, time constant and dead time in the saved model."""
     try:
         found = json.loads((out / f"{tag}.model.json").read_text())["constants"]
         return {f"{k}_error": found.get(k, 0.0) / truth["base"][k] - 1.0 for k in "KTL"}
@@ -120,27 +126,27 @@ def plain_errors(out: pathlib.Path, tag: str, truth: dict) -> dict[str, float]:
 
 
 def judge(cases: pathlib.Path, out: pathlib.Path) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """One row a case, and one row a shared parameter."""
+    """One row for each case, and one row for each parameter that occurs in truth and answer."""
     rows, params = [], []
     for tag, truth in json.loads((cases / "truth.json").read_text()).items():
-        said = said_of(out, tag)
-        strict, lenient = right_name(truth, said)
+        answer = answer_of(out, tag)
+        strict, lenient = right_name(truth, answer)
         keep = {k: truth.get(k) for k in ("effect", "level", "kind", "oddity", "energy", "strength")}
-        names = {e["name"] for e in said.get("effects", [])}
+        names = {e["name"] for e in answer.get("effects", [])}
         rows.append(
             keep
-            | {"loop": tag, "verdict": said["verdict"], "strict": strict, "lenient": lenient}
-            | {"block": said.get("block") == truth["block"], "group": group_of(truth)}
+            | {"loop": tag, "verdict": answer["verdict"], "strict": strict, "lenient": lenient}
+            | {"block": answer.get("block") == truth["block"], "group": group_of(truth)}
             | {"both": names >= set(truth.get("pair", [])), "recovered": recovered(cases, out, tag, truth)}
             | {"seconds": seconds_of(out, tag)}
-            | plain_errors(out, tag, truth)
+            | baseline_errors(out, tag, truth)
         )
-        params += [{"loop": tag, "level": truth["level"]} | p for p in parameters(truth, said)]
+        params += [{"loop": tag, "level": truth["level"]} | p for p in parameters(truth, answer)]
     return pd.DataFrame(rows), pd.DataFrame(params)
 
 
 def group_of(truth: dict) -> str:
-    """Which share of the set a case belongs to."""
+    """The group of the set to which a case belongs."""
     if truth["effect"] == "none":
         return "none"
     if truth.get("outside"):
@@ -151,7 +157,7 @@ def group_of(truth: dict) -> str:
 
 
 def seconds_of(out: pathlib.Path, tag: str) -> float:
-    """Time that the explanation took [s]."""
+    """Duration of the explanation [s]."""
     try:
         return float(json.loads((out / f"{tag}.log.json").read_text())["explain"]["seconds"])
     except (OSError, ValueError, KeyError):

@@ -1,4 +1,4 @@
-"""How a valve stem follows what the controller asks for: play, friction, slew, positioner, trim."""
+"""Response of a valve stem to the controller output: backlash, friction, slew, positioner, trim."""
 
 import math
 
@@ -8,7 +8,7 @@ from numba import njit
 
 @njit(cache=True)
 def push_through_gap(z: float, u: float, gap: float) -> float:
-    """Stem position [%] after a stiff contact pushed it; it rests while the driver crosses the gap [%]."""
+    """Stem position [%] after a stiff contact pushed it; it is at rest while the driver crosses the gap [%]."""
     lead = u - z
     if lead > 0.5 * gap:
         return z + 0.9 * (lead - 0.5 * gap)
@@ -79,16 +79,16 @@ def trim(z: float, middle: float, bend: float) -> float:
 
 @njit(cache=True)
 def second_valve(z: float, at: float, dead: float, ratio: float) -> float:
-    """Flow [%] that a second valve adds to (or takes from) the first above the split point `at` [%]."""
+    """Flow [%] that a second valve adds to (or subtracts from) the first above the split point `at` [%]."""
     above = max(z - at, 0.0)
     return ratio * max(above - dead, 0.0) - above
 
 
 def gap_path(u: np.ndarray, gap: float, steps: int = 10) -> np.ndarray:
-    """Stem positions, shape (n,), for asked positions `u`, shape (n,), each held for `steps` steps."""
+    """Stem positions, shape (n,), for demanded positions `u`, shape (n,), each held for `steps` steps."""
     z, out = float(u[0]), np.empty(len(u))
-    for k, ask in enumerate(u):
+    for k, demand in enumerate(u):
         for _ in range(steps):
-            z = push_through_gap(z, float(ask), gap)
+            z = push_through_gap(z, float(demand), gap)
         out[k] = z
     return out

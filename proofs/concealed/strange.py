@@ -12,18 +12,18 @@ from proofs.concealed.scene import Rng, Scene, draw_scene, log_uniform
 
 
 def rate_gain(scene: Scene, s: float, rng: Rng) -> Made:
-    """Moves count for more the faster they are."""
+    """A gain that increases with the rate of the move."""
     return scene.with_plant(hurry=s), {"hurry": s}
 
 
 def swinging_mount(scene: Scene, s: float, rng: Rng) -> Made:
-    """A share `s` of the reading comes from a mount that rings."""
+    """A share `s` of the reading comes from an oscillating mount."""
     w = 2.0 / (scene.plant.T * rng.uniform(0.5, 1.0) + scene.plant.L)
     return scene.with_plant(mount=s, mount_w=w, mount_z=rng.uniform(0.05, 0.15)), {"mount": s}
 
 
 def hidden_controller(scene: Scene, s: float, rng: Rng) -> Made:
-    """A second controller on another input acts at times."""
+    """A second controller acts on another input at times."""
 
     def awake(d: Drive) -> Drive:
         on, n = d.helper.copy(), len(d.sp)
@@ -35,7 +35,7 @@ def hidden_controller(scene: Scene, s: float, rng: Rng) -> Made:
 
 
 def recycle(scene: Scene, s: float, rng: Rng) -> Made:
-    """A share `s` of what leaves comes back after several time constants."""
+    """A share `s` of the outflow returns after several time constants."""
     delay = rng.uniform(3.0, 7.0) * (scene.plant.T + scene.plant.L)
     return scene.with_plant(echo=s, echo_s=delay), {"echo": s, "echo_s": delay}
 
@@ -53,13 +53,13 @@ def bursts(scene: Scene, s: float, rng: Rng) -> Made:
 
 
 def long_memory(scene: Scene, s: float, rng: Rng) -> Made:
-    """A gain that goes with where PV has been for many time constants."""
+    """A gain that depends on the average of PV over many time constants."""
     slow = rng.uniform(15.0, 40.0) * (scene.plant.T + scene.plant.L)
     return scene.with_plant(recall=s, recall_s=slow), {"recall": s, "recall_s": slow}
 
 
 def sticking_sensor(scene: Scene, s: float, rng: Rng) -> Made:
-    """A sensor that stands until PV is a way off, and then jumps."""
+    """A sensor whose value is constant until PV differs by some percent, and then jumps."""
     return scene.with_plant(grip=s), {"grip": s}
 
 
@@ -82,18 +82,18 @@ OUTSIDE = (
 
 
 def plain(rng: Rng, kind: str) -> Scene:
-    """Nothing odd at all."""
+    """No oddity."""
     return draw_scene(rng, kind)
 
 
 def with_gaps(rng: Rng, kind: str) -> Scene:
-    """Some stretches are missing."""
+    """Some sections are missing."""
     gaps = tuple((float(rng.uniform(0.1, 0.9)), log_uniform(rng, 0.001, 0.02)) for _ in range(3))
     return draw_scene(rng, kind).with_historian(gaps=gaps)
 
 
 def with_outlier(rng: Rng, kind: str) -> Scene:
-    """One PV is far off."""
+    """One outlier of PV."""
     return draw_scene(rng, kind).with_historian(outlier=float(rng.choice([-1, 1]) * rng.uniform(5, 25)))
 
 
@@ -103,17 +103,17 @@ def with_ramps(rng: Rng, kind: str) -> Scene:
 
 
 def sluggish(rng: Rng, kind: str) -> Scene:
-    """A controller that takes its time."""
+    """A slow controller."""
     return draw_scene(rng, kind, speed=float(rng.uniform(8.0, 20.0)))
 
 
 def brisk(rng: Rng, kind: str) -> Scene:
-    """A controller near its limit, well damped no more."""
+    """A controller near its stability limit, with little damping."""
     return draw_scene(rng, kind, speed=float(rng.uniform(0.5, 0.8)))
 
 
 def many_moves(rng: Rng, kind: str) -> Scene:
-    """Setpoints that hardly let the loop settle."""
+    """Set points that change almost before the loop settles."""
     return draw_scene(rng, kind, settle=float(rng.uniform(70.0, 120.0)))
 
 
@@ -123,7 +123,7 @@ def big_load(rng: Rng, kind: str) -> Scene:
 
 
 def small_moves(rng: Rng, kind: str) -> Scene:
-    """Setpoints that move little."""
+    """Set points with small changes."""
     return draw_scene(rng, kind, span=float(rng.uniform(2.0, 3.0)))
 
 

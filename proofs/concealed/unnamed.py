@@ -1,5 +1,5 @@
-"""Physics that no code names, neither the catalogue nor what is told beside it: what an explanation does not know has
-to be owned up to by what is left. Of the two decks the second was not asked before the first was settled."""
+"""Physics that no code names, neither the catalogue nor the other generators. An explanation must report it as
+`unexplained`, because of its residual. The second deck was not used before the thresholds were set on the first."""
 
 from dataclasses import replace
 
@@ -12,7 +12,8 @@ from proofs.concealed.scene import Rng, Scene
 
 
 def flow_regimes(scene: Scene, s: float, rng: Rng) -> Made:
-    """Above a flow the gain is another one, until the flow falls well below: two regimes with a hysteresis."""
+    """Above a certain flow the gain is different, until the flow falls well below it: two regimes with a
+    hysteresis."""
     sign, at = float(rng.choice([-0.5, 1.0])), float(rng.uniform(-1.0, 1.0))
     band = float(rng.uniform(2.0, 6.0))
     made = scene.with_plant(regime=sign * s, regime_at=at, regime_band=band)
@@ -20,7 +21,7 @@ def flow_regimes(scene: Scene, s: float, rng: Rng) -> Made:
 
 
 def clocked_pump(scene: Scene, s: float, rng: Rng) -> Made:
-    """A second pump that runs by the clock."""
+    """A second pump that runs at a constant frequency."""
     period, duty = rng.uniform(0.03, 0.1), rng.uniform(0.2, 0.5)
 
     def runs(d: Drive) -> Drive:
@@ -31,13 +32,13 @@ def clocked_pump(scene: Scene, s: float, rng: Rng) -> Made:
 
 
 def fatigue(scene: Scene, s: float, rng: Rng) -> Made:
-    """Gain that travel takes away and rest gives back."""
+    """A gain that decreases with travel and recovers at rest."""
     rest = rng.uniform(8.0, 30.0) * (scene.plant.T + scene.plant.L)
     return scene.with_plant(tired=s, tired_s=rest), {"tired": s}
 
 
 def zeroing(scene: Scene, s: float, rng: Rng) -> Made:
-    """A sensor that drifts and is set back to zero by its own clock."""
+    """A sensor that drifts and is reset to zero at constant intervals."""
     period = rng.uniform(0.04, 0.12)
 
     def drifts(d: Drive) -> Drive:
@@ -48,31 +49,31 @@ def zeroing(scene: Scene, s: float, rng: Rng) -> Made:
 
 
 def two_ways(scene: Scene, s: float, rng: Rng) -> Made:
-    """Flow above its rest takes a longer way."""
+    """Flow above its value at rest takes a longer path."""
     late = s * (scene.plant.T + scene.plant.L)
     return scene.with_plant(detour=late), {"detour": late}
 
 
 def foaming(scene: Scene, s: float, rng: Rng) -> Made:
-    """A surface that foams while it moves, whichever way."""
+    """A surface that foams while it moves, in either direction."""
     return scene.with_plant(foam=s), {"foam": s}
 
 
 def relay(scene: Scene, s: float, rng: Rng) -> Made:
-    """A load that comes on for a set time whenever PV passes a place."""
+    """A load that acts for a set time whenever PV passes a threshold."""
     at = float(rng.uniform(0.0, 2.5))
     lasts = rng.uniform(1.0, 6.0) * (scene.plant.T + scene.plant.L)
     return scene.with_plant(relay=s, relay_at=at, relay_s=lasts), {"relay": s}
 
 
 def slow_actuator(scene: Scene, s: float, rng: Rng) -> Made:
-    """An actuator that takes a new position only now and then."""
+    """An actuator that takes a new position only at intervals."""
     wait = s * (scene.plant.T + scene.plant.L)
     return scene.with_plant(hold_s=wait), {"hold_s": wait}
 
 
 def purge(scene: Scene, s: float, rng: Rng) -> Made:
-    """A sensor that is blown out every so often, and stands meanwhile."""
+    """A sensor that is purged at intervals; its value is constant during a purge."""
     period = rng.uniform(10.0, 30.0) * (scene.plant.T + scene.plant.L)
     return scene.with_plant(purge=s, purge_s=period), {"purge": s}
 

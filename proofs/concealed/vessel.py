@@ -1,4 +1,4 @@
-"""What flow does to the measured value: pipe, vessel and transmitter, integrated by Runge-Kutta steps."""
+"""From the flow to the measured value: pipe, vessel and transmitter, integrated by Runge-Kutta steps."""
 
 import math
 from typing import Any
@@ -11,7 +11,7 @@ STATES = 9  # vessel, slow part, two extra lags, opposing part, spill basin, mou
 
 @njit(cache=True)
 def outflow(x: float, p: Any) -> float:
-    """What leaves the vessel at deviation `x` [%], in % of PV at rest."""
+    """Outflow of the vessel at deviation `x` [%], in % of PV at rest."""
     if p.root > 0.0:
         head = p.y0 / p.root
         return 2.0 * head * (math.sqrt(max(1.0 + x / head, 0.0)) - 1.0)
@@ -22,7 +22,7 @@ def outflow(x: float, p: Any) -> float:
 
 @njit(cache=True)
 def level_of(x: np.ndarray, p: Any) -> float:
-    """True PV [%] that the states make."""
+    """True PV [%] of these states."""
     inner = 1.0 + p.oppose
     return p.y0 + (1.0 - p.slow) * (inner * x[0] - p.oppose * x[4]) + p.slow * x[1]
 
@@ -49,7 +49,7 @@ def rates(x: np.ndarray, dx: np.ndarray, feed: float, pre: float, p: Any) -> Non
 
 @njit(cache=True)
 def advance(x: np.ndarray, work: np.ndarray, feed: float, pre: float, dt: float, p: Any) -> None:
-    """Move the states, shape (9,), on by `dt` [s] by the classic fourth-order rule; work: shape (5, 9)."""
+    """Advance the states, shape (9,), by `dt` [s] by the classic fourth-order rule; work: shape (5, 9)."""
     rates(x, work[0], feed, pre, p)
     for i in range(x.size):
         work[4, i] = x[i] + 0.5 * dt * work[0, i]
@@ -66,7 +66,7 @@ def advance(x: np.ndarray, work: np.ndarray, feed: float, pre: float, dt: float,
 
 @njit(cache=True)
 def reading(x: np.ndarray, pre: float, post: float, p: Any) -> float:
-    """What the transmitter sends [%]: mount, damping, noise, span, converter steps, in that order."""
+    """Output of the transmitter [%]: mount, filter, noise, span, converter steps, in that order."""
     y = level_of(x, p)
     value = (1.0 - p.mount) * y + p.mount * (p.y0 + x[6]) + pre
     if p.lag > 0.0:
