@@ -22,33 +22,36 @@ LOOPS = (30, 300)
 HOURS = (6.0, 24.0)
 """Length of a record [h]."""
 SOURCES = 5
-"""Sources of a plant at most, and one for each eight loops."""
+"""Most sources of a plant; also at most one for each eight loops."""
 VALUES = 6_000_000
-"""Loops by scans at most where the length is drawn, to fit in memory."""
+"""Most values (loops times scans) where the length is drawn, to fit in memory."""
 WARM = 5400.0
-"""What runs before the record [s]."""
+"""Simulated time before the record [s]."""
 ATTEMPTS = 8
-"""Plants drawn until one has a source and a follower."""
+"""Number of plants drawn until one has a source and a follower."""
 NEAR = 0.8
-"""Share of plants with oscillators of nearly a source's period."""
+"""Share of plants with independent oscillations of nearly a source's period."""
 WITHIN = (0.01, 0.1)
-"""How near those periods are; the nearer with this share:"""
+"""Relative difference of those periods; the smaller one with this share:"""
 NEARER = 0.4
 STRANGERS = 0.04
-"""Most oscillators of other periods, by the number of loops."""
+"""Most independent oscillations of other periods, relative to the number of loops."""
 GRIDS = (0.01, 0.02, 0.05)
-"""Roundings of the historian [%]."""
+"""Resolutions of the historian [%]."""
 LEVEL_WORN = 0.75
-"""Share of worn linkages at levels."""
+"""Share of faults with backlash that are at levels."""
 MASTERS = 0.35
-"""Share of tight tunings at masters."""
+"""Share of tight tunings that are at masters."""
 START = datetime(2026, 3, 2)
 
 
 @dataclass(frozen=True)
 class Recorded:
-    """A loop as recorded: SP, PV and OP [%] at stamp_s [s] from the plant's start, dt [s] apart; the controller is
-    op = kp (e + integral(e) / ti), e = SP - PV, ti in seconds; master: its name or ""; all ranges 0 to 100."""
+    """A loop as recorded: SP, PV and OP [%] at stamp_s [s] from the plant's start, dt [s] apart.
+
+    The controller is op = kp (e + integral(e) / ti), e = SP - PV, ti in seconds; master: its name or ""; all ranges 0
+    to 100.
+    """
 
     name: str
     kind: str
@@ -65,7 +68,7 @@ class Recorded:
 
 @dataclass(frozen=True)
 class Drawn:
-    """A plant: its scan [s], start, loops, and for each loop's name its truth."""
+    """A plant: its scan [s], start, loops, and the truth by loop name."""
 
     step_s: float
     start: datetime
@@ -74,7 +77,7 @@ class Drawn:
 
 
 def _bench(rng: np.random.Generator, n: int, step: float, scans: int) -> tuple[Bench, list[loops.Tag]]:
-    """A sound plant on which faults are tried."""
+    """A plant without faults, on which faults are tested."""
     plant, tags = loops.drawn(rng, n, step)
     natural = np.array([response.natural(plant, i) for i in range(n)])
     warm = round(WARM / step)
@@ -85,18 +88,22 @@ def _bench(rng: np.random.Generator, n: int, step: float, scans: int) -> tuple[B
 
 
 def _place(rng: np.random.Generator, bench: Bench, tags: list[loops.Tag], cause: str) -> int:
-    """A loop for a fault; -1: none fits."""
-    may = [i for i in range(bench.sound.size) if faults.fitting(bench, i, cause)]
-    may = [i for i in may if not {int(bench.sound.master[i]), int(bench.sound.slave[i])} & set(bench.faults)]
+    """A loop for a fault; -1 where none is suitable."""
+    may = [i for i in range(bench.without_fault.size) if faults.fitting(bench, i, cause)]
+    may = [
+        i
+        for i in may
+        if not {int(bench.without_fault.master[i]), int(bench.without_fault.slave[i])} & set(bench.faults)
+    ]
     if cause == "backlash" and rng.random() < LEVEL_WORN:
         may = [i for i in may if tags[i].kind == "level"] or may
     if cause == "tuning" and rng.random() < MASTERS:
-        may = [i for i in may if bench.sound.slave[i] >= 0] or may
+        may = [i for i in may if bench.without_fault.slave[i] >= 0] or may
     return int(rng.choice(may)) if may else -1
 
 
 def _fault(rng: np.random.Generator, bench: Bench, tags: list[loops.Tag]) -> int:
-    """Somewhere a fault that shows; its place, -1: none came about."""
+    """Add a visible fault to some loop; returns its place, -1 where no fault was possible."""
     for _ in range(4):
         cause = str(rng.choice(faults.CAUSES, p=faults.SHARES))
         i = _place(rng, bench, tags, cause)
@@ -106,27 +113,29 @@ def _fault(rng: np.random.Generator, bench: Bench, tags: list[loops.Tag]) -> int
 
 
 def _lone(bench: Bench, i: int, fed: set[int]) -> bool:
-    return i not in fed and bench.sound.master[i] < 0 and bench.sound.slave[i] < 0
+    return i not in fed and bench.without_fault.master[i] < 0 and bench.without_fault.slave[i] < 0
 
 
 def _unrelated(
-    rng: np.random.Generator, bench: Bench, turns: dict[int, float], fed: set[int]
+    rng: np.random.Generator, bench: Bench, periods: dict[int, float], fed: set[int]
 ) -> dict[int, int]:
-    """Oscillators of their own, with the source whose period they nearly have or -1; turns: periods of the sources
-    [s]; fed: loops that are coupled already."""
-    out, n = {}, bench.sound.size
+    """Loops with independent oscillations, with the source whose period they nearly have, or -1.
+
+    periods: of the sources [s]; fed: loops that are coupled already.
+    """
+    out, n = {}, bench.without_fault.size
     for _ in range(int(rng.integers(1, min(6, n // 8) + 1)) if rng.random() < NEAR else 0):
-        source = int(rng.choice(list(turns)))
-        turn = turns[source]
+        source = int(rng.choice(list(periods)))
+        cycle = periods[source]
         within = WITHIN[0] if rng.random() < NEARER else WITHIN[1]
         for _ in range(5):
             cause = str(rng.choice(["stiction", "tuning", "load"], p=(0.6, 0.28, 0.12)))
             may = [i for i in range(n) if faults.fitting(bench, i, cause) and _lone(bench, i, fed)]
             if not may:
                 break
-            far = np.abs(np.log(bench.natural[may, 0] / turn))
+            far = np.abs(np.log(bench.natural[may, 0] / cycle))
             i = int(rng.choice(np.array(may)[np.argsort(far)[: max(n // 4, 5)]]))
-            if faults.add_matched(rng, bench, i, cause, turn, within):
+            if faults.add_matched(rng, bench, i, cause, cycle, within):
                 out[i] = source
                 break
     for _ in range(int(rng.integers(0, round(n * STRANGERS) + 1))):
@@ -139,11 +148,11 @@ def _unrelated(
 
 
 def _web(rng: np.random.Generator, bench: Bench, tags: list[loops.Tag], sources: list[int]) -> Web:
-    """Lead the sources to their followers."""
+    """Couple the sources to their followers."""
     web = Web(rng, bench, [t.area for t in tags])
     for i in sources:
         depth = {i: 0}
-        depth |= {int(x[i]): 1 for x in (bench.sound.master, bench.sound.slave) if x[i] >= 0}
+        depth |= {int(x[i]): 1 for x in (bench.without_fault.master, bench.without_fault.slave) if x[i] >= 0}
         web.trees.append(Tree(i, bench.faults[i][1].period_s, depth))
     for tree in web.trees:
         web.grow(tree)
@@ -152,7 +161,7 @@ def _web(rng: np.random.Generator, bench: Bench, tags: list[loops.Tag], sources:
 
 
 def _recorded(rng: np.random.Generator, bench: Bench, tags: list[loops.Tag]) -> list[Recorded]:
-    """What the historian kept."""
+    """The values that the historian records."""
     p, out = bench.faulty, []
     ran = simulate(p, bench.trends)
     stamp = np.arange(ran.pv.shape[0] - bench.warm) * p.step
@@ -170,7 +179,7 @@ def _recorded(rng: np.random.Generator, bench: Bench, tags: list[loops.Tag]) -> 
 def _attempt(
     rng: np.random.Generator, n: int, sources: int, hours: float | None, step: float
 ) -> Drawn | None:
-    """A plant; None: no source stayed or none of them had a follower."""
+    """A plant; None where no source remained or none has a follower."""
     most = max(min(HOURS[1], VALUES * step / 3600 / n), HOURS[0])
     scans = round((hours or rng.uniform(HOURS[0], most)) * 3600 / step)
     bench, tags = _bench(rng, n, step, scans)
@@ -181,8 +190,8 @@ def _attempt(
     pv = showing(bench, begun)[0]
     if not begun:
         return None
-    turns = {i: period(pv[:, i]) * step for i in begun}
-    own = _unrelated(rng, bench, turns, web.fed())
+    periods = {i: period(pv[:, i]) * step for i in begun}
+    own = _unrelated(rng, bench, periods, web.fed())
     web.quiet(set(own))
     known = truths(bench, [t.name for t in tags], begun, own)
     roles = [x["role"] for x in known.values()]
@@ -199,7 +208,7 @@ def draw(
     hours: float | None = None,
     step_s: float | None = None,
 ) -> Drawn:
-    """One plant; numbers that are not given are drawn."""
+    """One plant; values that are not given are drawn."""
     for attempt in range(ATTEMPTS):
         rng = np.random.default_rng([2007, seed, attempt])
         n = loops or round(trends.log_uniform(rng, *LOOPS))
@@ -211,13 +220,13 @@ def draw(
 
 
 def clock_off(drawn: Drawn, seconds: float, names: set[str]) -> Drawn:
-    """Some loops' stamps are late by that many seconds."""
+    """The plant with the stamps of some loops late by `seconds`."""
     some = (replace(x, stamp_s=x.stamp_s + seconds) if x.name in names else x for x in drawn.loops)
     return replace(drawn, loops=tuple(some))
 
 
 def thinned(drawn: Drawn, factor: int, names: set[str]) -> Drawn:
-    """Of some loops only every so many samples are kept."""
+    """The plant with every `factor`-th sample of some loops."""
     out = []
     for x in drawn.loops:
         kept = {k: getattr(x, k)[::factor] for k in ("stamp_s", "sp", "pv", "op")}

@@ -1,4 +1,4 @@
-"""Faults that make a loop oscillate, each tried on its loop alone before it is kept."""
+"""Faults that make a loop oscillate; each is tested on its loop alone before it is used."""
 
 from __future__ import annotations
 
@@ -13,41 +13,42 @@ from proofs.coupled.trends import log_uniform
 
 CAUSES = ("stiction", "backlash", "tuning", "load")
 SHARES = (0.5, 0.22, 0.14, 0.14)
-"""How often each is drawn; valves fail to cycle oftener than the others."""
+"""Shares of the faults in the draws; valve faults are more often without a cycle than the others."""
 SWELL = 1.5
-"""A source's error is spread at least so much more than without its fault."""
+"""Least ratio of a source's error to that without its fault."""
 SPARE = 1.1
-"""So much more than that alone on its loop, as couplings take some away."""
+"""Additional factor of that ratio on the loop alone, because couplings reduce it."""
 RHYTHM = {"stiction": 0.3, "backlash": 0.3, "tuning": 0.2, "load": 0.3}
-"""Least returning peak of the error, by cause: ringing that noise sustains is less regular."""
+"""Least returning peak of the error's autocorrelation, by cause: ringing that noise sustains is less regular."""
 LASTS = 0.75
-"""Least share of the record in which a source's error is spread by more than BY times that without its fault."""
+"""Least share of the record in which a source's error is more than BY times that without its fault."""
 BY = 1.2
 FINEST = 7.0
-"""Samples in a cycle at least."""
+"""Least number of samples in a cycle."""
 CYCLES = 12.0
-"""Cycles in the record at least."""
+"""Least number of cycles in the record."""
 TRIES = 10
-"""Draws of one fault at most."""
+"""Most draws of one fault."""
 STICKBAND = (0.6, 5.0)
-"""Of a sticking valve [% OP]."""
-PLAY = (1.5, 10.0)
-"""Of a worn linkage [% OP]."""
+"""Stickband of a sticking valve [% OP]."""
+BACKLASH = (1.5, 10.0)
+"""Width of backlash [% OP]."""
 RINGING = (0.86, 0.985)
-"""Gain of a loop that rings, over the critical one."""
+"""Gain of a loop that rings, relative to the critical gain."""
 GROWING = (1.01, 1.08)
-"""Of one that grows until OP meets its limits."""
+"""The same of an unstable loop, whose oscillation grows until OP reaches its limits."""
 GROWS = 0.08
-"""Share of those."""
+"""Share of unstable loops."""
 BEAT = 0.4
-"""Largest periodic load over what would move the PV by its whole span at the loop's most sensitive period."""
+"""Largest periodic load, relative to one that would move the PV by its whole span at the loop's most sensitive
+period."""
 SCALES = (0.2, 5.0)
-"""How far a loop is made slower or faster to match a period."""
+"""Factors by which a loop is made slower or faster to match a period."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """What a fault changes: values of the loop with and without it, what with it alone, its own trend."""
+    """The changes of a fault: values of the loop with and without it, values only with it, its own trend."""
 
     cause: str
     common: dict[str, float]
@@ -57,7 +58,8 @@ class Fault:
 
 @dataclass(frozen=True)
 class Shown:
-    """What a fault did on its loop alone: swell, period [s], amplitudes of PV and stem [%], whether it will do."""
+    """The effect of a fault on its loop alone: ratio of errors, period [s], amplitudes of PV and stem [%], whether it
+    is usable."""
 
     swell: float
     period_s: float
@@ -68,10 +70,11 @@ class Shown:
 
 @dataclass
 class Bench:
-    """A plant being drawn: without and with its faults, its trends, each loop's natural period [s] and height
-    (n, 2), the spread of sound errors (n,), scans before the record, and the faults so far with what they did."""
+    """A plant under construction: without and with its faults, its trends, each loop's natural period [s] and height
+    (n, 2), the spread of the errors without a fault (n,), scans before the record, and the faults with their
+    effects."""
 
-    sound: Plant
+    without_fault: Plant
     faulty: Plant
     trends: Trends
     natural: np.ndarray
@@ -80,101 +83,108 @@ class Bench:
     faults: dict[int, tuple[Fault, Shown]]
 
     def keep(self, i: int, fault: Fault, shown: Shown) -> None:
-        """Take a fault into the plant."""
-        self.sound, self.faulty = _pair(self.sound, self.faulty, i, fault)
+        """Add a fault to the plant."""
+        self.without_fault, self.faulty = _pair(self.without_fault, self.faulty, i, fault)
         if fault.own is not None:
             self.trends.own[i] = fault.own
         self.faults[i] = (fault, shown)
 
     def without(self, at: list[int]) -> Plant:
-        """The plant with those loops' faults taken away."""
+        """The plant without the faults of those loops."""
         plant = self.faulty
         for i in at:
-            plant = plant.changed(i, **{k: getattr(self.sound, k)[i] for k in self.faults[i][0].values})
+            plant = plant.changed(
+                i, **{k: getattr(self.without_fault, k)[i] for k in self.faults[i][0].values}
+            )
         return plant
 
 
-def _pair(sound: Plant, faulty: Plant, i: int, fault: Fault) -> tuple[Plant, Plant]:
-    sound, faulty = (x.changed(i, **fault.common) if fault.common else x for x in (sound, faulty))
-    return sound, faulty.changed(i, **fault.values)
+def _pair(intact: Plant, faulty: Plant, i: int, fault: Fault) -> tuple[Plant, Plant]:
+    intact, faulty = (x.changed(i, **fault.common) if fault.common else x for x in (intact, faulty))
+    return intact, faulty.changed(i, **fault.values)
 
 
 def _stiction(rng: np.random.Generator, bench: Bench, i: int) -> Fault:
     band, jump = log_uniform(rng, *STICKBAND), rng.uniform(0.15, 0.9)
-    brisk = {"kp": bench.sound.kp[i] * rng.uniform(0.8, 1.6), "ti": bench.sound.ti[i] * rng.uniform(0.5, 1)}
+    brisk = {
+        "kp": bench.without_fault.kp[i] * rng.uniform(0.8, 1.6),
+        "ti": bench.without_fault.ti[i] * rng.uniform(0.5, 1),
+    }
     values = {"stick": band * (1 + jump) / 2, "slip": band * (1 - jump) / 2}
     values["scatter"] = rng.choice([0.0, 0.1, 0.2])
     return Fault("stiction", brisk, values, rng.standard_normal(bench.trends.sp.shape[0]))
 
 
 def _backlash(rng: np.random.Generator, bench: Bench, i: int) -> Fault:
-    p, brisk = bench.sound, {}
+    p, brisk = bench.without_fault, {}
     if not p.integrating[i]:
         brisk["ti"] = p.ti[i] * rng.uniform(0.4, 0.8)
         brisk["kp"] = response.critical_gain(p.changed(i, **brisk), i) * rng.uniform(0.45, 0.75)
     else:
         brisk = {"kp": p.kp[i] * rng.uniform(0.7, 1.5), "ti": p.ti[i] * rng.uniform(0.4, 0.9)}
-    return Fault("backlash", brisk, {"play": log_uniform(rng, *PLAY)}, None)
+    return Fault("backlash", brisk, {"backlash": log_uniform(rng, *BACKLASH)}, None)
 
 
 def _tuning(rng: np.random.Generator, bench: Bench, i: int) -> Fault:
-    ti = bench.sound.ti[i] * log_uniform(rng, 0.25, 1.2)
-    critical = response.critical_gain(bench.sound.changed(i, ti=ti), i)
+    ti = bench.without_fault.ti[i] * log_uniform(rng, 0.25, 1.2)
+    critical = response.critical_gain(bench.without_fault.changed(i, ti=ti), i)
     near = rng.uniform(*(GROWING if rng.random() < GROWS else RINGING))
     return Fault("tuning", {}, {"kp": critical * near, "ti": ti}, None)
 
 
 def _load(rng: np.random.Generator, bench: Bench, i: int, at: float = 0.0) -> Fault:
-    step, n = bench.sound.step, bench.trends.sp.shape[0]
-    turn = at or max(bench.natural[i, 0] * log_uniform(rng, 0.6, 5), FINEST * step)
-    answer = abs(response.load_to_error(bench.sound, i, np.array([2 * np.pi / turn]))[0])
+    step, n = bench.without_fault.step, bench.trends.sp.shape[0]
+    cycle = at or max(bench.natural[i, 0] * log_uniform(rng, 0.6, 5), FINEST * step)
+    answer = abs(response.load_to_error(bench.without_fault, i, np.array([2 * np.pi / cycle]))[0])
     size = np.sqrt(2) * bench.calm[i] * np.sqrt(log_uniform(rng, 1.8, 6) ** 2 - 1) / max(answer, 1e-6)
     size = min(size, 100 * BEAT / max(bench.natural[i, 1], 1e-6))
-    return Fault("load", {}, {"beat": size}, trends.beat(rng, n, turn / step))
+    return Fault("load", {}, {"beat": size}, trends.beat(rng, n, cycle / step))
 
 
 def tried(bench: Bench, i: int, fault: Fault) -> Shown:
-    """Run a fault on its loop alone, with the partner of its cascade, and without it."""
-    at = [i, *(int(x[i]) for x in (bench.sound.master, bench.sound.slave) if x[i] >= 0)]
+    """Simulate a loop alone, with the partner of its cascade, with and without a fault."""
+    at = [i, *(int(x[i]) for x in (bench.without_fault.master, bench.without_fault.slave) if x[i] >= 0)]
     at.sort()
     k, part = at.index(i), bench.trends.part(at)
     if fault.own is not None:
         part.own[k] = fault.own
-    sound, faulty = _pair(bench.sound.part(at), bench.sound.part(at), k, fault)
+    intact, faulty = _pair(bench.without_fault.part(at), bench.without_fault.part(at), k, fault)
     if not (np.isfinite(list(fault.values.values())).all() and faulty.kp[k] > 0):
         return Shown(0.0, 0.0, 0.0, 0.0, False)
-    ran, calm = simulate(faulty, part, stems=True), simulate(sound, part)
+    ran, calm = simulate(faulty, part, stems=True), simulate(intact, part)
     pv, e, op, stem = (x[bench.warm :, k] for x in (ran.pv, ran.sp - ran.pv, ran.op, ran.stem))
     least = spread((calm.sp - calm.pv)[bench.warm :, k])
     swell = float(spread(e) / least)
     if swell < SWELL * SPARE:
         return Shown(swell, 0.0, 0.0, 0.0, False)
-    turn, step = period(pv), bench.sound.step
-    good = FINEST <= turn <= pv.size / CYCLES
-    good = good and cycling(e, turn, least, fault.cause) and bool(np.mean((pv <= 0) | (pv >= 100)) < 0.05)
+    cycle, step = period(pv), bench.without_fault.step
+    good = FINEST <= cycle <= pv.size / CYCLES
+    good = good and cycling(e, cycle, least, fault.cause) and bool(np.mean((pv <= 0) | (pv >= 100)) < 0.05)
     if good and fault.cause in ("stiction", "backlash"):
         back, height = returning(stem)
-        good = height >= RHYTHM[fault.cause] and abs(back / turn - 1) < 0.2
+        good = height >= RHYTHM[fault.cause] and abs(back / cycle - 1) < 0.2
     if fault.cause != "tuning":
         good = good and bool(np.mean((op <= 0) | (op >= 100)) < 0.1)
-    return Shown(swell, turn * step, np.sqrt(2) * float(spread(pv)), np.sqrt(2) * float(spread(stem)), good)
+    return Shown(swell, cycle * step, np.sqrt(2) * float(spread(pv)), np.sqrt(2) * float(spread(stem)), good)
 
 
-def cycling(e: np.ndarray, turn: float, calm: float, cause: str) -> bool:
-    """Whether an error comes back all through the record, against its spread without the fault."""
-    return returning(e)[1] >= RHYTHM[cause] and lasting(e, turn, BY * calm) >= LASTS
+def cycling(e: np.ndarray, cycle: float, calm: float, cause: str) -> bool:
+    """Whether an error is periodic over the whole record, compared with its spread without the fault."""
+    return returning(e)[1] >= RHYTHM[cause] and lasting(e, cycle, BY * calm) >= LASTS
 
 
 def fitting(bench: Bench, i: int, cause: str) -> bool:
     """Whether a loop can have that fault: a master has no valve."""
-    return i not in bench.faults and not (cause in ("stiction", "backlash") and bench.sound.slave[i] >= 0)
+    return i not in bench.faults and not (
+        cause in ("stiction", "backlash") and bench.without_fault.slave[i] >= 0
+    )
 
 
 DRAWS = {"stiction": _stiction, "backlash": _backlash, "tuning": _tuning, "load": _load}
 
 
 def add(rng: np.random.Generator, bench: Bench, i: int, cause: str) -> bool:
-    """Give loop i a fault that shows; False: none of the draws did."""
+    """Give loop i a visible fault; False where no draw is visible."""
     for _ in range(TRIES):
         fault = DRAWS[cause](rng, bench, i)
         shown = tried(bench, i, fault)
@@ -185,7 +195,7 @@ def add(rng: np.random.Generator, bench: Bench, i: int, cause: str) -> bool:
 
 
 def _slower(p: Plant, i: int, fault: Fault, times: float) -> Fault:
-    """The same loop and fault with all times of the loop scaled."""
+    """The same loop and fault with all times of the loop multiplied by a factor."""
     common = {**fault.common}
     for name in ("first", "second", "ti"):
         common[name] = common.get(name, getattr(p, name)[i]) * times
@@ -195,21 +205,21 @@ def _slower(p: Plant, i: int, fault: Fault, times: float) -> Fault:
 
 
 def add_matched(
-    rng: np.random.Generator, bench: Bench, i: int, cause: str, turn: float, within: float
+    rng: np.random.Generator, bench: Bench, i: int, cause: str, cycle: float, within: float
 ) -> bool:
-    """Give loop i a fault of nearly that period [s]; False: none came that near."""
-    aim = turn * (1 + rng.uniform(-within, within))
+    """Give loop i a fault with nearly that period [s]; False where none is near enough."""
+    aim = cycle * (1 + rng.uniform(-within, within))
     for _ in range(3):
         fault = _load(rng, bench, i, aim) if cause == "load" else DRAWS[cause](rng, bench, i)
         for _ in range(5):
             shown = tried(bench, i, fault)
-            if shown.good and abs(shown.period_s / turn - 1) <= within:
+            if shown.good and abs(shown.period_s / cycle - 1) <= within:
                 bench.keep(i, fault, shown)
                 return True
-            first = fault.common.get("first", bench.sound.first[i]) / bench.sound.first[i]
+            first = fault.common.get("first", bench.without_fault.first[i]) / bench.without_fault.first[i]
             if cause == "load" or not shown.period_s:
                 break
             if not SCALES[0] <= first * aim / shown.period_s <= SCALES[1]:
                 break
-            fault = _slower(bench.sound, i, fault, aim / shown.period_s)
+            fault = _slower(bench.without_fault, i, fault, aim / shown.period_s)
     return False

@@ -17,13 +17,14 @@ def _none() -> np.ndarray:
 
 @dataclass(frozen=True)
 class Plant:
-    """Loops and couplings as arrays; times in seconds unless said, the rest in percent of spans.
+    """Loops and couplings as arrays; times in seconds unless stated otherwise, other values in percent of spans.
 
-    Loops, shape (n,): gain [% PV/% OP] (per `first` where it integrates), two time constants, dead time [scans];
-    kp, ti; sp0, op0, where it stands; master, slave, their places, -1: none, masters come first; stick and slip, He's
-    two levels of friction [% OP], scatter of the first from slip to slip [log]; play, full width [% OP]; beat,
-    amplitude of its own periodic load [% OP]. Couplings: from the PV or the stem of a loop to the process input of
-    another by gain, lag and delay [scans].
+    Loops, shape (n,): gain [% PV/% OP] (per `first` where it integrates), two time constants, dead time [scans]; kp,
+    ti; sp0, op0 at rest.
+    master, slave: their places, -1: none, masters come first; stick, slip: He's two levels of friction [% OP].
+    scatter: of the first level from slip to slip [log]; backlash: full width [% OP]; beat: amplitude of its own
+        periodic load [% OP].
+    Couplings: from the PV or the stem of a loop to the process input of another by gain, lag and delay [scans].
     """
 
     step: float
@@ -41,7 +42,7 @@ class Plant:
     stick: np.ndarray
     slip: np.ndarray
     scatter: np.ndarray
-    play: np.ndarray
+    backlash: np.ndarray
     beat: np.ndarray
     link_from: np.ndarray = field(default_factory=_none)
     link_to: np.ndarray = field(default_factory=_none)
@@ -68,7 +69,7 @@ class Plant:
         return replace(self, **new)
 
     def part(self, at: list[int]) -> Plant:
-        """Those loops alone, without couplings; partners of a cascade that are left out are dropped."""
+        """Those loops alone, without couplings; partners of a cascade that are not included are dropped."""
         new = {
             f.name: getattr(self, f.name)[at]
             for f in fields(self)
@@ -82,8 +83,10 @@ class Plant:
 
 @dataclass(frozen=True)
 class Trends:
-    """What drives a plant: set points, loads at the process inputs and noises [%], shape (scans, n); own, by loop:
-    the shape of its periodic load, or the normals for its friction, shape (scans,)."""
+    """Inputs of a plant: set points, loads at the process inputs and noises [%], shape (scans, n).
+
+    own: by loop, the shape of its periodic load, or the normal random numbers for its friction, shape (scans,).
+    """
 
     sp: np.ndarray
     load: np.ndarray
@@ -98,7 +101,7 @@ class Trends:
 
 @dataclass(frozen=True)
 class Ran:
-    """SP, PV, OP and stem [%], shape (scans, n); the stem only where asked for."""
+    """SP, PV, OP and stem [%], shape (scans, n); the stem only if it is requested."""
 
     sp: np.ndarray
     pv: np.ndarray
@@ -127,7 +130,7 @@ def _valve(state: np.ndarray, move: float, op: float, valve: np.ndarray, draw: f
 def _pass_on(
     k: int, ends: np.ndarray, links: np.ndarray, past: np.ndarray, passed: np.ndarray, extra: np.ndarray
 ) -> None:
-    """One scan of the couplings; passed, what their lags hold, and extra, the processes' loads, are changed."""
+    """One scan of the couplings; changes `passed`, the states of their lags, and `extra`, the processes' loads."""
     for j in range(ends.shape[0]):
         was = k - ends[j, 3]
         signal = past[was % past.shape[0], ends[j, 2], ends[j, 0]] if was >= 0 else 0.0
@@ -144,7 +147,7 @@ def _run(
     drives: tuple[np.ndarray, ...],
     kept: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """PV and OP; the set points in drives are overwritten at slaves, kept holds the last stems."""
+    """PV and OP; the set points in `drives` are overwritten at slaves, `kept` holds the last stems."""
     process, control, valve, links = tables
     sp, load, noise = drives
     n, scans = sp.shape[1], sp.shape[0]
@@ -183,7 +186,7 @@ def _run(
 
 
 def shares(step: float, times: np.ndarray) -> np.ndarray:
-    """How far first-order lags of those time constants go in one scan."""
+    """Step response of first-order lags with those time constants after one scan."""
     return -np.expm1(-step / np.maximum(times, 1e-6))
 
 
@@ -193,7 +196,7 @@ def simulate(plant: Plant, trends: Trends, stems: bool = False) -> Ran:
     pace = np.where(p.integrating > 0, p.step / p.first, shares(p.step, p.first))
     process = np.column_stack([p.gain, pace, shares(p.step, p.second), p.dead, p.integrating]).astype(float)
     control = np.column_stack([p.kp, p.kp * p.step / p.ti, p.sp0, p.op0, p.master, p.slave]).astype(float)
-    valve = np.column_stack([p.stick, p.slip, p.scatter, p.play, p.beat]).astype(float)
+    valve = np.column_stack([p.stick, p.slip, p.scatter, p.backlash, p.beat]).astype(float)
     ends = np.column_stack([p.link_from, p.link_to, p.link_stem, p.link_delay]).astype(np.int64)
     links = np.column_stack([p.link_gain, shares(p.step, p.link_lag)])
     column = np.full(p.size, -1)

@@ -1,4 +1,4 @@
-"""Sound loops of a plant, their cascades and names."""
+"""Loops of a plant without faults, their cascades and names."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from proofs.coupled.trends import log_uniform
 
 KINDS = ("flow", "pressure", "level", "temperature")
 SHARES = (0.42, 0.18, 0.2, 0.2)
-"""How often each is drawn among single loops."""
+"""Shares of the types among single loops."""
 TIMES = {"flow": (3, 12, 1, 4), "pressure": (15, 120, 2, 12), "level": (150, 1500, 2, 12)}
 TIMES["temperature"] = (60, 900, 10, 90)
 """Shortest and longest time constant and dead time [s]; of a level, for one percent a percent."""
 ARREST = (60.0, 500.0)
-"""How soon levels are caught [s]."""
+"""Arrest times of levels [s]."""
 CASCADES = (0.05, 0.14)
-"""Cascades by the number of loops."""
-APART = 4.0
-"""A master is slower than its slave by this factor at least."""
+"""Number of cascades, relative to the number of loops."""
+MASTER_SLOWER = 4.0
+"""Least ratio of the time constants of a master and its slave."""
 HARMLESS = 0.1
-"""Largest play of a sound valve [% OP]."""
+"""Largest backlash of a valve without a fault [% OP]."""
 AREA = (8, 25)
-"""Loops in an area of the plant."""
+"""Number of loops in an area of the plant."""
 
 
 @dataclass(frozen=True)
@@ -37,9 +37,10 @@ class Tag:
 
 
 def _loop(rng: np.random.Generator, kind: str, step: float, inner: float) -> dict[str, float]:
-    """A process of that kind and a sound controller; inner: closed-loop time of its slave [s], 0: a valve."""
+    """A process of that kind and a controller without a fault; inner: closed-loop time of its slave [s], 0: a
+    valve."""
     low, high, soon, late = TIMES[kind]
-    first = max(log_uniform(rng, low, high), 1.5 * step, APART * inner)
+    first = max(log_uniform(rng, low, high), 1.5 * step, MASTER_SLOWER * inner)
     dead = max(round(log_uniform(rng, soon, late) / step), 1)
     second = first * rng.uniform(0.05, 0.25) if kind != "flow" and rng.random() < 0.5 else 0.0
     gain, wait = rng.uniform(0.6, 2.2), (dead + 0.5) * step + second + inner
@@ -57,7 +58,7 @@ def _loop(rng: np.random.Generator, kind: str, step: float, inner: float) -> dic
 
 
 def _tags(rng: np.random.Generator, kinds: list[str], near: list[int]) -> list[Tag]:
-    """Names by kind, area and a number that tells nothing; near[i]: the loop whose area i shares."""
+    """Names by kind, area and a number without meaning; near[i]: the loop whose area i shares."""
     n = len(kinds)
     places = max(round(n / rng.uniform(*AREA)), 1)
     area = rng.integers(places, size=n)
@@ -70,7 +71,7 @@ def _tags(rng: np.random.Generator, kinds: list[str], near: list[int]) -> list[T
 
 
 def drawn(rng: np.random.Generator, n: int, step: float) -> tuple[Plant, list[Tag]]:
-    """n sound loops, among them cascades, without couplings."""
+    """n loops without faults, some of them in cascades, without couplings."""
     rows, kinds, near = [], [], []
     for _ in range(round(n * rng.uniform(*CASCADES))):
         slave = _loop(rng, "flow", step, 0.0)
@@ -85,7 +86,13 @@ def drawn(rng: np.random.Generator, n: int, step: float) -> tuple[Plant, list[Ta
         rows.append(_loop(rng, kinds[-1], step, 0.0))
     for row in rows:
         usual = {"sp0": rng.uniform(35, 65), "op0": rng.uniform(35, 65), "master": -1, "slave": -1}
-        usual |= {"stick": 0.0, "slip": 0.0, "scatter": 0.0, "play": rng.uniform(0, HARMLESS), "beat": 0.0}
+        usual |= {
+            "stick": 0.0,
+            "slip": 0.0,
+            "scatter": 0.0,
+            "backlash": rng.uniform(0, HARMLESS),
+            "beat": 0.0,
+        }
         row.update({k: v for k, v in usual.items() if k not in row})
         del row["closed"]
     columns = {k: np.array([row[k] for row in rows], dtype=float) for k in rows[0]}

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 SLOWEST = 6
-"""Cycles in a record below which a swing is drift and left out of autocorrelations."""
+"""Least number of cycles in a record; slower components are drift and not used in autocorrelations."""
 ENOUGH = 0.75
-"""The first peak of at least this share of the highest one is the period: later ones are its multiples."""
+"""The period is the first peak of at least this share of the highest peak; later peaks are its multiples."""
 
 BLOCKS = 6
-"""Bits kept of a record's length, as transforms of prime lengths are slow."""
+"""Significant bits of the record length that are kept, because transforms of prime lengths are slow."""
 
 
 def correlations(x: np.ndarray) -> np.ndarray:
-    """Autocorrelation at lags up to a quarter of the record, drift left out, shape (about n / 4,)."""
+    """Autocorrelation at lags up to a quarter of the record, without drift, shape (about n / 4,)."""
     x = x[: x.size - x.size % (1 << max(x.size.bit_length() - BLOCKS, 0))]
     n = x.size
     f = np.fft.rfft(x - x.mean())
@@ -41,7 +41,7 @@ def returning(x: np.ndarray) -> tuple[float, float]:
 
 
 def _vertex(r: np.ndarray, at: int) -> float:
-    """Where the parabola through a peak and its neighbours turns."""
+    """Position of the vertex of the parabola through a peak and its neighbours."""
     if not 0 < at < r.size - 1:
         return float(at)
     bend = r[at - 1] - 2 * r[at] + r[at + 1]
@@ -49,20 +49,20 @@ def _vertex(r: np.ndarray, at: int) -> float:
 
 
 def period(x: np.ndarray) -> float:
-    """Period [samples]: the returning peak, made finer by its multiples as long as they stand out; 0: none."""
+    """Period [samples]: the returning peak, refined by its multiples while these are distinct; 0: none."""
     first, height = returning(x)
     if first <= 0:
         return 0.0
     r, best = correlations(x), first
-    for turns in range(2, 9):
+    for multiple in range(2, 9):
         half = max(int(0.2 * best), 1)
-        low = round(turns * best) - half
+        low = round(multiple * best) - half
         if low + 2 * half + 2 > r.size:
             break
         at = low + int(np.argmax(r[low : low + 2 * half + 1]))
         if r[at] < 0.5 * height:
             break
-        best = _vertex(r, at) / turns
+        best = _vertex(r, at) / multiple
     return best
 
 
@@ -71,7 +71,7 @@ def spread(x: np.ndarray) -> np.ndarray:
     return np.maximum(np.std(x, axis=0), 1e-9)
 
 
-def lasting(x: np.ndarray, turn: float, least: float) -> float:
-    """Share of stretches of four periods [samples] in which a trend is spread by `least` or more."""
-    pieces = np.array_split(x, max(int(x.size / (4 * turn)), 1))
+def lasting(x: np.ndarray, cycle: float, least: float) -> float:
+    """Share of sections of four periods [samples] in which the spread of a trend is `least` or more."""
+    pieces = np.array_split(x, max(int(x.size / (4 * cycle)), 1))
     return float(np.mean([np.std(piece) >= least for piece in pieces]))

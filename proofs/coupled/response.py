@@ -7,13 +7,13 @@ import numpy as np
 from proofs.coupled.kernel import Plant, shares
 
 GRID = 400
-"""Frequencies looked at."""
+"""Number of frequencies."""
 LONGEST = 40_000.0
-"""Slowest period looked at [s]."""
+"""Longest period [s]."""
 
 
 def frequencies(step: float) -> np.ndarray:
-    """From the slowest period to two and a half scans a cycle [rad/s]."""
+    """Frequencies from the longest period to two and a half scans a cycle [rad/s]."""
     return np.geomspace(2 * np.pi / LONGEST, 2 * np.pi / (2.5 * step), GRID)
 
 
@@ -31,7 +31,7 @@ def _parts(plant: Plant, i: int, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def opened(plant: Plant, i: int, w: np.ndarray) -> np.ndarray:
-    """Loop gain, through the slave where there is one."""
+    """Loop gain, through the slave where one exists."""
     process, control = _parts(plant, i, w)
     slave = int(plant.slave[i])
     if slave < 0:
@@ -41,33 +41,34 @@ def opened(plant: Plant, i: int, w: np.ndarray) -> np.ndarray:
 
 
 def load_to_error(plant: Plant, i: int, w: np.ndarray) -> np.ndarray:
-    """From a load at the process input to the error; [% per %]."""
+    """Response of the error to a load at the process input [% per %]."""
     return -_parts(plant, i, w)[0] / (1 + opened(plant, i, w))
 
 
 def natural(plant: Plant, i: int) -> tuple[float, float]:
-    """Period [s] at which loads disturb a loop most, and how much [% per %]."""
+    """Period [s] at which loads disturb a loop most, and the response there [% per %]."""
     w = frequencies(plant.step)
     size = np.abs(load_to_error(plant, i, w))
     return float(2 * np.pi / w[np.argmax(size)]), float(size.max())
 
 
 def critical_gain(plant: Plant, i: int) -> float:
-    """Controller gain at which the loop just keeps swinging, the integral time left; 0: none found."""
+    """Controller gain at the stability limit, with the integral time unchanged; 0: none found."""
     loop = opened(plant, i, np.geomspace(2 * np.pi / LONGEST, np.pi / plant.step, 8 * GRID)) / plant.kp[i]
     at = np.flatnonzero((loop.imag[:-1] < 0) & (loop.imag[1:] >= 0) & (loop.real[1:] < 0))
     return float(1 / np.max(-loop.real[at])) if at.size else 0.0
 
 
 def passage(plant: Plant, w: float) -> np.ndarray:
-    """Of each coupling at that frequency, shape (links,)."""
+    """Response of each coupling at that frequency, shape (links,)."""
     z = np.exp(1j * w * plant.step)
     pace = shares(plant.step, plant.link_lag)
     return plant.link_gain * pace * z / (z - 1 + pace) * z ** (-plant.link_delay)
 
 
 def _moves(plant: Plant, w: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Processes (n,); OPs and what acts on the processes by the PVs, (n, n): the stem, or the slave's PV."""
+    """Processes (n,); responses of the OPs and of the process inputs to the PVs, (n, n): the stem, or the slave's
+    PV."""
     n = plant.size
     process, ops = np.empty(n, complex), np.zeros((n, n), complex)
     for i in range(n):
@@ -86,9 +87,9 @@ def _moves(plant: Plant, w: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def swings(
     plant: Plant, w: float, source: int, pv: float, stem: float, load: int = -1
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """PVs, what acts on the processes, and errors at frequency w, shape (n,), while a source swings as told.
+    """PVs, process inputs, and errors at frequency w, shape (n,), while a source oscillates as given.
 
-    source, pv, stem : its place and amplitudes [%]; -1: none; load : a loop with a unit load at its input; -1: none.
+    source, pv, stem: its place and amplitudes [%]; -1: none; load: a loop with a unit load at its input; -1: none.
     """
     process, ops, acts = _moves(plant, w)
     put, matrix = np.zeros(plant.size, complex), acts.copy()

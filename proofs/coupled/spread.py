@@ -1,4 +1,5 @@
-"""How faults spread: couplings from the sources to neighbours and on, mixing, recycles, and quiet couplings."""
+"""Couplings through which faults spread: from the sources to neighbours and further, mixing, recycles, and weak
+couplings."""
 
 from __future__ import annotations
 
@@ -12,49 +13,49 @@ from proofs.coupled.kernel import Plant
 from proofs.coupled.trends import log_uniform
 
 FIRST = (1, 4)
-"""Neighbours that a source reaches itself."""
+"""Number of neighbours that a source reaches directly."""
 DEPTH = 4
 """Longest chain of followers."""
 MOST = 12
-"""Loops that one source is led to."""
+"""Most loops that one source reaches."""
 COVERED = 0.6
-"""Share of the plant's loops that sources are led to at most, an equal part each."""
+"""Largest share of the plant's loops that sources reach, in equal parts."""
 ONWARD = 0.75
-"""How likely a follower passes it on; to a second one half as likely."""
+"""Probability that a follower passes the oscillation on; to a second loop with half of it."""
 MIXED = 0.2
-"""How likely a coupling ends at a loop that is fed already."""
+"""Probability that a coupling ends at a loop that is already coupled."""
 STEEPEST = 2.0
 """Largest gain of a coupling [% OP/%]."""
 FADING = 0.7
-"""Swell above one that is drawn for far followers, over that for near ones."""
+"""Increase of the error that is drawn for far followers, relative to that for near ones."""
 WEAK = (1.1, 1.5)
-"""Swell that weak followers are drawn for."""
+"""Ratio of errors with and without the source, drawn for weak followers."""
 STRONG = (1.8, 7.0)
-"""Swell that the others are drawn for; far ones fade."""
+"""The same for the other followers; for far ones it is smaller."""
 WEAK_SHARE = 0.25
-"""Share of weak ones."""
+"""Share of weak followers."""
 FAINTEST = 1.08
-"""A coupling that would give its follower a smaller swell is drawn elsewhere."""
+"""Least ratio of errors of a follower; a weaker coupling is drawn again elsewhere."""
 RECYCLED = 0.5
-"""Share of sources that a follower feeds back to."""
+"""Share of sources with feedback from a follower."""
 RECYCLE = (0.08, 0.3)
 """Loop gain of a recycle at its most sensitive frequency."""
 QUIET = (0.1, 0.4)
-"""Couplings between loops that no source reaches, by the number of loops."""
+"""Number of couplings between loops that no source reaches, relative to the number of loops."""
 QUIET_GAIN = (0.03, 0.3)
 """Their gains [% OP/%]."""
 NEIGHBOURS = 1.0
-"""How far followers are like their parents in natural period: one deviation [log]."""
+"""One deviation of the difference in natural period between followers and their parents [log]."""
 ELSEWHERE = 0.25
-"""How likely a follower stands in another area, against the same one."""
+"""Probability that a follower is in another area, relative to the same area."""
 
 
 @dataclass
 class Tree:
-    """A source, its period [s], and who it was led to, by chain length."""
+    """A source, its period [s], and its followers by chain length."""
 
     source: int
-    turn: float
+    cycle: float
     depth: dict[int, int]
 
 
@@ -70,7 +71,7 @@ class Web:
         return set().union(*(t.depth for t in self.trees))
 
     def reaches(self, begin: int, end: int) -> bool:
-        """Whether couplings and cascades lead from one loop to another."""
+        """Whether couplings and cascades connect one loop to another."""
         p = self.bench.faulty
         seen, todo = {begin}, [begin]
         while todo:
@@ -80,24 +81,26 @@ class Web:
             seen |= on
         return end in seen
 
-    def link(self, begin: int, end: int, turn: float, gain: float) -> tuple[float, ...]:
-        """A drawn coupling: ends, signal, gain, lag and delay for swings of that period [s]."""
-        rng, step = self.rng, self.bench.sound.step
-        stem = float(rng.random() < 0.4 and self.bench.sound.slave[begin] < 0)
-        delay = max(round(turn * log_uniform(rng, 0.02, 0.6) / step), 1)
-        return begin, end, stem, gain, turn * log_uniform(rng, 0.02, 0.3), delay
+    def link(self, begin: int, end: int, cycle: float, gain: float) -> tuple[float, ...]:
+        """A drawn coupling: ends, signal, gain, lag and delay for an oscillation of that period [s]."""
+        rng, step = self.rng, self.bench.without_fault.step
+        stem = float(rng.random() < 0.4 and self.bench.without_fault.slave[begin] < 0)
+        delay = max(round(cycle * log_uniform(rng, 0.02, 0.6) / step), 1)
+        return begin, end, stem, gain, cycle * log_uniform(rng, 0.02, 0.3), delay
 
     def put(self, link: tuple[float, ...]) -> None:
         """Add a coupling."""
-        self.bench.sound, self.bench.faulty = (x.linked(*link) for x in (self.bench.sound, self.bench.faulty))
+        self.bench.without_fault, self.bench.faulty = (
+            x.linked(*link) for x in (self.bench.without_fault, self.bench.faulty)
+        )
 
     def led(self, tree: Tree, begin: int, end: int) -> bool:
-        """Couple a follower so that it swells as drawn; False: it would not show."""
+        """Couple a follower so that its error increases as drawn; False where the increase would not be visible."""
         bench, rng, depth = self.bench, self.rng, tree.depth[begin] + 1
-        shown, link = bench.faults[tree.source][1], self.link(begin, end, tree.turn, 1.0)
-        told = (2 * np.pi / tree.turn, tree.source, shown.pv, shown.stem)
-        with_it = response.swings(bench.faulty.linked(*link), *told)[2][end]
-        answer = abs(with_it - response.swings(bench.faulty, *told)[2][end])
+        shown, link = bench.faults[tree.source][1], self.link(begin, end, tree.cycle, 1.0)
+        swing = (2 * np.pi / tree.cycle, tree.source, shown.pv, shown.stem)
+        with_it = response.swings(bench.faulty.linked(*link), *swing)[2][end]
+        answer = abs(with_it - response.swings(bench.faulty, *swing)[2][end])
         aim = rng.uniform(*WEAK) if rng.random() < WEAK_SHARE else log_uniform(rng, *STRONG)
         aim = aim if depth == 1 else 1 + FADING * (aim - 1)
         calm = np.sqrt(2) * bench.calm[end]
@@ -106,29 +109,29 @@ class Web:
             return False
         self.put((*link[:3], gain * rng.choice([-1.0, 1.0]), *link[4:]))
         tree.depth.setdefault(end, depth)
-        for partner in (int(bench.sound.master[end]), int(bench.sound.slave[end])):
+        for partner in (int(bench.without_fault.master[end]), int(bench.without_fault.slave[end])):
             if partner >= 0:
                 tree.depth.setdefault(partner, depth + 1)
         return True
 
     def _next(self, tree: Tree, begin: int) -> int:
-        """A loop to be fed by another; -1: none is left."""
+        """A loop to be coupled to another one; -1 where none remains."""
         bench, fed = self.bench, self.fed()
         mixed = self.rng.random() < MIXED and len(fed) > 3
         shut = {t.source for t in self.trees}
-        may = [i for i in range(bench.sound.size) if i not in shut and (i in fed) == mixed]
+        may = [i for i in range(bench.without_fault.size) if i not in shut and (i in fed) == mixed]
         may = [i for i in may if not self.reaches(i, begin)]
         if not may:
             return -1
-        far = np.log(bench.natural[may, 0] / tree.turn) / NEIGHBOURS
+        far = np.log(bench.natural[may, 0] / tree.cycle) / NEIGHBOURS
         here = np.array([1.0 if self.areas[i] == self.areas[begin] else ELSEWHERE for i in may])
         weight = here * np.exp(-0.5 * np.clip(far, -5, 5) ** 2)
         return int(self.rng.choice(may, p=weight / weight.sum()))
 
     def grow(self, tree: Tree) -> None:
-        """Lead a source to its neighbours, and them to theirs."""
+        """Couple a source to its neighbours, and these to theirs."""
         rng, todo, tries = self.rng, [tree.source], 0
-        most = min(MOST, max(COVERED * self.bench.sound.size / len(self.trees), 2))
+        most = min(MOST, max(COVERED * self.bench.without_fault.size / len(self.trees), 2))
         while todo and len(tree.depth) <= most:
             begin = todo.pop(0)
             depth = tree.depth[begin]
@@ -148,7 +151,7 @@ class Web:
                     todo += [] if known else [end]
 
     def recycle(self, tree: Tree) -> None:
-        """Let a late follower feed back to the source or an early follower, well below a loop gain of one."""
+        """Add feedback from a late follower to the source or an early follower, with a loop gain well below one."""
         rng = self.rng
         late = [i for i, depth in tree.depth.items() if depth >= 1 and self.reaches(tree.source, i)]
         if not late or rng.random() > RECYCLED:
@@ -156,26 +159,28 @@ class Web:
         begin = max(late, key=lambda i: tree.depth[i] + rng.random())
         early = [i for i in late if i != begin and tree.depth[i] == 1 and self.reaches(i, begin)]
         end = int(rng.choice(early)) if early and rng.random() < 0.3 else tree.source
-        link = self.link(begin, end, tree.turn, 1.0)
-        most = max(returned(x, link) for x in (self.bench.faulty, self.bench.sound))
+        link = self.link(begin, end, tree.cycle, 1.0)
+        most = max(returned(x, link) for x in (self.bench.faulty, self.bench.without_fault))
         gain = min(rng.uniform(*RECYCLE) / max(most, 1e-9), STEEPEST)
         self.put((*link[:3], gain * rng.choice([-1.0, 1.0]), *link[4:]))
 
     def quiet(self, alone: set[int]) -> None:
-        """Couple loops that no source reaches to one another and to followers, some not at all."""
-        rng, p = self.rng, self.bench.sound
+        """Couple loops that no source reaches to each other and to followers; some are not coupled at all."""
+        rng, p = self.rng, self.bench.without_fault
         fed = self.fed() | alone
         free = [i for i in range(p.size) if i not in fed]
         ends = [i for i in range(p.size) if i not in alone]
         for _ in range(round(p.size * rng.uniform(*QUIET)) if free else 0):
             begin, end = int(rng.choice(free)), int(rng.choice(ends))
             if not self.reaches(end, begin):
-                turn = self.bench.natural[end, 0]
-                self.put(self.link(begin, end, turn, log_uniform(rng, *QUIET_GAIN) * rng.choice([-1.0, 1.0])))
+                cycle = self.bench.natural[end, 0]
+                self.put(
+                    self.link(begin, end, cycle, log_uniform(rng, *QUIET_GAIN) * rng.choice([-1.0, 1.0]))
+                )
 
 
 def returned(plant: Plant, link: tuple[float, ...]) -> float:
-    """Largest gain over all frequencies once round a coupling that closes a recycle."""
+    """Largest loop gain over all frequencies around a recycle that this coupling closes."""
     at = sorted({int(link[0]), int(link[1])})
     todo = list(at)
     while todo:
@@ -196,7 +201,7 @@ def returned(plant: Plant, link: tuple[float, ...]) -> float:
 
 
 def among(plant: Plant, at: list[int]) -> Plant:
-    """Those loops with the couplings among them."""
+    """Those loops with the couplings between them."""
     out = plant.part(at)
     for k in range(plant.link_to.size):
         ends = int(plant.link_from[k]), int(plant.link_to[k])

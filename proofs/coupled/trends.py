@@ -8,13 +8,13 @@ from scipy.signal import lfilter
 from proofs.coupled.kernel import Plant, Trends
 
 DAY = 86_400.0
-"""Period of the ambient [s]."""
+"""Period of the ambient temperature [s]."""
 AMBIENT = 0.2
-"""Share of loops that feel it."""
+"""Share of loops that it affects."""
 STEPPED = 0.25
-"""Share of set points that are moved now and then."""
+"""Share of set points that change from time to time."""
 ERROR = (0.08, 0.6)
-"""Spread that loads give the errors of sound loops [%]."""
+"""Spread of the errors of loops without a fault, from their loads [%]."""
 NOISE = (0.02, 0.2)
 """Spread of measurement noise [%]."""
 LOAD_MOST = 4.0
@@ -22,7 +22,7 @@ LOAD_MOST = 4.0
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    """Between those two, evenly in the logarithm."""
+    """A number between those two, uniform in the logarithm."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
@@ -35,7 +35,8 @@ def coloured(rng: np.random.Generator, n: int, scans: float) -> np.ndarray:
 
 
 def _load(rng: np.random.Generator, n: int, scale: float) -> np.ndarray:
-    """Load of about unit variance at two rates of a loop of that time scale [scans], some with a few steps."""
+    """Load of about unit variance with two correlation times relative to the loop's [scans], some with a few
+    steps."""
     slow = rng.uniform(0.2, 0.8)
     out = np.sqrt(1 - slow) * coloured(rng, n, scale * log_uniform(rng, 0.3, 2))
     out += np.sqrt(slow) * coloured(rng, n, scale * log_uniform(rng, 2, 20))
@@ -60,7 +61,7 @@ def _setpoint(rng: np.random.Generator, n: int) -> np.ndarray:
 
 
 def drawn(rng: np.random.Generator, plant: Plant, natural: np.ndarray, n: int) -> Trends:
-    """Trends of n scans for a plant; natural: periods [s] and heights of the answers to loads, (loops, 2)."""
+    """Trends of n scans for a plant; natural: periods [s] and heights of the responses to loads, (loops, 2)."""
     ambient = np.sin(2 * np.pi * (np.arange(n) * plant.step / DAY + rng.random()))
     ambient += 0.3 * coloured(rng, n, 0.1 * DAY / plant.step)
     sp, load, noise = (np.empty((plant.size, n)) for _ in range(3))
@@ -76,7 +77,7 @@ def drawn(rng: np.random.Generator, plant: Plant, natural: np.ndarray, n: int) -
 
 
 def beat(rng: np.random.Generator, n: int, scans: float) -> np.ndarray:
-    """A load of about unit amplitude that comes back: a sine, a square or a pump's on and off; its phase walks."""
+    """A periodic load of about unit amplitude: a sine, a square wave or a pump's on and off; its phase varies."""
     pace = 1 + rng.uniform(0.01, 0.06) * coloured(rng, n, rng.uniform(2, 8) * scans)
     phase = np.cumsum(np.maximum(pace, 0.2) / scans) + rng.random()
     kind, part = rng.integers(3), phase % 1

@@ -1,4 +1,4 @@
-"""What is true of each loop, measured by running the same plant without each fault."""
+"""The truth of each loop, measured by simulation of the same plant without each fault."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from proofs.coupled.kernel import Plant, simulate
 from proofs.coupled.measure import period, returning, spread
 
 FELT = 1.05
-"""Least swell that is told."""
+"""Least ratio of errors that is included in the truth."""
 MOVED = 1.5
-"""How far a source's period may move as its loop is coupled."""
+"""Largest change of a source's period when its loop is coupled, as a factor."""
 FOLLOWS = 1.1
-"""Least swell of a follower."""
+"""Least ratio of errors of a follower."""
 
 
 def _errors(bench: Bench, plant: Plant) -> np.ndarray:
@@ -25,7 +25,8 @@ def _errors(bench: Bench, plant: Plant) -> np.ndarray:
 
 
 def showing(bench: Bench, sources: list[int]) -> tuple[np.ndarray, np.ndarray, dict[int, np.ndarray]]:
-    """PVs, errors and swells by source; faults that do not show in the coupled plant are taken out of it."""
+    """PVs, errors and ratios of errors by source; faults that are not visible in the coupled plant are removed from
+    it."""
     while True:
         ran = simulate(bench.faulty, bench.trends)
         pv, e = ran.pv[bench.warm :], (ran.sp - ran.pv)[bench.warm :]
@@ -41,17 +42,17 @@ def showing(bench: Bench, sources: list[int]) -> tuple[np.ndarray, np.ndarray, d
 
 
 def _shows(bench: Bench, i: int, e: np.ndarray, pv: np.ndarray, swell: float) -> bool:
-    turn, (fault, shown) = period(pv), bench.faults[i]
-    if swell < faults.SWELL or not faults.FINEST <= turn <= pv.size / faults.CYCLES:
+    cycle, (fault, shown) = period(pv), bench.faults[i]
+    if swell < faults.SWELL or not faults.FINEST <= cycle <= pv.size / faults.CYCLES:
         return False
-    kept = 1 / MOVED <= turn * bench.sound.step / shown.period_s <= MOVED
-    return kept and faults.cycling(e, turn, float(spread(e)) / swell, fault.cause)
+    kept = 1 / MOVED <= cycle * bench.without_fault.step / shown.period_s <= MOVED
+    return kept and faults.cycling(e, cycle, float(spread(e)) / swell, fault.cause)
 
 
 def truths(
     bench: Bench, names: list[str], sources: list[int], unrelated: dict[int, int]
 ) -> dict[str, dict[str, Any]]:
-    """By loop's name; sources loses those whose fault does not show."""
+    """The truth by loop name; sources whose fault is not visible are removed from `sources`."""
     pv, e, swells = showing(bench, sources)
     own = spread(e) / spread(_errors(bench, bench.without(list(unrelated)))) if unrelated else spread(e)
     out, p = {}, bench.faulty
@@ -65,14 +66,14 @@ def truths(
         elif i in unrelated:
             role, root, swell = "unrelated", "", round(float(own[i]), 3)
         parents = {int(x) for x in p.link_from[p.link_to == i]} | {int(p.master[i]), int(p.slave[i])}
-        turns = role in ("source", "unrelated")
+        oscillates = role in ("source", "unrelated")
         out[name] = {
             "role": role,
             "cause": bench.faults[i][0].cause if i in bench.faults else "none",
             "root": root,
             "swell": swell,
             "roots": roots,
-            "period_s": round(period(pv[:, i]) * p.step, 3) if turns else 0.0,
+            "period_s": round(period(pv[:, i]) * p.step, 3) if oscillates else 0.0,
             "rhythm": round(returning(e[:, i])[1], 3),
             "near": names[unrelated[i]] if unrelated.get(i, -1) >= 0 else "",
             "coupled_to": sorted(names[x] for x in parents if x >= 0),

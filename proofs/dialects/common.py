@@ -1,4 +1,4 @@
-"""Shared parts of the dialect corpus: process-like samples with known truth, and the list of cases."""
+"""Parts that all dialects share: simulated samples with known truth, and the list of cases."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 @dataclass
 class Case:
-    """One export: its files (relative to the case's folder) and what a reader must find in them."""
+    """One export: its files (relative to the case's folder) and the contents that a reader must find."""
 
     name: str
     family: str
@@ -96,7 +96,7 @@ def comma(x, digits=2):
 
 
 def truth(t, v, bad=(), digits=2):
-    """Truth of one tag: the value as printed with so many digits, None where the sample is not good."""
+    """Truth of one tag: the values as printed with `digits` digits, None where the sample is not good."""
     bad = set(bad)
     times = [round(float(x), 6) for x in t]
     times = [int(x) if x == int(x) else x for x in times]
@@ -104,7 +104,7 @@ def truth(t, v, bad=(), digits=2):
 
 
 def three(lp, names, bad=("pv",), digits=2):
-    """Truth of PV, SP, OP under three names on one clock; `bad` says which of them have the bad samples."""
+    """Truth of PV, SP, OP under three names with common stamps; `bad` names those with the bad samples."""
     return {
         name: truth(lp.t, getattr(lp, key), lp.bad if key in bad else (), digits)
         for name, key in zip(names, ("pv", "sp", "op"), strict=False)

@@ -1,4 +1,4 @@
-"""Dates in their orders, thousands separators, row layouts."""
+"""Dates in different orders, thousands separators, row layouts."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Encodings, packed files, parquet, small nuisances of the layout, and files to refuse."""
+"""Encodings, packed files, Parquet, small defects of the layout, and files to refuse."""
 
 import gzip
 import io

@@ -1,4 +1,4 @@
-"""Stamps: numbers, words, zones, offsets, and stamps that cannot be known."""
+"""Stamps: numbers, words, zones, offsets, and stamps that cannot be determined."""
 
 from proofs.dialects.common import at, case, comma, loop, num, sheet, stamp, text, three
 

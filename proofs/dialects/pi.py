@@ -10,7 +10,7 @@ TAGS = ["FIC101.PV", "FIC101.SP", "FIC101.OP"]
 
 
 def clocks(seed, start="2024-11-21 08:00:00", bad=3, n=(150, 90, 120), tags=TAGS):
-    """Three tags with clocks of their own: {tag: (t, v, bad)}."""
+    """Three tags with separate stamps: {tag: (t, v, bad)}."""
     out = {}
     for k, (tag, rows, dt, key) in enumerate(zip(tags, n, (3.0, 7.0, 5.0), ("pv", "sp", "op"), strict=True)):
         lp = loop(f"{seed}{k}", rows, dt, start, bad=bad if k == 0 else 0)
@@ -41,7 +41,7 @@ def heads_over(data, first=True, gap=False):
     return row[:-1] if gap else row
 
 
-def told(data):
+def truths_of(data):
     return {tag: truth(*d) for tag, d in data.items()}
 
 
@@ -52,15 +52,15 @@ def english(t):
 @case("pi", why="pairs, tag over the time column, Excel serials, ragged ends")
 def pi_datalink_serial():
     d = clocks("pi1")
-    return {"datalink.csv": pairs(d, excel, heads=heads_over(d), errors=("I/O Timeout", "Bad Input"))}, told(
-        d
-    )
+    return {
+        "datalink.csv": pairs(d, excel, heads=heads_over(d), errors=("I/O Timeout", "Bad Input"))
+    }, truths_of(d)
 
 
 @case("pi", why="pairs, tag over the value column, 21-Nov-24 08:00:00")
 def pi_datalink_text():
     d = clocks("pi2")
-    return {"datalink.csv": pairs(d, english, heads=heads_over(d, False), errors=("No Data",))}, told(d)
+    return {"datalink.csv": pairs(d, english, heads=heads_over(d, False), errors=("No Data",))}, truths_of(d)
 
 
 @case("pi", why="tag, descriptor and units rows before Time/Value header")
@@ -72,7 +72,7 @@ def pi_datalink_descriptor_units():
         ["m3/h", "", "m3/h", "", "%", ""],
         ["Time", "Value"] * 3,
     ]
-    return {"feed.csv": pairs(d, english, heads=heads, errors=("Scan Off", "Pt Created"))}, told(d)
+    return {"feed.csv": pairs(d, english, heads=heads, errors=("Scan Off", "Pt Created"))}, truths_of(d)
 
 
 @case("pi", why="one time column, sampled data, calculation errors as text")
@@ -86,7 +86,7 @@ def pi_datalink_sampled_errors():
 def pi_datalink_gap_column():
     d = clocks("pi5", bad=5)
     body = pairs(d, english, heads=heads_over(d, gap=True), gap=True, errors=("#N/A", "Calc Failed"))
-    return {"datalink.csv": body}, told(d)
+    return {"datalink.csv": body}, truths_of(d)
 
 
 @case("pi", why="German Excel: semicolon, decimal comma, dotted dates")
@@ -101,14 +101,16 @@ def pi_datalink_german_excel():
         show=comma,
         enc="cp1252",
     )
-    return {"datalink.csv": body}, told(d)
+    return {"datalink.csv": body}, truths_of(d)
 
 
 @case("pi", why="the array was too small: last row says so")
 def pi_datalink_resize():
     d = clocks("pi7", n=(120, 120, 120))
     body = pairs(d, english, heads=heads_over(d), errors=("I/O Timeout",))
-    return {"datalink.csv": body + b"Resize to show all values,,Resize to show all values,,,\r\n"}, told(d)
+    return {"datalink.csv": body + b"Resize to show all values,,Resize to show all values,,,\r\n"}, truths_of(
+        d
+    )
 
 
 @case("pi", why="states No Data, Pt Created, Scan Off before the first value, 1.#QNAN inside")
@@ -146,7 +148,7 @@ def pi_datalink_server_path():
     d = clocks("pi11", tags=tags)
     body = pairs(d, english, "\t", heads_over(d), errors=("I/O Timeout",))
     alias = {t: [t.rsplit("\\", 1)[1]] for t in tags}
-    return {"datalink.txt": body}, told(d), {"aliases": alias}
+    return {"datalink.txt": body}, truths_of(d), {"aliases": alias}
 
 
 def web_rows(d):
@@ -173,7 +175,7 @@ def pi_webapi_csv():
     rows = [
         [n, t, "m3/h", g, False, False, False, num(v) if g else "I/O Timeout"] for n, t, v, g in web_rows(d)
     ]
-    return {"streams.csv": sheet(head, rows, eol="\n")}, told(d)
+    return {"streams.csv": sheet(head, rows, eol="\n")}, truths_of(d)
 
 
 @case("pi", why="Web API answer as saved (JSON); a reader of tables only may refuse it with a clear line")
@@ -189,7 +191,7 @@ def pi_webapi_json():
         "Links": {},
         "Items": [{"WebId": f"F1Ab{i}", "Name": n, "Items": x} for i, (n, x) in enumerate(items.items())],
     }
-    return {"recorded.json": json.dumps(body, indent=1).encode()}, told(d)
+    return {"recorded.json": json.dumps(body, indent=1).encode()}, truths_of(d)
 
 
 @case("pi", why="archive editor copy, one file per tag, the tag is the file name")
@@ -204,7 +206,7 @@ def pi_smt_archive_editor():
         files[f"{tag}.txt"] = sheet(
             ["Timestamp", "Value", "Questionable", "Annotated", "Substituted"], rows, "\t"
         )
-    return files, told(d)
+    return files, truths_of(d)
 
 
 @case("pi", why="piconfig output: tag,time,value without a header")
@@ -216,7 +218,7 @@ def pi_piconfig_no_header():
             [tag, stamp(t[i], "%d-%b-%y %H:%M:%S.%5f"), "Bad Input" if i in bad else num(v[i])]
             for i in range(len(t))
         ]
-    return {"piarc.txt": sheet(None, rows, eol="\n")}, told(d)
+    return {"piarc.txt": sheet(None, rows, eol="\n")}, truths_of(d)
 
 
 @case("pi", why="PI Vision table: newest first, questionable column stays empty")

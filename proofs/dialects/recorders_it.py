@@ -1,4 +1,4 @@
-"""LabVIEW, paperless recorders, and tools of the IT side: InfluxDB, Grafana, SQL shells."""
+"""LabVIEW, paperless recorders, and IT tools: InfluxDB, Grafana, SQL shells."""
 
 from proofs.dialects.common import case, comma, loop, num, sheet, stamp, text, three, truth, wide
 from proofs.dialects.historians import FIC, long

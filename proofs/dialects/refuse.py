@@ -1,4 +1,4 @@
-"""Files an honest reader refuses with one clear line."""
+"""Files that a reader must refuse with one clear line."""
 
 import gzip
 

@@ -1,7 +1,7 @@
-"""How exports of other makes are read: python -m proofs.dialects.score [CASE...]
+"""How exports of other products are read: python -m proofs.dialects.score [CASE...]
 
-The exports of `make.py`, written by a hand that did not know the readers, are read and compared with their truths
-sample by sample. Without CASE it writes score.md here.
+An independent generator, `make.py`, writes the exports; it shares no code with the readers. They are read and
+compared with their truths sample by sample. Without CASE the command writes score.md here.
 """
 
 from __future__ import annotations
@@ -25,25 +25,25 @@ from proofs.common import publish
 from proofs.dialects.make import main as make
 
 CLOSE_S = 0.03
-"""Stamps this close are one [s]: serials of days have no more digits."""
+"""Stamps count as equal within this difference [s]: serial numbers of days have no more digits."""
 WARNS = ("state ", "in autumn", "in spring", "out of order", "no date", "since the start", "repeat a stamp")
-"""Words of notes that tell a reader that something could not be known."""
+"""Words in notes which report that some information could not be determined."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a case: right, wrong or refused; what was wrong, or the refusal; whether it was warned of."""
+    """The result of a case: right, wrong or refused; the error, or the refusal; whether a note warned of it."""
 
     case: str
     family: str
     kind: str
-    said: str
+    verdict: str
     detail: str = ""
     warned: bool = False
 
 
 def differences(series: Series, want: Mapping[str, Any], uncertain: list[int]) -> str:
-    """What is wrong about the good samples of a tag; '' where nothing is."""
+    """The errors in the good samples of a tag; '' where there is none."""
     t = np.array(want["t"], float)
     v = np.array([np.nan if x is None else x for x in want["v"]], float)
     kept = ~series.bad & np.isfinite(series.value)
@@ -61,12 +61,12 @@ def differences(series: Series, want: Mapping[str, Any], uncertain: list[int]) -
     ordered = np.sort(t)
     place = np.clip(np.searchsorted(ordered, stamp - CLOSE_S), 0, t.size - 1)
     extra = int((np.abs(ordered[place] - stamp) > 2 * CLOSE_S).sum())
-    told = {"missing": missing, "of another value": other, "bad read as good": bad, "too many": extra}
-    return ", ".join(f"{n} {what}" for what, n in told.items() if n)
+    result = {"missing": missing, "of another value": other, "bad read as good": bad, "too many": extra}
+    return ", ".join(f"{n} {what}" for what, n in result.items() if n)
 
 
 def name_of(tag: str, aliases: list[str], held: tuple[str, ...]) -> str | None:
-    """The tag, or a fair other name of it, as the reader has it."""
+    """The name of the tag, or a permitted alias, as the reader names it."""
     folded = {name.casefold(): name for name in held}
     return next((folded[n.casefold()] for n in (tag, *aliases) if n.casefold() in folded), None)
 
@@ -100,30 +100,40 @@ def outcomes(folder: Path, only: list[str] | None = None) -> list[Outcome]:
 
 
 def table(found: list[Outcome]) -> str:
-    """Counts by family as Markdown, and what is not right."""
+    """Counts by family as Markdown, and the cases that are not right."""
     lines = ["| family | exports | right | refused | wrong |", "|---|--:|--:|--:|--:|"]
     plain = [o for o in found if o.kind == "plain"]
     for family in sorted({o.family for o in plain}):
-        said = Counter(o.said for o in plain if o.family == family)
-        lines.append(f"| {family} | {said.total()} | {said['right']} | {said['refused']} | {said['wrong']} |")
-    said = Counter(o.said for o in plain)
-    lines.append(f"| all | {len(plain)} | {said['right']} | {said['refused']} | {said['wrong']} |")
-    lines += ["", "Refused or wrong though they can be read:", ""]
-    lines += [f"- {o.case}: {o.said}. {o.detail.rsplit('/', 1)[-1]}" for o in plain if o.said != "right"]
+        counts = Counter(o.verdict for o in plain if o.family == family)
+        lines.append(
+            f"| {family} | {counts.total()} | {counts['right']} | {counts['refused']} | {counts['wrong']} |"
+        )
+    counts = Counter(o.verdict for o in plain)
+    lines.append(f"| all | {len(plain)} | {counts['right']} | {counts['refused']} | {counts['wrong']} |")
+    lines += ["", "Refused or wrong, although they can be read:", ""]
+    lines += [
+        f"- {o.case}: {o.verdict}. {o.detail.rsplit('/', 1)[-1]}" for o in plain if o.verdict != "right"
+    ]
     refuse = [o for o in found if o.kind == "refuse"]
-    lines += ["", f"To be refused: {sum(o.said == 'refused' for o in refuse)} of {len(refuse)} are."]
-    lines += ["", "What nobody can know from the file (right, or told):", ""]
+    lines += ["", f"To be refused: {sum(o.verdict == 'refused' for o in refuse)} of {len(refuse)} are."]
+    lines += ["", "Information that the file does not contain (right, or reported):", ""]
     for o in found:
         if o.kind == "unknowable":
-            told = "right" if o.said == "right" else "refused" if o.said == "refused" else "read as it can be"
+            result = (
+                "right"
+                if o.verdict == "right"
+                else "refused"
+                if o.verdict == "refused"
+                else "read with an assumption"
+            )
             lines.append(
-                f"- {o.case}: {told}, {'with' if o.warned else 'without'} a word on what is not known"
+                f"- {o.case}: {result}, {'with' if o.warned else 'without'} a note on the unknown part"
             )
     return "\n".join(lines)
 
 
 def main() -> None:
-    """Print the table and write it beside this file."""
+    """Print the table and write it next to this file."""
     only = sys.argv[1:]
     with tempfile.TemporaryDirectory() as folder:
         found = outcomes(Path(folder), only)
@@ -132,9 +142,9 @@ def main() -> None:
             print(o)
         return
     about = (
-        "Exports in the manner of products, by a hand that did not know the readers, against their truths."
+        "Exports in the formats of products, written by an independent generator, compared with their truths."
     )
-    publish(__file__, "Exports of other makes", "`python -m proofs.dialects.score`", about, table(found))
+    publish(__file__, "Exports of other products", "`python -m proofs.dialects.score`", about, table(found))
 
 
 if __name__ == "__main__":

@@ -23,19 +23,19 @@ be done. Exit status 0 means that a night was written; its list then reports wha
 
 
 def answered(mistake: Mistake, folder: Path) -> tuple[int, str, str, str]:
-    """Exit status, the last line that is said, and action and reason in the list; '' where there is no list."""
+    """Exit status, the last printed line, and action and reason in the list; '' where there is no list."""
     command = mistake.made(folder)
     done = CliRunner(env={"COLUMNS": "200"}).invoke(triage, command)
     if done.exception is not None and not isinstance(done.exception, SystemExit):
         raise done.exception
     lines = [line for line in (done.stderr + done.stdout).splitlines() if line.strip()]
-    told = [line for line in lines if mistake.said in line] or lines[-1:]
+    matching = [line for line in lines if mistake.message in line] or lines[-1:]
     action = reason = ""
     if done.exit_code == 0 and command[0] == "run":
         listed = CliRunner().invoke(triage, ["rank", str(folder / "store"), "--format", "csv"])
         row = next(csv.DictReader(io.StringIO(listed.stdout)))
         action, reason = row["action"], row["reason"]
-    return done.exit_code, told[-1].replace(str(folder), "."), action, reason
+    return done.exit_code, matching[-1].replace(str(folder), "."), action, reason
 
 
 def quoted(text: str) -> str:
@@ -48,9 +48,9 @@ def main() -> None:
     print(HEAD)
     for mistake in MISTAKES:
         with tempfile.TemporaryDirectory() as folder:
-            status, said, action, reason = answered(mistake, Path(folder))
+            status, message, action, reason = answered(mistake, Path(folder))
         shown = f"{action}: {reason}" if action else ""
-        print(f"| {mistake.what} | {status} | {quoted(said)} | {quoted(shown)} |")
+        print(f"| {mistake.what} | {status} | {quoted(message)} | {quoted(shown)} |")
 
 
 if __name__ == "__main__":

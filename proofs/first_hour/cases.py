@@ -1,6 +1,6 @@
-"""Twenty natural mistakes of a first hour, each as files and a command, with what the answer must hold.
+"""Twenty natural mistakes of a first hour, each as files and a command, with the expected answer.
 
-Trends are of a level that cycles for its valve, made here by a play and a tank of a few lines.
+The trends are of a level loop that cycles because of its valve: a backlash and a tank of a few lines of code.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ HOURS = 3
 
 @dataclass(frozen=True)
 class Mistake:
-    """What is done wrong; files and command, given a folder; exit status; a part of what is said."""
+    """A mistake: its files and command, given a folder; the exit status; a part of the message."""
 
     what: str
     made: Callable[[Path], list[str]]
     status: int
-    said: str
+    message: str
 
 
 @cache
 def trends(hours: float = HOURS, seed: int = 0) -> pd.DataFrame:
-    """SP, PV and OP of LIC1, a sample a second: a PI loop with 4 % play before a tank."""
+    """SP, PV and OP of LIC1, one sample a second: a PI loop with a backlash of 4 % before a tank."""
     n = round(3600 * hours)
     noise = 0.05 * np.random.default_rng(seed).normal(size=n)
     pv, op = np.empty(n), np.empty(n)
@@ -189,7 +189,7 @@ MISTAKES = (
         "a span of time that the export does not hold", _outside, 2, "no samples between --since and --until"
     ),
 )
-"""Each is answered in one line, or by a night whose list says what the trends can show."""
+"""The answer is one line, or a night whose list reports what the trends can show."""
 LISTED = {
     "one sample every four minutes of a loop with a cycle of five minutes": (
         "needs data",
@@ -200,4 +200,4 @@ LISTED = {
     "settings in loops.csv that were changed long ago": ("check settings", "are not those of the controller"),
     "no settings in loops.csv": ("retune", "valve backlash"),
 }
-"""What the list says, of the mistakes that end in a night: the action, and a part of the reason."""
+"""The list for the mistakes that end in a night: the action, and a part of the reason."""

@@ -1,12 +1,12 @@
-"""Readers under a fuzzer that is led by what their code does: python -m proofs.fuzz.readers CORPUS [OPTIONS]
+"""Readers under a coverage-guided fuzzer: python -m proofs.fuzz.readers CORPUS [OPTIONS]
 
     pip install atheris
     python -m proofs.fuzz.readers CORPUS -max_total_time=3600 -timeout=25 -rss_limit_mb=2048 -max_len=6000
 
-The first byte says what the rest is: an export, a loops.csv, a changes.csv, a model, a configuration. Whatever it
-holds must be read or refused by an InputError; anything else ends the run and leaves the input. CORPUS is filled with
-small files of every dialect of proofs/dialects first. What it finds is to be kept as a test
-(tests/proofs/fuzz/test_findings.py); so far it has found nothing.
+The first byte selects the type of the rest: an export, a loops.csv, a changes.csv, a model, a configuration. Every
+input must be read, or refused by an InputError. Any other result ends the run and saves the input. CORPUS is first
+filled with small files of every dialect of proofs/dialects. Each finding must be kept as a test
+(tests/proofs/fuzz/test_findings.py); there is no finding so far.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pathlib import Path
 from identification.errors import TriageError
 
 SEEDS_BYTES = 6000
-"""What is taken of a seed."""
+"""Bytes of a seed that are used."""
 
 
 def _export(path: Path) -> None:
@@ -56,26 +56,26 @@ def _config(path: Path) -> None:
     read_config(path)
 
 
-ASKED: tuple[tuple[str, Callable[[Path], None]], ...] = (
+READERS: tuple[tuple[str, Callable[[Path], None]], ...] = (
     ("export.csv", _export),
     ("loops.csv", _loops),
     ("changes.csv", _changes),
     ("model.json", _model),
     ("config.toml", _config),
 )
-"""Name of the file and who reads it, by the first byte of an input; exports take what is left of the bytes."""
+"""File name and reader, by the first byte of an input; exports use the other values."""
 
 
 def read(data: bytes) -> bool:
-    """Read one input; whether it was understood.
+    """Read one input; whether it was readable.
 
     Raises
     ------
     Exception
-        Whatever is no refusal: a finding.
+        Any exception that is not a refusal: a finding.
     """
     kind = data[0] if data else 0
-    name, reader = ASKED[kind if kind < len(ASKED) else 0]
+    name, reader = READERS[kind if kind < len(READERS) else 0]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / name
         path.write_bytes(data[1:])
@@ -87,7 +87,7 @@ def read(data: bytes) -> bool:
 
 
 def fill(corpus: Path) -> None:
-    """Lay a small file of each dialect, and of each other kind, into an empty corpus."""
+    """Write a small file of each dialect, and of each other type, into an empty corpus."""
     from proofs.dialects.make import main as make
 
     corpus.mkdir(parents=True, exist_ok=True)
@@ -109,7 +109,7 @@ def fill(corpus: Path) -> None:
 
 
 def main() -> None:
-    """Fill the corpus and hand over to the fuzzer."""
+    """Fill the corpus and start the fuzzer."""
     import atheris  # type: ignore[import-not-found]
 
     fill(Path(sys.argv[1]))

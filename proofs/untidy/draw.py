@@ -14,15 +14,16 @@ from proofs.untidy.recorder import rounded, swinging_door
 
 CAUSES = ("healthy", "stiction", "backlash", "tuning", "load")
 SHARES = (0.35, 0.31, 0.08, 0.1, 0.16)
-"""How often each is drawn."""
+"""Shares of the causes."""
 KINDS = ("flow", "pressure", "level", "temperature")
 LONGEST = 90_000
-"""Scans simulated at most."""
+"""Most scans that are simulated."""
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """A recorded loop: SP, PV and OP [%], shape (n,), at step_s [s]; plant; truth as wild's truth.json names it."""
+    """A recorded loop: SP, PV and OP [%], shape (n,), at step_s [s]; plant; truth with the names of wild's
+    truth.json."""
 
     sp: np.ndarray
     pv: np.ndarray
@@ -34,7 +35,7 @@ class Drawn:
 
 
 def _plant(rng: np.random.Generator, kind: str) -> Plant:
-    """A process of that kind with a controller between slow and brisk (internal model control, Rivera 1986)."""
+    """A process of that kind with a controller between slow and fast (internal model control, Rivera 1986)."""
     ranges = {
         "flow": (2, 8, 1, 3),
         "pressure": (8, 50, 1, 6),
@@ -65,9 +66,9 @@ def _plant(rng: np.random.Generator, kind: str) -> Plant:
 def _stem(rng: np.random.Generator, cause: str) -> Stem:
     lag = rng.uniform(0.3, 1.2)
     if cause == "backlash":
-        return Stem(lag=lag, play=rng.uniform(1.5, 8))
+        return Stem(lag=lag, backlash=rng.uniform(1.5, 8))
     if cause != "stiction":
-        return Stem(lag=lag, play=rng.choice([0.0, rng.uniform(0.02, 0.1)]))
+        return Stem(lag=lag, backlash=rng.choice([0.0, rng.uniform(0.02, 0.1)]))
     size = rng.uniform(1, 6)
     stem = Stem(size * rng.uniform(0.1, 0.8) ** 1.3, size, rng.choice([0.0, 0.1, 0.25]), lag=lag)
     if rng.random() < 0.15:
@@ -96,20 +97,20 @@ def _returning(x: np.ndarray, most: int) -> tuple[float, float]:
 
 
 def _natural(plant: Plant, stem: Stem) -> float:
-    """Scans of one turn that such a loop is likely to take.
+    """Estimated period of such a loop [scans].
 
-    A stem that slips by J waits while the integral of the error that the slip left moves OP by the stickband S.
+    A stem that slips by J waits while the integral of the remaining error moves OP by the stickband S.
     """
-    turn = (
+    cycle = (
         6 * plant.ti
         if plant.kp * plant.gain < 0.5 and not plant.integrating
         else 3 * plant.ti + 6 * plant.dead
     )
     jump = 2 * (stem.static - stem.coulomb)
     if plant.integrating or jump <= 0:
-        return turn
+        return cycle
     return max(
-        turn, min(4 * (stem.static + stem.coulomb) * plant.ti / (plant.kp * plant.gain * jump), 15 * turn)
+        cycle, min(4 * (stem.static + stem.coulomb) * plant.ti / (plant.kp * plant.gain * jump), 15 * cycle)
     )
 
 
@@ -122,47 +123,47 @@ def _signals(
 
 
 def _period(cause: str, with_it: np.ndarray, sp: np.ndarray, guess: float) -> float:
-    """True period [scans]: the load's own, two turns of the stem, or where the error comes back."""
+    """True period [scans]: that of the load, of two reversals of the stem, or of the error's autocorrelation."""
     if cause == "tuning":
         r = _correlations(with_it[0] - sp, int(12 * guess))
         quarter = int(np.argmax(r < 0)) or 1
         back = r[2 * quarter : 6 * quarter + 2]
         return float(2 * quarter + np.argmax(back)) if back.size else guess
-    turns = _turns(with_it[2], int(6 * guess)) if cause in ("stiction", "backlash") else 0
-    return 2 * sp.size / turns if turns > 5 else guess
+    reversals = _reversals(with_it[2], int(6 * guess)) if cause in ("stiction", "backlash") else 0
+    return 2 * sp.size / reversals if reversals > 5 else guess
 
 
 def _turning(plant: Plant, stem: Stem, guess: float) -> float:
-    """Period [scans] of a loop with its valve under little load, as it is run for thirty guesses."""
+    """Period [scans] of a loop with its valve under little load, simulated for thirty estimated periods."""
     n = int(min(max(30 * guess, 2000), 40_000))
     rng = np.random.default_rng(1)
     load = 0.05 * rng.standard_normal(n).cumsum() / np.sqrt(np.arange(1, n + 1))
     return _period("stiction", run(plant, stem, np.full(n, 50.0), load, np.zeros(n), rng), load, guess)
 
 
-def _turns(stem: np.ndarray, window: int) -> int:
-    """How often a stem turns by more than half of its range within a window [scans], its slow drift apart."""
+def _reversals(stem: np.ndarray, window: int) -> int:
+    """Reversals of a stem by more than half of its range within a window [scans], without its slow drift."""
     rows = max(stem.size // max(window, 1), 1)
     cut = stem[: rows * (stem.size // rows)].reshape(rows, -1)
     size = 0.5 * float(np.median(np.ptp(cut, axis=1)))
-    turns, way, far = 0, 0.0, float(stem[0])
+    reversals, way, far = 0, 0.0, float(stem[0])
     for x in stem:
         if way * (x - far) > 0 or way == 0:
             way = way or float(np.sign(x - far))
             far = x
         elif abs(x - far) > size:
-            turns, way, far = turns + 1, -way, x
-    return turns
+            reversals, way, far = reversals + 1, -way, x
+    return reversals
 
 
 CYCLES = (4.0, 160.0)
-"""Least and most cycles that a loop records."""
+"""Least and most cycles in a record."""
 
 
 def draw(
     seed: int, cause: str | None = None, lengths: tuple[float, float] = CYCLES, worn: bool = False
 ) -> Drawn:
-    """One recorded loop; `worn`: behind a load too the stem has a play that shows."""
+    """One recorded loop; `worn`: the stem has a visible backlash even where a load is the cause."""
     rng = np.random.default_rng([4711, seed])
     cause = cause or str(rng.choice(CAUSES, p=SHARES))
     kind = (
@@ -170,14 +171,16 @@ def draw(
         if cause == "backlash" and rng.random() < 0.6
         else str(rng.choice(KINDS, p=(0.4, 0.2, 0.2, 0.2)))
     )
-    plant = sound = _plant(rng, kind)
+    plant = without_fault = _plant(rng, kind)
     if cause == "tuning":
         plant = replace(plant, kp=critical_gain(plant) * rng.uniform(0.85, 1.1))
     cycles = float(np.exp(rng.uniform(*np.log(lengths))))
     stem, back = _stem(rng, cause), None
-    stem = Stem(lag=stem.lag, play=rng.uniform(0.3, 2.5)) if worn else stem
+    stem = Stem(lag=stem.lag, backlash=rng.uniform(0.3, 2.5)) if worn else stem
     if cause in ("stiction", "backlash"):
-        plant = sound = replace(plant, kp=plant.kp * rng.uniform(1, 2.5), ti=plant.ti * rng.uniform(0.5, 1))
+        plant = without_fault = replace(
+            plant, kp=plant.kp * rng.uniform(1, 2.5), ti=plant.ti * rng.uniform(0.5, 1)
+        )
     period = _natural(plant, stem)
     if cause in ("stiction", "backlash"):
         period = _turning(plant, stem, period)
@@ -190,7 +193,7 @@ def draw(
     state = int(rng.integers(2**31))
     with_it = run(plant, stem, sp, load if back is None else load + back, noise, np.random.default_rng(state))
     idle = Stem(lag=stem.lag)
-    without = run(sound, idle, sp, load, noise, np.random.default_rng(state))
+    without = run(without_fault, idle, sp, load, noise, np.random.default_rng(state))
     return _recorded(rng, (sp, with_it, without), cause, kind, plant, cycles, period, moves)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from proofs.untidy.valve import step_lugre, step_play
+from proofs.untidy.valve import step_backlash, step_lugre
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,12 @@ class Plant:
 
 @dataclass(frozen=True)
 class Stem:
-    """A valve: coulomb and static friction [% OP], their scatter from slip to slip [log], the stem's place where
-    they are larger and its width [% stem], viscous time [scans], actuator's lag [scans], positioner's integral
-    gain where it hunts [1/scan], play [% OP]."""
+    """A valve: Coulomb and static friction [% OP], their scatter from slip to slip [log], and the place of higher
+    friction.
+
+    place: of the stem where friction is higher, and its width [% stem]; viscous time [scans]; actuator's lag [scans];
+        positioner's integral gain where it oscillates [1/scan]; backlash [% OP].
+    """
 
     coulomb: float = 0.0
     static: float = 0.0
@@ -42,7 +45,7 @@ class Stem:
     viscous: float = 0.2
     lag: float = 0.5
     hunting: float = 0.0
-    play: float = 0.0
+    backlash: float = 0.0
 
 
 @njit(cache=True)
@@ -78,7 +81,7 @@ def _run(
             stem = step_lugre(state, op, friction, valve[0], valve[1], valve[2], draws[k])
         else:
             state[0] += (op - state[0]) / max(valve[1], 1.0)
-            stem = step_play(stem, state[0], valve[3])
+            stem = step_backlash(stem, state[0], valve[3])
     return out
 
 
@@ -91,12 +94,12 @@ def run(
     control = np.array([plant.kp, plant.kp / plant.ti, 1 / max(plant.pv_lag, 1.0)])
     stribeck = 0.01 * max(stem.static, 1e-3)
     friction = np.array([stem.coulomb, stem.static, stribeck, stem.viscous, stem.place, stem.width])
-    valve = np.array([stem.scatter, stem.lag, stem.hunting, stem.play])
+    valve = np.array([stem.scatter, stem.lag, stem.hunting, stem.backlash])
     return _run(process, control, friction, valve, sp, load, noise, rng.standard_normal(sp.size))
 
 
 def critical_gain(plant: Plant) -> float:
-    """Controller gain at which the loop just keeps swinging, the integral time left: kp over |L| at -180 degrees."""
+    """Controller gain at the stability limit, with the integral time unchanged: kp over |L| at -180 degrees."""
     w = np.geomspace(1e-5, 3.0, 6000)
     s = 1j * w
     first = 1 / (plant.first * s) if plant.integrating else 1 / (1 + plant.first * s)
@@ -104,7 +107,7 @@ def critical_gain(plant: Plant) -> float:
     loop = plant.gain * first / (1 + plant.second * s) / (1 + smooth * s)
     held = 0.5 if plant.second <= 0 else 0.0
     loop = loop * np.exp(-(round(plant.dead) + held) * s) * (1 + 1 / (plant.ti * s))
-    turn = np.unwrap(np.angle(loop))
-    turn -= 2 * np.pi * np.round((turn[0] + np.pi / 2 * (2 if plant.integrating else 1)) / (2 * np.pi))
-    late = np.flatnonzero((turn[1:] < -np.pi) & (turn[:-1] >= -np.pi))
+    phase = np.unwrap(np.angle(loop))
+    phase -= 2 * np.pi * np.round((phase[0] + np.pi / 2 * (2 if plant.integrating else 1)) / (2 * np.pi))
+    late = np.flatnonzero((phase[1:] < -np.pi) & (phase[:-1] >= -np.pi))
     return float(1 / np.abs(loop[late[-1]])) if late.size else 0.0

@@ -1,4 +1,4 @@
-"""What a historian keeps of a trend, and what it gives back."""
+"""The values of a trend that a historian keeps, and the values that it returns."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import numpy as np
 
 
 def rounded(x: np.ndarray, grid: float) -> np.ndarray:
-    """On a grid [%]; 0 leaves it as it is."""
+    """Rounded to a grid [%]; 0: not rounded."""
     return np.round(x / grid) * grid if grid > 0 else x
 
 
 def swinging_door(x: np.ndarray, deviation: float, longest: int) -> np.ndarray:
-    """Archived by a swinging door of that deviation and read back by straight lines, shape (n,).
+    """Archived by a swinging door with that deviation and read by linear interpolation, shape (n,).
 
-    From the last archived point on, the steepest and flattest line that pass every later sample within the deviation
-    close like doors; where they cross, the sample before is archived.
+    From the last archived point, two lines limit the slope: the steepest and the flattest that pass every later
+        sample within the deviation. Where they cross, the sample before is archived.
     """
     kept = [0]
     steep, flat = np.inf, -np.inf

@@ -42,7 +42,7 @@ def load(rng: np.random.Generator, n: int, size: float, scale: float) -> np.ndar
 
 
 def setpoint(rng: np.random.Generator, n: int, size: float, scale: float) -> tuple[np.ndarray, str]:
-    """A set point that stands, steps, ramps or is moved by a master, about zero, and which of them."""
+    """A set point about zero that is constant, steps, ramps or is moved by a master, and which of these."""
     kind = str(rng.choice(["stands", "stands", "steps", "ramps", "master"]))
     if kind == "steps":
         return np.cumsum((rng.random(n) < rng.uniform(1, 10) / n) * rng.normal(0, 4 * size, n)), kind
@@ -57,7 +57,7 @@ def setpoint(rng: np.random.Generator, n: int, size: float, scale: float) -> tup
 
 
 def periodic(rng: np.random.Generator, n: int, period: float) -> np.ndarray:
-    """A load that comes back, of unit amplitude: sine, square, triangle or pulses; its period may wander."""
+    """A periodic load of unit amplitude: sine, square, triangle or pulses; its period may vary."""
     drift = rng.choice([0.0, 0.03, 0.1]) * _smooth(rng, n, 4 * period)
     phase = np.cumsum((1 + drift) / period) + rng.random()
     kind, part = rng.integers(4), phase % 1

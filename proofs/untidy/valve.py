@@ -1,4 +1,4 @@
-"""Valves with LuGre friction or play, stepped within a controller's scan."""
+"""Valves with LuGre friction or backlash, integrated with small steps within a controller's scan."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numba import njit
 SUBSTEPS = 120
 """Steps of the valve within a scan."""
 BRISTLES = 25.0
-"""Stiffness of the bristles over that of the spring [-]: the stem creeps 1/25 of its stickband before it slips."""
+"""Stiffness of the bristles relative to the spring [-]: the stem creeps 1/25 of its stickband before it slips."""
 
 
 @njit(cache=True)
@@ -59,6 +59,6 @@ def step_lugre(
 
 
 @njit(cache=True)
-def step_play(stem: float, op: float, width: float) -> float:
-    """Stem behind a linkage of that full width of play [% OP]."""
+def step_backlash(stem: float, op: float, width: float) -> float:
+    """Stem behind a backlash of that full width [% OP]."""
     return min(max(stem, op - 0.5 * width), op + 0.5 * width)

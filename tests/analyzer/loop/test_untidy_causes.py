@@ -86,7 +86,7 @@ def test_a_backlash_of_many_steps_of_the_grid_is_still_found():
     n, plant = 1200, Plant(1.5, 20.0, 0.0, 3.0, False, 1.2, 20.0, 1.0)
     sp = 50 + 9.2 * ((np.arange(n) // 150) % 2)
     load = 1.5 * lfilter([0.1], [1, -0.99], rng.standard_normal(n))
-    pv, op, _ = run(plant, Stem(lag=1.0, play=12.0), sp, load, 0.02 * rng.standard_normal(n), rng)
+    pv, op, _ = run(plant, Stem(lag=1.0, backlash=12.0), sp, load, 0.02 * rng.standard_normal(n), rng)
     assert verdict_of(sp, rounded(pv, 0.3), op, 1.0, "") == "valve"
 
 

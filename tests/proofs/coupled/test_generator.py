@@ -25,7 +25,7 @@ def fault_free(n: int, step: float = 5.0, seed: int = 1) -> Plant:
     lone = [i for i in range(3 * n) if plant.master[i] < 0 and plant.slave[i] < 0][:n]
     plant = plant.part(lone)
     for i in range(n):
-        plant = plant.changed(i, play=0.0)
+        plant = plant.changed(i, backlash=0.0)
     return plant
 
 
@@ -43,7 +43,7 @@ def in_plain_python(plant: Plant, drive: Trends, i: int) -> tuple[np.ndarray, np
         pvs.append(min(max(plant.sp0[i] + plant.gain[i] * y + noise, 0), 100))
         e = sp - pvs[-1]
         op = min(max(op + plant.kp[i] * (e - last + dt / plant.ti[i] * e), 0), 100)
-        last, half = e, plant.play[i] / 2
+        last, half = e, plant.backlash[i] / 2
         stem = op - half if stem < op - half else op + half if stem > op + half else stem
         ops.append(op)
         moved.append(stem - plant.op0[i] + load)
@@ -59,7 +59,7 @@ def test_the_kernel_equals_a_loop_in_plain_python():
     rng = np.random.default_rng(3)
     plant = loops.drawn(rng, 24, 5.0)[0]
     lone = [i for i in range(24) if plant.master[i] < 0 and plant.slave[i] < 0]
-    plant = plant.part(lone).changed(0, play=3.0)
+    plant = plant.part(lone).changed(0, backlash=3.0)
     natural = np.array([response.natural(plant, i) for i in range(plant.size)])
     drive = trends.drawn(rng, plant, natural, 1500)
     drive.load[500:700] += 70.0
@@ -91,9 +91,9 @@ def test_the_critical_gain_separates_decay_from_growth():
     kinds = [int(np.flatnonzero(x)[0]) for x in (plant.slave >= 0, plant.slave < 0, plant.integrating > 0)]
     for i in kinds:
         for factor, grows in ((0.95, False), (1.05, True)):
-            swung = plant.changed(i, kp=factor * response.critical_gain(plant, i), play=0.0)
+            swung = plant.changed(i, kp=factor * response.critical_gain(plant, i), backlash=0.0)
             if plant.slave[i] >= 0:
-                swung = swung.changed(int(plant.slave[i]), play=0.0)
+                swung = swung.changed(int(plant.slave[i]), backlash=0.0)
             drive = at_rest(swung, 6000)
             drive.load[10:20, i] = 0.01
             e = np.abs(simulate(swung, drive).pv[:, i] - plant.sp0[i])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from proofs.fuzz.readers import ASKED, fill, read
+from proofs.fuzz.readers import READERS, fill, read
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def test_mutants_are_read_or_refused(seeds):
 
 def test_the_first_byte_selects_the_reader(tmp_path):
     """Each kind of input reaches its own reader. An input with an unknown first byte is read as an export."""
-    assert [name for name, _ in ASKED][1:] == ["loops.csv", "changes.csv", "model.json", "config.toml"]
+    assert [name for name, _ in READERS][1:] == ["loops.csv", "changes.csv", "model.json", "config.toml"]
     assert read(b"\x01loop,pv\nFIC1,FIC1.PV\n")
     assert not read(b"\x03{}")
     assert read(b"\xfftimestamp,FIC1.PV\n2026-03-02 00:00:00,1\n2026-03-02 00:00:01,2\n")
