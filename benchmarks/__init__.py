@@ -1,4 +1,4 @@
-"""Benchmarks, each a command: python -m benchmarks.NAME. Linear algebra takes one thread, as in a night."""
+"""Benchmarks, each a command: python -m benchmarks.NAME. Linear algebra uses one thread, as in a night."""
 
 import ctypes
 import os
@@ -16,12 +16,12 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 
 _OWN: set[int] = set()
-"""Children that this process had when it began to adopt, which may outlive it."""
+"""Children of this process before it began to adopt; they may run longer than this process."""
 
 
 def adopt() -> None:
-    """Become the parent of processes whose own ends before them, such as a run's server of workers: what they spend
-    counts once they are waited for. Linux alone; elsewhere a run's workers are its children."""
+    """Become the parent of processes whose own parent ends before them, such as a run's server of workers. Their
+    resources count once they are waited for. Linux only; elsewhere a run's workers are its children."""
     if sys.platform == "linux":
         become_subreaper = 36
         ctypes.CDLL(None).prctl(become_subreaper, 1)
@@ -35,7 +35,7 @@ def _children() -> set[int]:
 
 
 def spent() -> resource.struct_rusage:
-    """What all descendants that have ended have spent, those among them that were adopted; waits for these."""
+    """Resources of all descendants that have ended, with the adopted ones; waits for these."""
     while left := _children() - _OWN if sys.platform == "linux" else set():
         for pid in left:
             with suppress(ChildProcessError):
@@ -45,7 +45,7 @@ def spent() -> resource.struct_rusage:
 
 @dataclass(frozen=True)
 class Own:
-    """What one process took, its children left out: processor and wall time [s], largest memory [MB]."""
+    """Resources of one process without its children: processor and wall time [s], largest memory [MB]."""
 
     processor_s: float
     wall_s: float
@@ -53,13 +53,13 @@ class Own:
 
 
 def own_of(command: Sequence[str]) -> Own:
-    """Run a command to its end and say what its own process took. Linux alone; SystemExit where it fails."""
+    """Run a command to its end and return the resources of its own process. Linux only; SystemExit where it fails."""
     begun, memory = time.perf_counter(), 0
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     while True:
         with suppress(
             OSError, StopIteration
-        ):  # its own figure: what the system counts begins with its parent's
+        ):  # its own figure: the count of the system begins with its parent's
             held = Path(f"/proc/{process.pid}/status").read_text(encoding="utf-8").splitlines()
             memory = max(memory, int(next(x for x in held if x.startswith("VmHWM")).split()[1]))
         pid, status, used = os.wait4(process.pid, os.WNOHANG)

@@ -1,7 +1,7 @@
-"""A night on a cluster of two workers beside two processes: python -m benchmarks.cluster [--loops 100]
+"""A night on a cluster of two workers compared with two processes: python -m benchmarks.cluster [--loops 100]
 
-A scheduler and two workers of one thread each, over TCP on loopback, do the night that `--jobs 2` does, in turns.
-Wall time of the run alone; the workers are warm from one night before. Writes cluster.md here.
+A scheduler and two workers with one thread each, over TCP on loopback, run the same night as `--jobs 2`, in turns.
+The wall time is that of the run alone; the workers are warm from one night before. Writes cluster.md here.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from proofs.common import command, command_line, publish, table
 from tests.analyzer.night.dask_cluster import dask_cluster
 
 TURNS = 3
-"""Nights of each, of which the median counts."""
+"""Number of nights of each; the median counts."""
 
 
 def night_s(plant: Plant, folder: Path, *how: str) -> float:
@@ -34,7 +34,7 @@ def night_s(plant: Plant, folder: Path, *how: str) -> float:
 
 
 def main() -> None:
-    """Measure and write the table beside this file."""
+    """Measure and write the table next to this file."""
     loops = command_line(__doc__, loops=100).loops
     pa.set_cpu_count(1)
     with tempfile.TemporaryDirectory() as made:
@@ -51,8 +51,10 @@ def main() -> None:
     local, remote = (float(np.median(x)) for x in taken.values())
     rows = ([name, *(f"{f(x):.1f}" for f in (np.median, min, max))] for name, x in taken.items())
     text = table("how | median s | least | most", rows, numbers=True)
-    said = f"Over the processes: {remote / local - 1:+.0%}."
-    publish(__file__, "A night on a cluster", f"{command(__file__, loops=loops)}, two cores", text, said)
+    difference = f"Difference from the processes: {remote / local - 1:+.0%}."
+    publish(
+        __file__, "A night on a cluster", f"{command(__file__, loops=loops)}, two cores", text, difference
+    )
 
 
 if __name__ == "__main__":

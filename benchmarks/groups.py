@@ -1,9 +1,9 @@
-"""What the plant-wide pass costs as a plant grows: python -m benchmarks.groups [--loops 1000 3000 10000]
+"""The time of the plant-wide pass as a plant grows: python -m benchmarks.groups [--loops 1000 3000 10000]
 
-Waves as a night of 24 h leaves them: of every loop one to five, of three in ten an oscillation, a third of those in
-groups of 2 to 40 loops that share one, periods from 20 s to 50 min. Time on one core over that of the floor, which is
-reading the waves' table and an rfft of its lines; memory at its peak. Each size runs in a process of its own.
-Writes groups.md here.
+The oscillations are like those of a night of 24 h: one to five of every loop, with periods from 20 s to 50 min. Three
+in ten loops oscillate; a third of these are in groups of 2 to 40 loops with a shared oscillation. The table gives the
+time on one core over that of the floor, and the peak memory. The floor reads the table of oscillations and takes an
+rfft of its lines. Each size runs in its own process. Writes groups.md here.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from proofs.common import command, parser_of, publish, table
 DAY_S = 86_400.0
 PERIODS = (20.0, 3000.0)
 PART = 2**16
-"""Lines of one transform of the floor."""
+"""Lines in one transform of the floor."""
 GROUPED = 0.1
 """Share of loops in groups."""
 
 
 def shape(rng: np.random.Generator, period: float) -> tuple[int, np.ndarray, np.ndarray]:
-    """First line, noise and a wave of its own about a period, shape (m,) each."""
+    """First line, noise and an independent oscillation near a period, shape (m,) each."""
     line = DAY_S / period
     first = max(int(line / REACH) - BESIDE, 0)
     at = np.arange(first, int(line * REACH) + BESIDE)
@@ -43,8 +43,10 @@ def shape(rng: np.random.Generator, period: float) -> tuple[int, np.ndarray, np.
     return first, noise, own * np.exp(-0.5 * ((at - line) / width) ** 2)
 
 
-def wave(rng: np.random.Generator, loop: str, period: float, shared: np.ndarray | None, own: bool) -> Wave:
-    """One wave of a loop: noise, and a wave that it shares or has to itself."""
+def oscillation(
+    rng: np.random.Generator, loop: str, period: float, shared: np.ndarray | None, own: bool
+) -> Wave:
+    """One oscillation of a loop: noise, and a shared or an independent oscillation."""
     first, noise, mine = shape(rng, period)
     lines = noise + (shared if shared is not None else mine if own else 0.0)
     clear = 60.0 if own else 2.0
@@ -52,7 +54,7 @@ def wave(rng: np.random.Generator, loop: str, period: float, shared: np.ndarray 
 
 
 def plant(loops: int, seed: int = 1) -> list[Wave]:
-    """Waves of a plant."""
+    """Oscillations of a plant."""
     rng = np.random.default_rng(seed)
     out: list[Wave] = []
     at = 0
@@ -62,22 +64,25 @@ def plant(loops: int, seed: int = 1) -> list[Wave]:
         period = float(np.exp(rng.uniform(*np.log(PERIODS))))
         shared = shape(rng, period)[2] if size > 1 else None
         for k in range(at, at + size):
-            out.append(wave(rng, f"L{k:06d}", period, shared, size > 1 or rng.random() < 0.22))
+            out.append(oscillation(rng, f"L{k:06d}", period, shared, size > 1 or rng.random() < 0.22))
             for _ in range(int(rng.integers(0, 5))):
-                out.append(wave(rng, f"L{k:06d}", float(np.exp(rng.uniform(*np.log(PERIODS)))), None, False))
+                out.append(
+                    oscillation(rng, f"L{k:06d}", float(np.exp(rng.uniform(*np.log(PERIODS)))), None, False)
+                )
         at += size
     return out
 
 
 def peak_mb() -> float:
-    """Largest memory of this process since it began [MB]; the resource module would count its parent's as well."""
-    kept = Path("/proc/self/status").read_text().split("VmHWM:")[1]
-    return float(kept.split()[0]) / 1024
+    """Largest memory of this process [MB]; the resource module would include its parent's."""
+    peak = Path("/proc/self/status").read_text().split("VmHWM:")[1]
+    return float(peak.split()[0]) / 1024
 
 
 def measured(path: Path) -> tuple[float, float, float, int, int]:
-    """Time of the floor and of the pass [s], peak memory [MB], waves, groups of a table of waves."""
-    trace(plant(20), {}, PlantLimits())  # compiles, or loads what was compiled
+    """Time of the floor and of the pass [s], peak memory [MB], oscillations, and groups of a table of
+    oscillations."""
+    trace(plant(20), {}, PlantLimits())  # compiles, or loads the compiled kernels
     begun = time.perf_counter()
     table = pq.read_table(path)
     lines = table.column("real").combine_chunks().flatten().to_numpy()
@@ -94,14 +99,14 @@ def measured(path: Path) -> tuple[float, float, float, int, int]:
 
 
 def row(loops: int, folder: Path) -> list[str]:
-    """One size: made here, measured in a process of its own."""
+    """One size: generated here, measured in its own process."""
     path = folder / f"{loops}.parquet"
     pq.write_table(waves_table(plant(loops)), path, compression="zstd")
     alone = [sys.executable, "-m", "benchmarks.groups", "--alone", str(path)]
-    said = subprocess.run(alone, capture_output=True, text=True, check=True).stdout.split()
-    floor, took, memory = map(float, said[:3])
+    printed = subprocess.run(alone, capture_output=True, text=True, check=True).stdout.split()
+    floor, took, memory = map(float, printed[:3])
     measured_s = (f"{floor:.2f}", f"{took:.1f}", f"{took / floor:.1f}", f"{memory:.0f}")
-    return [str(loops), said[3], said[4], *measured_s]
+    return [str(loops), printed[3], printed[4], *measured_s]
 
 
 def main() -> None:
@@ -118,7 +123,7 @@ def main() -> None:
             lines.append(row(loops, Path(folder)))
             print(lines[-1], flush=True)
     about = f"{command(__file__)}, one core, both within one run of the same machine."
-    heads = "loops | waves | groups | floor [s] | pass [s] | over floor | memory [MB]"
+    heads = "loops | oscillations | groups | floor [s] | pass [s] | over floor | memory [MB]"
     publish(__file__, "What the plant-wide pass costs", about, table(heads, lines, numbers=True))
 
 

@@ -1,8 +1,8 @@
-"""What a run does alone, and what a store of many nights takes to read: python -m benchmarks.joining
+"""The time of a run alone, and the time to read a store of many nights: python -m benchmarks.joining
 
-The pieces that workers wrote of a small plant are repeated under other names, each time with other phases, so that
-copies share no oscillation. A process of its own puts each night together; then a store of several nights, each with
-the first one's results, is checked and made into pages. Processor time and memory are those of that process alone.
+The pieces that workers wrote for a small plant are repeated under other names, each time with other phases, so that
+copies share no oscillation. A separate process joins each night. Then a store of several nights, each with the
+results of the first one, is checked and made into pages. Processor time and memory are those of that process alone.
 Writes joining.md here.
 """
 
@@ -38,11 +38,11 @@ from proofs.common import command, command_line, publish, table
 CHUNK = 30
 """Loops of a piece."""
 TIMES = ("time_s", "hour_s", "start_s", "judged_since_s", "settings_changed_s")
-"""Columns that move with the night."""
+"""Columns that change with the night."""
 
 
 def small_plant(folder: Path) -> tuple[Store, str]:
-    """The pieces of a small plant, made in this process, and its night."""
+    """The pieces of a small plant, computed in this process, and its night."""
     made = make(folder, DISTINCT, 2.0, 5, tenth)
     export = open_export(list(made.exports))
     specs = match(read_loops(made.loops_csv), export.tags)[0]
@@ -54,7 +54,7 @@ def small_plant(folder: Path) -> tuple[Store, str]:
 
 
 def repeat(small: Store, of: str, big: Store, night: str, loops: int) -> None:
-    """Lay the pieces of a small plant's night as those of a large plant's night."""
+    """Copy the pieces of a small plant's night as those of a large plant's night."""
     keys, rng = small.whole_chunks(of), np.random.default_rng(date.fromisoformat(night).toordinal())
     for k in range(0, loops, CHUNK):
         copy, key = divmod(k // CHUNK, len(keys))
@@ -91,7 +91,7 @@ def _renamed(held: pa.Table, copy: int, of: str, night: str) -> pa.Table:
 
 
 def _moved(held: pa.Table, of: str, night: str) -> pa.Table:
-    """A table of a night, or a part of it, as that of another night."""
+    """A table of a night, or a part of it, with the times of another night."""
     later = 86400.0 * (date.fromisoformat(night) - date.fromisoformat(of)).days
     fresh = {
         t: pc.add(held.column(t), later)
@@ -106,7 +106,7 @@ def _moved(held: pa.Table, of: str, night: str) -> pa.Table:
 
 
 def join(place: str, night: str) -> None:
-    """Put a night together from its pieces, as a run does when its workers are done."""
+    """Join a night from its pieces, as a run does when its workers have finished."""
     store = Store(Path(place))
     keys = store.whole_chunks(night)
     order = [
@@ -124,14 +124,14 @@ JOIN = "import sys; import benchmarks; from benchmarks.joining import join; join
 
 
 def joined(store: Store, night: str) -> Own:
-    """What a process takes that puts a night together, less what it takes to begin."""
+    """Resources of a process that joins a night, minus those of its start."""
     begun = own_of([sys.executable, "-c", JOIN.replace("join(*", "print(*")])
     done = own_of([sys.executable, "-c", JOIN, str(store.path), night])
     return replace(done, processor_s=done.processor_s - begun.processor_s)
 
 
 def nights_from(first: str, count: int) -> Iterator[str]:
-    """Names of so many nights."""
+    """Names of `count` nights."""
     return ((date.fromisoformat(first) + timedelta(days=k)).isoformat() for k in range(count))
 
 
@@ -161,8 +161,8 @@ def readings(small: Store, of: str, loops: int, nights: int, folder: Path) -> st
     place, rows, triage = str(store.path), [], [sys.executable, "-m", "analyzer.cli"]
     pages = ["pages", place, "--out", str(folder / "pages")]
     first = [*pages, "--top", "20"]
-    asked = (["store", "check", place], first, first, [*pages, "--loop", "U0001A00009"], ["rank", place])
-    for words in asked:
+    commands = (["store", "check", place], first, first, [*pages, "--loop", "U0001A00009"], ["rank", place])
+    for words in commands:
         own = own_of([*triage, *words])
         shown = " ".join(w for w in words if w not in (place, str(folder / "pages"))).replace(" --out", "")
         rows.append(
@@ -183,7 +183,7 @@ def main() -> None:
     about = "A night of 2 h at 5 s, one loop in ten flagged; processor time of the process alone, without its start."
     ran = command(__file__, loops=given.loops, plant=given.plant, nights=given.nights)
     store = f"A store of {given.nights} nights of {given.plant} loops; pages twice, then those of one loop:"
-    publish(__file__, "What a run does alone, and what a store takes to read", ran, about, one, store, many)
+    publish(__file__, "The time of a run alone, and the time to read a store", ran, about, one, store, many)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
-"""How long a person waits for an answer, over a floor of the same run: python -m benchmarks.latency
+"""How long a person waits for an answer, relative to a floor of the same run: python -m benchmarks.latency
 
-Whole commands are timed by the processor time of the process, over a start of Python with what they cannot do
-without; calls by the processor time of this process. The least of some runs counts. Writes latency.md here.
+Whole commands are timed by the processor time of the process. Their floor is a start of Python with the packages that
+they need. Calls are timed by the processor time of this process. The least of some runs counts. Writes latency.md
+here.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ def call_s(call: Callable[[], object]) -> float:
 
 
 def rows() -> list[tuple[str, float, str, float]]:
-    """What is timed, its seconds, its floor, and the floor's seconds."""
+    """The timed item, its seconds, its floor, and the floor's seconds."""
     bare = command_s("-c", "import click")
     arrow = command_s("-c", "import pyarrow.parquet, click")
     transform = call_s(lambda: np.fft.rfft(np.ones(86_400)))
@@ -60,15 +61,15 @@ def rows() -> list[tuple[str, float, str, float]]:
         for loops in LOOPS:
             place = Path(folder) / f"store{loops}"
             store = small_store(place, loops=loops, nights=1, hours=False, buckets=4)
-            asked = [
+            commands = [
                 (f"triage rank --format {f}", ("rank", store.path, "--top", "20", "--format", f))
                 for f in FORMS
             ]
-            asked.append(
+            commands.append(
                 ("triage pages --top 20", ("pages", store.path, "--out", place / "out", "--top", "20"))
             )
-            for name, ask in asked:
-                spent = command_s("-m", "analyzer.cli", *ask)
+            for name, words in commands:
+                spent = command_s("-m", "analyzer.cli", *words)
                 found.append((f"{name}, {loops:,} loops", spent, "python with pyarrow and click", arrow))
         big = small_store(Path(folder) / "big", loops=1500, nights=7, hours=False)
         pages = call_s(

@@ -1,8 +1,8 @@
-"""What a loop's night costs over what reading it costs: python -m benchmarks.night [--loops 60]
+"""The time of a loop's night relative to the time of reading it: python -m benchmarks.night [--loops 60]
 
-Each loop of an export is read, prepared and assessed, and between two loops the floor is taken on the same loop:
-pyarrow reads its columns and numpy takes one rfft of each. Both on one core, one after the other, so that whatever
-else the machine does falls on both. Without --export a plant of 24 h at 1 s is simulated. Writes night.md here.
+Each loop of an export is read, prepared and assessed. Between two loops the floor is measured on the same loop:
+pyarrow reads its columns and numpy takes one rfft of each. Both run on one core, one after the other, so that other
+processes affect both. Without --export a plant of 24 h at 1 s is simulated. Writes night.md here.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from proofs.common import command, parser_of, publish
 from proofs.plant import Sketch, simulate, write_export
 
 REPEATS = 3
-"""Runs of each, of which the fastest counts."""
+"""Number of runs of each; the fastest counts."""
 HEALTHY = (
     Sketch("none", (0.9, 15.0, 4.0), 0.8, 16.0, noise=0.15, load_std=0.8, kind="flow"),
     Sketch("none", (1.5, 40.0, 8.0), 1.2, 40.0, noise=0.1, load_std=0.8),
@@ -62,7 +62,7 @@ class Cost:
 
 
 def plant(loops: int, hours: float, folder: Path) -> tuple[Path, dict[str, Sketch]]:
-    """An export of loops, three of four healthy, and their sketches."""
+    """An export of loops, three of four without a fault, and their sketches."""
     sketches = {}
     for k in range(loops):
         kinds = FAULTY if k % 4 == 3 else HEALTHY
@@ -87,7 +87,7 @@ def stated(specs: Sequence[LoopSpec], sketches: dict[str, Sketch]) -> list[LoopS
 
 
 def fastest(task: Callable[[], Made]) -> tuple[float, Made]:
-    """Least time of a few runs [s], and what the last of them gave."""
+    """Least time of a few runs [s], and the result of the last one."""
     least = np.inf
     for _ in range(REPEATS):
         begun = time.perf_counter()
@@ -112,7 +112,7 @@ def one_night(export: Export, spec: LoopSpec, config: Config) -> Assessment:
 
 
 def measured(path: Path, export: Export, specs: Sequence[LoopSpec]) -> list[Cost]:
-    """Costs of all loops that can be assessed; the first is run once before, to load and compile."""
+    """Costs of all loops that can be assessed; the first is also run before, to load and compile."""
     config = Config()
     found = []
     for spec in (specs[0], *specs):
@@ -137,7 +137,7 @@ def quartiles(costs: Sequence[Cost]) -> str:
 
 
 def table(costs: Sequence[Cost]) -> str:
-    """A Markdown table over all, healthy and oscillating loops."""
+    """A Markdown table over all loops, loops without a fault and oscillating loops."""
     lines = [
         "| loops | number | floor ms | night ms | ratio, lower quartile | median | upper quartile |",
         "|---|---|---|---|---|---|---|",
@@ -151,7 +151,7 @@ def table(costs: Sequence[Cost]) -> str:
 
 
 def main() -> None:
-    """Measure and write the table beside this file."""
+    """Measure and write the table next to this file."""
     parser = parser_of(__doc__)
     parser.add_argument("--loops", type=int, default=60, help="loops of the simulated plant")
     parser.add_argument("--hours", type=float, default=24.0, help="length of its night")

@@ -1,15 +1,16 @@
-"""Time and answers beside PyPI's `stictionanalyser`: python -m benchmarks.peer --peer ENVIRONMENT/bin/python
+"""Time and answers compared with PyPI's `stictionanalyser`: python -m benchmarks.peer --peer ENVIRONMENT/bin/python
 
-That package reads ellipses off pictures of OP against PV, cycle by cycle, and wants old versions of what it stands
-on; it runs in an environment of its own, made by
+That package fits ellipses to pictures of OP against PV, cycle by cycle. It needs old versions of its dependencies, so
+it runs in its own environment, made by
 
     python -m venv ENVIRONMENT
     ENVIRONMENT/bin/pip install "numpy<2" "matplotlib<3.8" "pandas<2.3" "opencv-python-headless<4.11" scikit-image
     ENVIRONMENT/bin/pip install scipy && ENVIRONMENT/bin/pip install --no-deps stictionanalyser
 
-Its front end to a commercial server is left out; its detection is called as that front end calls it. Records are of
-6 h at 1 s, of sticking valves, of hunting controllers, of loads and of loops at rest. It
-names no cause but counts the cycles that show stiction: their median share stands in the table. Writes peer.md here.
+Its user interface for a commercial server is omitted; its detection is called in the same way as this interface calls
+it. Records are of 6 h at 1 s, of sticking valves, of oscillating controllers, of loads and of loops at rest. The
+package names no cause; it counts the cycles that show stiction. The table shows their median share. Writes peer.md
+here.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from proofs.plant import START_S, Sketch, Trends, series, simulate, spec
 
 HOURS = 6.0
 EACH = 6
-"""Records of a kind."""
+"""Number of records of a kind."""
 STICKS = (
     Sketch("stiction", (1.2, 8.0, 3.0), 0.4, 20.0, stickband=4.0, slip_jump=3.0, noise=0.08, kind="flow"),
     Sketch("stiction", (1.5, 40.0, 8.0), 0.8, 40.0, stickband=3.0, slip_jump=1.5),
@@ -70,11 +71,11 @@ for path in sys.argv[1:]:
     try:
         found, _ = CreatePVOP(error, op, 0, op, error)
         shares = [f.split("/") for f in found if isinstance(f, str) and "/" in f] if found != "none" else []
-        told = sum(int(a) for a, _ in shares), sum(int(b) for _, b in shares)
+        cycles = sum(int(a) for a, _ in shares), sum(int(b) for _, b in shares)
         why = ""
     except Exception as error:
-        told, why = (0, 0), f"{type(error).__name__}: {error}"
-    out[path] = {"told": told, "why": why, "s": time.process_time() - begun}
+        cycles, why = (0, 0), f"{type(error).__name__}: {error}"
+    out[path] = {"cycles": cycles, "why": why, "s": time.process_time() - begun}
 print(json.dumps(out))
 """
 
@@ -90,7 +91,8 @@ class Record:
 
 @dataclass(frozen=True)
 class Answer:
-    """How far the valve is told to be the cause (ours: no or yes; the other: share of cycles), processor time [s]."""
+    """Whether the valve is reported as the cause (ours: no or yes; the other: share of cycles), processor time
+    [s]."""
 
     valve: float
     spent_s: float
@@ -98,7 +100,7 @@ class Answer:
 
 
 def records() -> list[Record]:
-    """Some records of each kind, gains differing by up to a fifth."""
+    """Some records of each kind; the gains differ by up to a fifth."""
     out = []
     for kind, sketches in KINDS.items():
         for k in range(EACH):
@@ -110,7 +112,7 @@ def records() -> list[Record]:
 
 
 def ours(r: Record) -> Answer:
-    """What the night tells."""
+    """The answer of the night."""
     stamp = START_S + np.arange(r.trends.pv.size, dtype=float)
     found = {f"L.{n.upper()}": series(stamp, getattr(r.trends, n)) for n in ("sp", "pv", "op")}
     begun = time.process_time()
@@ -121,23 +123,23 @@ def ours(r: Record) -> Answer:
 
 
 def theirs(made: Sequence[Record], python: Path) -> list[Answer]:
-    """What the other package tells, in its own environment."""
+    """The answer of the other package, in its own environment."""
     with tempfile.TemporaryDirectory() as folder:
         paths = [Path(folder) / f"{k}.npz" for k in range(len(made))]
         for path, r in zip(paths, made, strict=True):
             np.savez(path, op=r.trends.op, error=r.trends.pv - r.trends.sp)
         command = [str(python), "-c", PEER, *map(str, paths)]
-        said = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
-    rows = [said[str(path)] for path in paths]
+        answers = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    rows = [answers[str(path)] for path in paths]
     for why in sorted({r["why"] for r in rows if r["why"]}):
         print(why)
-    return [Answer(r["told"][0] / max(r["told"][1], 1), r["s"], bool(r["why"])) for r in rows]
+    return [Answer(r["cycles"][0] / max(r["cycles"][1], 1), r["s"], bool(r["why"])) for r in rows]
 
 
 def table(made: Sequence[Record], own: Sequence[Answer], other: Sequence[Answer]) -> str:
-    """What is told of the records of each kind, and the median processor time of one."""
+    """The answers for the records of each kind, and the median processor time of one record."""
     lines = [
-        "| records | valve told | ms | cycles with stiction, stictionanalyser | ms | lost | times as long |",
+        "| records | valve reported | ms | cycles with stiction, stictionanalyser | ms | lost | times as long |",
         "|---|--:|--:|--:|--:|--:|--:|",
     ]
     for kind in KINDS:
@@ -151,7 +153,7 @@ def table(made: Sequence[Record], own: Sequence[Answer], other: Sequence[Answer]
 
 
 def main() -> None:
-    """Ask both and write the table beside this file."""
+    """Run both and write the table next to this file."""
     parser = parser_of(__doc__)
     parser.add_argument("--peer", type=Path, required=True, help="the Python of its environment")
     options = parser.parse_args()

@@ -1,10 +1,11 @@
-"""A plant's whole night over reading it: python -m benchmarks.plant_night [--loops 1500] [--hours 24]
+"""The time of a plant's whole night relative to reading it: python -m benchmarks.plant_night [--loops 1500] [--hours
+24]
 
-A plant is simulated and written as exports of areas with its loops.csv; `triage run` then does everything that it
-does of a night: opening, screening, cause, advice, groups, the store. Three plants: loops that do not oscillate, one
-loop in ten flagged, and half of the valves worn. Processor time is that of all processes of the run; the floor,
-before and after it, is that of pyarrow reading the same columns and numpy taking one rfft of each. `--growth` runs
-plants of 100, 1,000 and 10,000 loops of 2 h at 5 s instead. Writes plant_night.md or plant_growth.md here.
+A plant is simulated and written as exports of areas with its loops.csv. Then `triage run` does the work of a whole
+night: opening, screening, cause, advice, groups, the store. There are three plants: loops that do not oscillate, one
+loop in ten flagged, and half of the valves worn. Processor time is that of all processes of the run. The floor is
+measured before and after it: pyarrow reads the same columns and numpy takes one rfft of each. `--growth` runs plants
+of 100, 1,000 and 10,000 loops of 2 h at 5 s instead. Writes plant_night.md or plant_growth.md here.
 """
 
 from __future__ import annotations
@@ -34,9 +35,9 @@ GROWTH = Path(__file__).with_name("plant_growth.md")
 IN_A_FILE = 100
 """Loops of an area's export."""
 DISTINCT = 60
-"""Loops that are simulated; the others are these with sensor noise of their own."""
+"""Number of loops that are simulated; the others are copies with different sensor noise."""
 WORN = tuple(replace(s, backlash=b) for s, b in zip(HEALTHY, (0.6, 0.8, 0.3), strict=True))
-"""Loops with a play that does no harm."""
+"""Loops with a harmless backlash."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class Plant:
 
 @dataclass(frozen=True)
 class Night:
-    """What a run took: processor and wall time [s], largest memory of a process [MB], floor [s], loops flagged."""
+    """Resources of a run: processor and wall time [s], largest memory of a process [MB], floor [s], loops flagged."""
 
     loops: int
     processor_s: float
@@ -76,7 +77,7 @@ def tenth(k: int) -> Sketch:
 
 
 def old_valves(k: int) -> Sketch:
-    """Half of the valves are worn: one in ten oscillates, four in ten have a play that does no harm."""
+    """Half of the valves are worn: one in ten oscillates, four in ten have a harmless backlash."""
     if k % 10 == 9:
         return FAULTY[(k // 10) % 2]
     return WORN[k % len(WORN)] if k % 10 < 4 else HEALTHY[k % len(HEALTHY)]
@@ -174,7 +175,7 @@ def measured(
 
 
 def main() -> None:
-    """Measure and write the table beside this file."""
+    """Measure and write the table next to this file."""
     parser = parser_of(__doc__, loops=1500, hours=24.0, jobs=2)
     parser.add_argument("--growth", action="store_true", help="100, 1,000 and 10,000 loops of 2 h at 5 s")
     options = parser.parse_args()

@@ -1,8 +1,8 @@
-"""What reading an export costs over pyarrow's own read of it: python -m benchmarks.readers
+"""The time of reading an export relative to pyarrow's own read of it: python -m benchmarks.readers
 
-One export at 1 s in each format (--loops 60 --hours 6); each is opened, its span found out, and all loops read, as a
-night does; the floor is pyarrow reading the same file once, on one thread. Each in a process of its own, processor
-time and peak memory. Writes readers.md here.
+There is one export at 1 s in each format (--loops 60 --hours 6). Each is opened, its span is determined, and all
+loops are read, as in a night. The floor is pyarrow reading the same file once, on one thread. Each runs in its own
+process; the table gives processor time and peak memory. Writes readers.md here.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def PEAK():
     line = next(x for x in open("/proc/self/status") if x.startswith("VmHWM:"))
     return int(line.split()[1]) / 1024
 """
-"""Peak memory of a process itself [MB]; that of its resource usage begins with its parent's."""
+"""Peak memory of a process itself [MB]; its resource usage would include its parent's."""
 FLOOR = """
 import json, sys, time
 import pyarrow as pa, pyarrow.csv as csv, pyarrow.parquet as pq
@@ -66,7 +66,7 @@ def wide(loops: int, hours: float) -> pa.Table:
 
 
 def long(table: pa.Table) -> pa.Table:
-    """The same, a row a sample, in the order of time, with quality."""
+    """The same with one row for each sample, in the order of time, with quality."""
     tags = table.column_names[1:]
     n, m = table.num_rows, len(tags)
     values = np.stack([table.column(t).to_numpy() for t in tags], axis=1).ravel()
@@ -115,7 +115,7 @@ def measured(code: str, *arguments: str) -> tuple[float, float]:
 
 
 def main() -> None:
-    """Measure, print, and write the table beside this file."""
+    """Measure, print, and write the table next to this file."""
     wanted = command_line(__doc__, loops=60, hours=6.0)
     rows = []
     with tempfile.TemporaryDirectory() as name:
@@ -127,7 +127,7 @@ def main() -> None:
             times = (f"{floor_s:.2f}", f"{ours_s:.2f}", f"{ours_s / floor_s:.1f}")
             rows.append((kind, f"{size:.0f}", *times, f"{floor_mb:.0f}", f"{ours_mb:.0f}"))
     shown = command(__file__, loops=wanted.loops, hours=wanted.hours)
-    about = "All loops of an export at 1 s, three tags each, read as a night reads them, over one read of the file."
+    about = "All loops of an export at 1 s, three tags each, read as in a night, relative to one read of the file."
     text = table("format | MB | pyarrow s | ours s | ratio | pyarrow MB | ours MB", rows, numbers=True)
     publish(__file__, "What reading costs", shown, about, text)
 

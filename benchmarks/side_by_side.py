@@ -1,10 +1,11 @@
-"""Identification and describing functions beside other packages', on the same records.
+"""Identification and describing functions compared with other packages, on the same records.
 
     python -m benchmarks.side_by_side --records 8
 
-Gain, time constant and dead time from closed-loop records by this package, by sippy_unipi (ARX, ARMAX, OE) and by
-statsmodels (AutoReg with OP as exogenous input), whose models are read by their step responses; describing functions
-beside python-control's. Writes side_by_side.md beside this file. The others are left out where not installed.
+Gain, time constant and dead time are identified from closed-loop records by this package, by sippy_unipi (ARX, ARMAX,
+OE) and by statsmodels (AutoReg with OP as exogenous input). The constants of the other packages' models are
+determined from their step responses. Describing functions are compared with python-control's. Writes side_by_side.md
+next to this file. Packages that are not installed are omitted.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ SCANS = 3600
 """Scans of a record, one a second."""
 ACTUATOR_S = 0.6
 """Lag of the simulated actuator [s], which counts as dead time."""
-PLAY_PCT = 1.5
+BACKLASH_PCT = 1.5
 REPEATS = 3
 
 Model = tuple[float, float, float]
@@ -64,8 +65,9 @@ class Row:
     lost: int
 
 
-def case(seed: int, play: float) -> Case:
-    """A loop in automatic with set point steps under a coloured load, its dead time no whole number of scans."""
+def case(seed: int, width_pct: float) -> Case:
+    """A loop in automatic with set point steps under a coloured load; its dead time is not a whole number of
+    scans."""
     rng = np.random.default_rng(seed)
     gain, lag, dead = rng.uniform(0.6, 2.0), rng.uniform(20.0, 60.0), rng.uniform(3.0, 9.0)
     kp, ti = 0.5 * lag / (gain * 2.5 * dead), lag
@@ -73,13 +75,14 @@ def case(seed: int, play: float) -> Case:
     sp[:100] = 50.0
     load, noise = wander(rng, SCANS, 0.6, 300.0), 0.05 * rng.standard_normal(SCANS)
     fixed = np.full(SCANS, kp), np.full(SCANS, ti), np.zeros(SCANS), np.zeros(SCANS, dtype=bool)
-    pv, op, _ = run(sp, load, noise, *fixed, 50.0, (play, 0.0, 0.0), (gain, lag, dead))
+    pv, op, _ = run(sp, load, noise, *fixed, 50.0, (width_pct, 0.0, 0.0), (gain, lag, dead))
     record = LoopRecord("L", START_S, 1.0, sp, pv, op, np.zeros(SCANS, dtype=bool))
     return Case(record, (gain, lag, dead + ACTUATOR_S), Pid(kp, ti))
 
 
 def ours(made: Case) -> Model:
-    """The plain process, or that behind a play where the play's evidence is plain; nothing is told beforehand."""
+    """The baseline process, or the process behind backlash where the evidence of backlash is sufficient; without
+    prior information."""
     limits = Config().cause
     m = measure(made.record, None, made.controller, limits)
     fit = m.play if m.evidence >= limits.evidence_unexcited else m.linear
@@ -88,7 +91,7 @@ def ours(made: Case) -> Model:
 
 
 def plain(made: Case) -> Model:
-    """The process behind a valve that is taken as ideal."""
+    """The process behind an ideal valve."""
     window = window_of(made.record, time_scale(made.record, None, made.controller), Config().cause)
     p = fit_linear(window, time_scale(made.record, None, made.controller)).process
     return p.gain, p.time_constant_s, p.dead_time_s
@@ -107,7 +110,7 @@ def read_off(step: Floats) -> Model:
 
 
 def _rise(share: Floats, level: float) -> tuple[Floats, Floats]:
-    """Where a response first crosses a level: the two samples about it, scaled to the level, and their times."""
+    """First crossing of a level by a response: the two samples around it, scaled to the level, and their times."""
     k = max(int(np.argmax(share >= level)), 1)
     return share[k - 1 : k + 1] / level, np.array([k - 1.0, float(k)])
 
@@ -123,7 +126,7 @@ def from_polynomials(a: Floats, b: Floats, delay: int) -> Model:
 
 
 def statsmodels_arx(made: Case) -> Model:
-    """AutoReg of one lag with two lags of OP, the whole scans of dead time told."""
+    """AutoReg of one lag with two lags of OP; the whole scans of dead time are given."""
     from statsmodels.tsa.ar_model import AutoReg
 
     r, delay = made.record, int(made.truth[2])
@@ -135,7 +138,7 @@ def statsmodels_arx(made: Case) -> Model:
 
 
 def sippy(method: str) -> Callable[[Case], Model]:
-    """A model of sippy_unipi of the true structure, the whole scans of dead time told."""
+    """A model of sippy_unipi with the true structure; the whole scans of dead time are given."""
 
     def identified(made: Case) -> Model:
         from sippy_unipi import system_identification
@@ -143,12 +146,12 @@ def sippy(method: str) -> Callable[[Case], Model]:
         d = int(made.truth[2])
         chosen = {"IC": "AIC", "na_ord": [1, 2], "nb_ord": [1, 2], "delays": [0, 12]}
         orders = {"ARX": [1, 2, d], "ARMAX": [1, 2, 1, d], "OE": [2, 1, d]}
-        told = chosen if method == "AIC" else {f"{method}_orders": orders[method]}
+        given = chosen if method == "AIC" else {f"{method}_orders": orders[method]}
         with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             r = made.record
             found = system_identification(
-                r.pv, r.op, "ARX" if method == "AIC" else method, centering="MeanVal", tsample=1.0, **told
+                r.pv, r.op, "ARX" if method == "AIC" else method, centering="MeanVal", tsample=1.0, **given
             )
         b, a = (np.ravel(np.asarray(x[0][0], dtype=float)) for x in (found.G.num, found.G.den))
         return read_off(_response(b, a, 3000))
@@ -165,7 +168,7 @@ def _response(b: Floats, a: Floats, n: int) -> Floats:
 
 
 def methods() -> dict[str, Callable[[Case], Model]]:
-    """All that can be run here."""
+    """All methods that are installed."""
     found: dict[str, Callable[[Case], Model]] = {
         "this package": ours,
         "this package, valve taken as ideal": plain,
@@ -192,16 +195,19 @@ def row(name: str, method: Callable[[Case], Model], cases: Sequence[Case]) -> Ro
 
 
 def identification(records: int) -> dict[str, list[Row]]:
-    """All methods on records without and with play."""
+    """All methods on records without and with backlash."""
     out = {}
-    for title, play in (("ideal valve", 0.0), (f"play of {PLAY_PCT:g} % in the valve", PLAY_PCT)):
-        cases = [case(seed, play) for seed in range(records)]
+    for title, width_pct in (
+        ("ideal valve", 0.0),
+        (f"backlash of {BACKLASH_PCT:g} % in the valve", BACKLASH_PCT),
+    ):
+        cases = [case(seed, width_pct) for seed in range(records)]
         out[title] = [row(name, method, cases) for name, method in methods().items()]
     return out
 
 
 def identification_table(found: dict[str, list[Row]]) -> str:
-    """Markdown."""
+    """The table in Markdown."""
     lines = [
         "| records | method | gain, error % | time constant, error % | dead time, error s | time ms | lost |",
         "|---|---|---|---|---|---|---|",
@@ -214,12 +220,13 @@ def identification_table(found: dict[str, list[Row]]) -> str:
 
 
 def fourier(amplitude: float, width: float, relay: bool, points: int = 200_000) -> complex:
-    """Describing function of play, or of a relay of height and hysteresis `width`/2, by a sum over one period."""
+    """Describing function of backlash, or of a relay with height and hysteresis `width`/2, by a sum over one
+    period."""
     angle = 2 * np.pi * np.arange(2 * points) / points
-    wave = amplitude * np.sin(angle)
+    sine = amplitude * np.sin(angle)
     half, now = 0.5 * width, 0.0
-    out = np.empty_like(wave)
-    for k, x in enumerate(wave):
+    out = np.empty_like(sine)
+    for k, x in enumerate(sine):
         switched = half if x > half else -half if x < -half else now
         now = switched if relay else min(max(now, x - half), x + half)
         out[k] = now
@@ -231,10 +238,10 @@ def describing_table() -> str:
     import control
 
     amplitude = np.linspace(0.6, 4.0, 1000)
-    play, relay = control.friction_backlash_nonlinearity(1.0), control.relay_hysteresis_nonlinearity(0.5, 0.5)
+    gap, relay = control.friction_backlash_nonlinearity(1.0), control.relay_hysteresis_nonlinearity(0.5, 0.5)
     rows = {
-        "play, this package": (lambda a: backlash(a, 1.0), False),
-        "play, python-control": (lambda a: control.describing_function(play, a), False),
+        "backlash, this package": (lambda a: backlash(a, 1.0), False),
+        "backlash, python-control": (lambda a: control.describing_function(gap, a), False),
         "relay, this package": (lambda a: stick_slip(a, 1.0, 1.0), True),
         "relay, python-control": (lambda a: control.describing_function(relay, a), True),
     }
@@ -249,7 +256,7 @@ def describing_table() -> str:
 
 
 def fastest(task: Callable[[], object]) -> tuple[float, object]:
-    """Least processor time of a few runs [s], the first left out, and what the last of them gave."""
+    """Least processor time of a few runs [s] without the first, and the result of the last one."""
     made = task()
     least = np.inf
     for _ in range(REPEATS):
@@ -283,7 +290,7 @@ def first_calls() -> tuple[float, float]:
 
 
 def day() -> tuple[LoopRecord, Pid]:
-    """A day of a tank with play, one value a second."""
+    """A day of a tank with backlash, one value a second."""
     rng = np.random.default_rng(1)
     pid, n = Pid(0.9, 40.0), 86_400
     load = wander(rng, n, 0.5, 1800.0) + 0.05 * rng.standard_normal(n)
@@ -292,7 +299,7 @@ def day() -> tuple[LoopRecord, Pid]:
 
 
 def speed_table() -> str:
-    """Simulation and identification of a day, over floors that any program pays."""
+    """Times of a simulation and of an identification of a day, relative to floors."""
     from scipy.signal import lfilter
 
     from analyzer.loop.oscillation.detection import detect
@@ -310,9 +317,9 @@ def speed_table() -> str:
         [
             "| what | ms | over |",
             "|---|---|---|",
-            f"| closed loop of 86,400 scans with play | {1000 * simulated:.2f} | {simulated / floor:.1f} times one"
-            " first-order filter over as many |",
-            f"| identification of a day at 1 s, rivals of the valve and all | {1000 * identified:.0f} |"
+            f"| closed loop of 86,400 scans with backlash | {1000 * simulated:.2f} | {simulated / floor:.1f} times"
+            " one first-order filter over as many |",
+            f"| identification of a day at 1 s, with all candidates of the valve | {1000 * identified:.0f} |"
             f" {identified / transform:.0f} times a transform of its trends |",
             f"| first closed loop of a fresh process, kernels cached | {first:.0f} | the second takes {second:.1f} |",
         ]
@@ -320,13 +327,13 @@ def speed_table() -> str:
 
 
 def main() -> None:
-    """Measure and write the tables beside this file."""
+    """Measure and write the tables next to this file."""
     options = command_line(__doc__, records=8)
     about = (
         f"Medians over {options.records} records of {SCANS} scans in closed loop, set point steps under coloured\n"
-        "load, dead times of no whole scans. The others but AIC are told the structure and the whole scans of dead\n"
-        "time, this package is told neither. The time is that of one record; with this package it holds the search\n"
-        "for a valve fault. Processor time, after one call that is not counted."
+        "load; the dead times are not whole scans. The other methods, except AIC, get the structure and the whole\n"
+        "scans of dead time; this package gets neither. The time is that of one record; with this package it\n"
+        "includes the search for a valve fault. Processor time, after one call that is not counted."
     )
     missing = "" if find_spec("sippy_unipi") else "\n\nsippy_unipi is not installed and was left out."
     tables = [identification_table(identification(options.records)), describing_table(), speed_table()]

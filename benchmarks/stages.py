@@ -1,8 +1,8 @@
-"""What each stage of a loop costs over reading it: python -m benchmarks.stages [--loops 24] [--hours 24]
+"""The time of each stage of a loop relative to reading it: python -m benchmarks.stages [--loops 24] [--hours 24]
 
-Reading, preparing, detection, the cause, the rest of an assessment, advice, and, of a few loops, an explanation. The
-floor is that of night.py. Medians over the loops, on one core, of each loop's fastest of three runs. Writes stages.md
-here.
+The stages are reading, preparing, detection, the cause, the rest of an assessment, advice, and, for a few loops, an
+explanation. The floor is that of night.py. The table gives medians over the loops, on one core, of each loop's
+fastest of three runs. Writes stages.md here.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Cost:
 
 
 def cost(path: Path, export: Export, spec: LoopSpec, config: Config) -> Cost:
-    """The stages of one loop, each by itself."""
+    """The stages of one loop, each measured separately."""
     floor_s, _ = fastest(lambda: floor(path, spec.tags))
     read_s, series = fastest(lambda: export.read(spec.tags))
     prepare_s, prepared = fastest(lambda: prepare(spec, series, config.quality))
@@ -66,7 +66,7 @@ def explanation_s(export: Export, spec: LoopSpec, config: Config) -> float:
 
 
 def row(name: str, of: Callable[[Cost], float], groups: tuple[list[Cost], list[Cost]]) -> str:
-    """A stage: milliseconds and floors, of loops that do not oscillate and of those that do."""
+    """A stage: milliseconds and floors, for loops that do not oscillate and for loops that do."""
     cells = []
     for group in groups:
         cells.append(f"{1000 * np.median([of(c) for c in group]):.1f}")
@@ -78,7 +78,8 @@ def table(costs: list[Cost]) -> str:
     """A Markdown table over the stages."""
     groups = [c for c in costs if not c.oscillates], [c for c in costs if c.oscillates]
     lines = [
-        f"| stage | {len(groups[0])} calm loops, ms | floors | {len(groups[1])} that oscillate, ms | floors |",
+        f"| stage | {len(groups[0])} without oscillation, ms | floors "
+        f"| {len(groups[1])} that oscillate, ms | floors |",
         "|---|--:|--:|--:|--:|",
         row("floor", lambda c: c.floor_s, groups),
     ]
@@ -87,7 +88,7 @@ def table(costs: list[Cost]) -> str:
 
 
 def main() -> None:
-    """Measure and write the table beside this file."""
+    """Measure and write the table next to this file."""
     options = command_line(__doc__, loops=24, hours=24.0)
     pa.set_cpu_count(1)
     config = Config()
@@ -98,13 +99,15 @@ def main() -> None:
         warm = (
             specs[0],
             specs[3],
-        )  # a calm loop and one that oscillates: kernels are loaded before the clock counts
+        )  # a loop that does not oscillate and one that does: kernels are loaded before the measurement
         costs = [cost(path, export, spec, config) for spec in (*warm, *specs)][len(warm) :]
         ill = [s for s, c in zip(specs, costs, strict=True) if c.oscillates][: EXPLAINED + 1]
         taken = [explanation_s(export, spec, config) for spec in ill][1:]
     shown = command(__file__, loops=options.loops, hours=options.hours)
-    said = f"An explanation takes {np.median(taken):.1f} s of processor time, median of {len(taken)} loops."
-    publish(__file__, "What each stage costs", shown, table(costs), said)
+    taken_s = (
+        f"An explanation takes {np.median(taken):.1f} s of processor time, median of {len(taken)} loops."
+    )
+    publish(__file__, "What each stage costs", shown, table(costs), taken_s)
 
 
 if __name__ == "__main__":

@@ -88,7 +88,7 @@ def ellipses(folder: Path, loops: list[str], python: Path) -> NightDecision:
             [str(python), "-c", PEER, *map(str, paths.values())], check=True, capture_output=True, text=True
         )
     answers = json.loads(done.stdout)
-    counts = {loop: answers[str(path)]["told"] for loop, path in paths.items()}
+    counts = {loop: answers[str(path)]["cycles"] for loop, path in paths.items()}
     return {loop: cycles > 0 and sticking / cycles >= SHARE for loop, (sticking, cycles) in counts.items()}
 
 

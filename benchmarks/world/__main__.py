@@ -1,5 +1,5 @@
-"""Cause, fault and settings on loops of another hand: python -m benchmarks.world --seed 1 --each 8 [--ways
-plain ...]"""
+"""Cause, fault and settings on loops of an independent generator: python -m benchmarks.world --seed 1 --each 8
+[--ways plain ...]"""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ COLUMNS = (
 
 
 def export(folder: Path, records: dict[str, Recording]) -> list[Path]:
-    """One wide file a loop."""
+    """One wide file for each loop."""
     for name, r in records.items():
         stamp = (START_US + np.round(r["stamp_s"] * 1e6)).astype("datetime64[us]")
         columns = {f"{name}.{role.upper()}": r[role] for role in ("sp", "pv", "op")}
@@ -86,7 +86,7 @@ def night_rows(
 
 
 def right(d: Drawn, row: dict[str, Any]) -> bool:
-    """Whether cause and fault are those of the truth."""
+    """Whether cause and fault agree with the truth."""
     if d.kind == "sluggish":
         return row["cause"] == "none" and row["action"] == "retune"
     if d.kind == "healthy":
@@ -98,37 +98,39 @@ def right(d: Drawn, row: dict[str, Any]) -> bool:
     return row["cause"] == d.cause and row["valve_fault"] in ("none", None)
 
 
-def line(d: Drawn, row: dict[str, Any], said: str) -> str:
-    """One loop's truth and what was said of it."""
+def line(d: Drawn, row: dict[str, Any], answer: str) -> str:
+    """One loop's truth and its answer."""
     p, c = d.process, d.controller
     true = f"Ms {d.ms:.1f} P {d.period_s:.0f} L {p.dead_s:.0f} T {p.lag_s:.0f} kp {c.kp:.3g} ti {c.ti_s:.3g}"
     valve = f"band {d.valve.band:.2g} moves {d.moves:.0f}"
     shares = "/".join(f"{row[f'osc_{cause}_pct'] or 0:.0f}" for cause in ("valve", "tuning", "load"))
     seen = f"osc {row['oscillating_pct']} P {row['period_s']} v/t/l {shares}"
-    return f"{d.name} {true} {valve}: {said} {row['action']} {seen} {row['reason']}"
+    return f"{d.name} {true} {valve}: {answer} {row['action']} {seen} {row['reason']}"
 
 
-def _count(loops: list[Drawn], way: str, seed: int, counts: Counter[str], asked: Any) -> None:
-    """Count what is said of one plant's loops, recorded in one way."""
-    rows = night_rows(loops, {d.name: recorded(run(d), way, d.seed) for d in loops}, asked.jobs)
+def _count(loops: list[Drawn], way: str, seed: int, counts: Counter[str], options: Any) -> None:
+    """Count the answers for one plant's loops, recorded in one way."""
+    rows = night_rows(loops, {d.name: recorded(run(d), way, d.seed) for d in loops}, options.jobs)
     for d in loops:
         row = rows[d.name]
-        said = f"{row['cause']}/{row['valve_fault']}" if row["status"] == "ok" else row["status"]
-        counts[said] += 1
+        answer = f"{row['cause']}/{row['valve_fault']}" if row["status"] == "ok" else row["status"]
+        counts[answer] += 1
         counts["right"] += right(d, row)
-        if asked.show and not right(d, row):
-            print(f"{seed} {line(d, row, said)}", file=sys.stderr)
+        if options.show and not right(d, row):
+            print(f"{seed} {line(d, row, answer)}", file=sys.stderr)
 
 
 def main() -> None:
     """Draw, record, assess, count."""
-    asked = command_line(__doc__, seed=[1], each=8, ways=["plain"], jobs=2, kinds=list(KINDS), show=False)
-    for way in asked.ways:
-        counts: dict[str, Counter[str]] = {k: Counter() for k in asked.kinds}
-        for seed in asked.seed:
-            for kind in asked.kinds:  # a plant each, for loops of one seed share their load and noise
-                _count(drawn(seed, asked.each, (kind,)), way, seed, counts[kind], asked)
-        n = asked.each * len(asked.seed)
+    options = command_line(__doc__, seed=[1], each=8, ways=["plain"], jobs=2, kinds=list(KINDS), show=False)
+    for way in options.ways:
+        counts: dict[str, Counter[str]] = {k: Counter() for k in options.kinds}
+        for seed in options.seed:
+            for kind in (
+                options.kinds
+            ):  # one plant for each kind, because loops of one seed share their load and noise
+                _count(drawn(seed, options.each, (kind,)), way, seed, counts[kind], options)
+        n = options.each * len(options.seed)
         print(f"\n{way}\n")
         print(
             table("kind|right|answers", [(k, f"{c.pop('right')} of {n}", dict(c)) for k, c in counts.items()])

@@ -1,4 +1,4 @@
-"""Loops drawn at random with their truth: what makes each cycle, and what a perfect repair or retune would change."""
+"""Loops drawn at random with their truth: the cause of each cycle, and the effect of a perfect repair or retuning."""
 
 from __future__ import annotations
 
@@ -26,15 +26,18 @@ from benchmarks.world.simulate import (
 KINDS = ("backlash", "stiction", "tight", "load", "healthy", "worn-sine", "sluggish", "worn-tight")
 HOURS = 24
 SWELL = 1.5
-"""Spread of the error over that without the fault from which a loop shows it."""
+"""Ratio of the error's spread to that without the fault, from which a loop shows the fault."""
 RETURN = 0.35
-"""First returning peak of the error's autocorrelation from which it does."""
+"""Least first returning peak of the error's autocorrelation for a loop that shows the fault."""
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """A loop with its truth: kind as in KINDS; period_s of the cycle, 0 where there is none; ms, largest
-    sensitivity of the linear loop; swell as SWELL; seed."""
+    """A loop with its truth.
+
+    kind: as in KINDS; period_s: of the cycle, 0 where there is none; ms: largest sensitivity of the linear loop;
+        swell: as SWELL.
+    """
 
     name: str
     kind: str
@@ -49,13 +52,13 @@ class Drawn:
 
     @property
     def cause(self) -> str:
-        """What `cause` should say."""
+        """The right value of `cause`."""
         causes = {"backlash": "valve", "stiction": "valve", "tight": "tuning", "worn-tight": "tuning"}
         return causes.get(self.kind, "none" if self.kind in ("healthy", "sluggish") else "load")
 
     @property
     def fault(self) -> str:
-        """What `valve_fault` should say."""
+        """The right value of `valve_fault`."""
         if self.valve.kind == BACKLASH:
             return "backlash"
         return "stiction" if self.valve.kind else "none"
@@ -70,7 +73,7 @@ def wander(rng: np.random.Generator, n: int, corner_s: float, h: float) -> Float
 
 
 def _process(rng: np.random.Generator, kind: str) -> Process:
-    """A lag, two lags, an integrator, or one with a small inverse response."""
+    """A lag, two lags, an integrator, or a process with a small inverse response."""
     dead = float(np.exp(rng.uniform(math.log(3), math.log(60))))
     form = rng.choice(["lag", "two", "level", "inverse"], p=[0.45, 0.25, 0.22, 0.08])
     ratio = float(np.exp(rng.uniform(math.log(1.2), math.log(25))))
@@ -91,7 +94,7 @@ def _nominal(p: Process, scan_s: float) -> tuple[float, float]:
 
 
 def _settings(rng: np.random.Generator, kind: str, p: Process) -> Controller | None:
-    """Settings of a kind; None where those drawn are of none."""
+    """Settings of a kind; None where the drawn settings are not of this kind."""
     scan = 1.0
     kp, ti = _nominal(p, scan)
     if kind in ("tight", "worn-tight"):
@@ -113,8 +116,8 @@ def _settings(rng: np.random.Generator, kind: str, p: Process) -> Controller | N
 
 @dataclass(frozen=True)
 class Character:
-    """What the loads of a plant have in common on all days: corner time [s] and size [% OP] of the random walk,
-    whether it also steps, and the standard deviation of PV's noise [% PV]."""
+    """Properties of a plant's loads on all days: corner time [s] and size [% OP] of the random walk, whether it also
+    steps, and the standard deviation of PV's noise [% PV]."""
 
     corner_s: float
     size: float
@@ -125,7 +128,7 @@ class Character:
 def loads(
     d: Drawn, n: int, rng: np.random.Generator, like: Character | None = None
 ) -> tuple[Floats, Floats, Character]:
-    """Load before the process, and noise, shape (n,) each, of a character drawn, or of a given one."""
+    """Load before the process, and noise, shape (n,) each, of a drawn or a given character."""
     h = d.controller.scan_s
     scale = d.process.dead_s + d.process.second_s
     corner = float(np.exp(rng.uniform(math.log(2 * scale), math.log(600 * scale))))
@@ -143,12 +146,12 @@ def loads(
     if d.kind in ("load", "worn-sine"):
         period = d.period_s
         phase = 2 * math.pi * np.arange(n) * h / period
-        if d.kind == "load" and rng.random() < 0.4:  # a neighbour's cycle wanders
+        if d.kind == "load" and rng.random() < 0.4:  # the period of a neighbour's cycle varies
             phase = phase + 0.15 * np.cumsum(rng.standard_normal(n)) * math.sqrt(h / period) * 2
-        wave = np.sin(phase)
+        periodic = np.sin(phase)
         if d.kind == "load" and rng.random() < 0.3:
-            wave = np.clip(2.0 * wave, -1, 1)
-        before = before + (3.0 if d.kind == "load" else 2.0) * max(size, 0.4) * wave
+            periodic = np.clip(2.0 * periodic, -1, 1)
+        before = before + (3.0 if d.kind == "load" else 2.0) * max(size, 0.4) * periodic
     return before, noise, Character(corner, size, steps, deviation)
 
 
@@ -171,9 +174,12 @@ def run(
     sp: Floats | None = None,
     more: Floats | None = None,
 ) -> Trends:
-    """One day of a loop, with other settings or another valve on the same load. Other days have other loads, of any
-    character or, `alike`, of that of the first day. auto, shape (n,): False in manual; None: always in automatic. sp,
-    another set point [% PV], and more, a further load before the process [% OP], shape (n,)."""
+    """One day of a loop, optionally with other settings or another valve under the same load.
+
+    Other days have other loads, of a random character or, with `alike`, of that of the first day. auto, shape (n,):
+    False in manual; None: always in automatic. sp: another set point [% PV]; more: a further load before the process
+    [% OP], shape (n,).
+    """
     n = int(hours * 3600 / d.controller.scan_s)
     like = loads(d, n, np.random.default_rng([d.seed, 0]))[2] if alike and day else None
     rng = np.random.default_rng([d.seed, day])
@@ -192,7 +198,7 @@ def run(
 
 
 def returning(e: Floats) -> float:
-    """First peak of the autocorrelation behind its first zero."""
+    """First peak of the autocorrelation after its first zero."""
     x = e - e.mean()
     f = np.abs(np.fft.rfft(x, 2 * x.size)) ** 2
     r = np.fft.irfft(f)[: x.size // 3]
@@ -222,7 +228,7 @@ def _valve(rng: np.random.Generator, kind: str) -> Valve:
 
 
 def one(seed: int, kind: str, name: str) -> Drawn | None:
-    """A loop of a kind, None where what was drawn does not show it plainly (or, healthy, swings)."""
+    """A loop of a kind; None where the draw does not show it clearly, or where a loop without a fault oscillates."""
     rng = np.random.default_rng([seed, KINDS.index(kind)])
     p = _process(rng, kind)
     c = _settings(rng, kind, p)
@@ -250,7 +256,7 @@ def one(seed: int, kind: str, name: str) -> Drawn | None:
 
 
 def drawn(seed: int, each: int, kinds: tuple[str, ...] = KINDS) -> list[Drawn]:
-    """So many loops of each kind."""
+    """`each` loops of each kind."""
     found: list[Drawn] = []
     for kind in kinds:
         have, k = 0, 0

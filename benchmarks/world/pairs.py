@@ -1,5 +1,6 @@
-"""Whether the answer stays where the fault does: each loop as it is and in everyday variations that leave its fault
-alone: python -m benchmarks.world.pairs --seed 1 --each 8 --kinds backlash tight --ways "rows missing" "SP moves" """
+"""Does the answer stay the same where the fault stays the same? Each loop as it is, and in everyday variations that
+do not change its fault: python -m benchmarks.world.pairs --seed 1 --each 8 --kinds backlash tight --ways "rows
+missing" "SP moves"."""
 
 from __future__ import annotations
 
@@ -20,25 +21,25 @@ DAYS = (
     *("another day", "SP moves", "PV filter", "manual spell", "ten hours of it"),
     *("SP ramps", "a master's SP", "load ramps", "bent valve curve"),
 )
-"""Variations of the day itself: another load; eight set point moves; a filter of 5 s on the PV that the controller
-sees, which loops.csv does not state; three hours in manual, which no mode states; fourteen hours of the same loop in
-good order, then ten hours with the fault; six set point ramps of 20 minutes; the set point of a master, a random
-walk; three changes of throughput, each a ramp of the load of an hour and a half; a valve whose gain changes with its
-opening."""
+"""Variations of the day itself: another load; eight set point moves; a filter of 5 s on the controller's PV, which
+loops.csv does not state; three hours in manual, which no mode states; fourteen hours of the same loop without the
+fault, then ten hours with it; six set point ramps of 20 minutes; the set point of a master, a random walk; three
+changes of throughput, each a load ramp of an hour and a half; a valve whose gain changes with its opening."""
 RAMPS, RAMP_S, MASTER_S, MASTER = 6, 1200, 1800.0, 1.0
-"""Ramps of the set point a day, their duration [s], corner time [s] and standard deviation [% PV] of a master's."""
+"""Set point ramps a day, their duration [s], corner time [s] and standard deviation [% PV] of a master's set
+point."""
 THROUGHPUT, BEND = 10.0, 1.0
-"""Standard deviation of a change of throughput [% OP], and bend of the valve's curve [-]."""
+"""Standard deviation of a change of throughput [% OP], and curvature of the valve characteristic [-]."""
 DAY_S = HOURS * 3600
 MANUAL = (0.4, 0.525)
-"""The spell in manual, as shares of the day."""
+"""The time in manual, as shares of the day."""
 FITTING = 3.5
-"""Factor of a process gain for which the settings of a loop that is too tight are well chosen; such loops are drawn
-with 2.2 to 3.6 times the gain, or a third to a fourteenth of the integral time."""
+"""Factor of a process gain for which the settings of a loop that is too tight are right. Such loops are drawn with
+2.2 to 3.6 times the gain, or a third to a fourteenth of the integral time."""
 WITH_FAULT = 10.0
-"""Hours with the fault at the end of a day that is otherwise in good order."""
+"""Hours with the fault at the end of a day without a fault."""
 UNSTATED = "settings unstated"
-"""The plain record of a loop for which loops.csv has no settings."""
+"""The unchanged record of a loop for which loops.csv has no settings."""
 SIZE, PERIOD = 0.2, 0.05
 """Changes of size and period from which an answer counts as changed."""
 
@@ -64,12 +65,12 @@ def varied(d: Drawn, way: str) -> Recording:
     if way == "bent valve curve":
         return recorded(run(replace(d, process=replace(d.process, bend=BEND))), "plain", d.seed)
     if way == "ten hours of it":
-        return recorded(joined(calm(d), run(d)), "plain", d.seed)
+        return recorded(joined(before_fault(d), run(d)), "plain", d.seed)
     return recorded(run(d), way, d.seed)
 
 
 def ramps(d: Drawn, count: int, duration_s: int, size: float) -> Floats:
-    """So many ramps a day to drawn levels about 0 of a standard deviation [% of span], a value a second."""
+    """`count` ramps a day to drawn levels about 0 with a standard deviation [% of span], one value a second."""
     rng = np.random.default_rng([d.seed, 6])
     begins = np.sort(rng.choice(DAY_S // duration_s - 1, count, replace=False)) * duration_s
     levels = np.concatenate(([0.0], size * rng.standard_normal(count)))
@@ -77,16 +78,16 @@ def ramps(d: Drawn, count: int, duration_s: int, size: float) -> Floats:
     return np.interp(np.arange(DAY_S), at, np.repeat(levels, 2)[1:-1])
 
 
-def calm(d: Drawn) -> Trends:
-    """The hours before the fault: the loop with a new valve, without its periodic load, or, if it is too tight, with
-    a process gain that its settings are made for."""
+def before_fault(d: Drawn) -> Trends:
+    """The hours before the fault: the loop with a new valve and without its periodic load. A loop that is too tight
+    has a process gain for which its settings are right."""
     process = replace(d.process, gain=d.process.gain / FITTING) if d.cause == "tuning" else d.process
     good = replace(d, kind="healthy", valve=Valve(), process=process)
     return run(good, day=1, hours=HOURS - WITH_FAULT, alike=True)
 
 
 def joined(first: Trends, day: Trends) -> Trends:
-    """Hours of a loop, and the last hours of a day of it."""
+    """Hours of a loop, followed by the last hours of a day of it."""
     n = first.pv.size
     both = (np.concatenate((getattr(first, x), getattr(day, x)[n:])) for x in ("sp", "pv", "op", "stem"))
     return Trends(*both, first.scan_s)
@@ -103,7 +104,7 @@ def _off(a: float | None, b: float | None, most: float) -> bool:
 
 
 def changes(before: dict[str, Any], after: dict[str, Any], way: str) -> list[str]:
-    """What of an answer changed: cause, fault, size, action, and the period where the day is the same."""
+    """The changed parts of an answer: cause, fault, size, action, and the period where the day is the same."""
     found = [name for name in ("cause", "valve_fault", "action") if before[name] != after[name]]
     found += ["size"] if _off(size(before), size(after), SIZE) else []
     longer = way not in DAYS and _off(before["period_s"], after["period_s"], PERIOD)
@@ -115,9 +116,9 @@ def _compared(d: Drawn, way: str, before: dict[str, Any], after: dict[str, Any],
     found = changes(before, after, way)
     if show and (found or not right(d, after)):
         names = ("cause", "valve_fault", "action", "period_s", "reason")
-        said = ["/".join(str(row[n]) for n in names) for row in (before, after)]
+        answer = ["/".join(str(row[n]) for n in names) for row in (before, after)]
         print(
-            f"{d.seed} {d.name} {way} {found} right {right(d, after)}: {said[0]} -> {said[1]}",
+            f"{d.seed} {d.name} {way} {found} right {right(d, after)}: {answer[0]} -> {answer[1]}",
             file=sys.stderr,
         )
     return found
@@ -125,22 +126,22 @@ def _compared(d: Drawn, way: str, before: dict[str, Any], after: dict[str, Any],
 
 def main() -> None:
     """Draw, vary, assess, compare."""
-    asked = command_line(
+    options = command_line(
         __doc__, seed=[1], each=8, ways=[*WAYS[1:], *DAYS, UNSTATED], jobs=2, kinds=list(KINDS), show=False
     )
-    counts: dict[str, Counter[str]] = {way: Counter() for way in ("plain", *asked.ways)}
-    for seed in asked.seed:
-        for kind in asked.kinds:
-            loops = drawn(seed, asked.each, (kind,))
-            plain = night_rows(loops, {d.name: varied(d, "plain") for d in loops}, asked.jobs)
+    counts: dict[str, Counter[str]] = {way: Counter() for way in ("plain", *options.ways)}
+    for seed in options.seed:
+        for kind in options.kinds:
+            loops = drawn(seed, options.each, (kind,))
+            plain = night_rows(loops, {d.name: varied(d, "plain") for d in loops}, options.jobs)
             counts["plain"].update(right=sum(right(d, plain[d.name]) for d in loops))
-            for way in asked.ways:
+            for way in options.ways:
                 records = {d.name: varied(d, "plain" if way == UNSTATED else way) for d in loops}
-                rows = night_rows(loops, records, asked.jobs, stated=way != UNSTATED)
+                rows = night_rows(loops, records, options.jobs, stated=way != UNSTATED)
                 for d in loops:
-                    found = _compared(d, way, plain[d.name], rows[d.name], asked.show)
+                    found = _compared(d, way, plain[d.name], rows[d.name], options.show)
                     counts[way].update(found, changed=int(bool(found)), right=int(right(d, rows[d.name])))
-    n = asked.each * len(asked.seed) * len(asked.kinds)
+    n = options.each * len(options.seed) * len(options.kinds)
     parts = ("right", "changed", "cause", "valve_fault", "size", "period", "action")
     print(
         table(

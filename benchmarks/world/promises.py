@@ -1,4 +1,4 @@
-"""Forecasts of new settings against what comes of them on the true plant, on the recorded day and on another one:
+"""Forecasts of new settings compared with their effect on the true plant, on the recorded day and on another one:
 python -m benchmarks.world.promises --seed 1"""
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ FIGURES = ("average_absolute_error", "stem_travel")
 
 @dataclass(frozen=True)
 class Promise:
-    """Forecast changes of error and stem travel, and those that came, on the recorded day and on the next one [-]."""
+    """Forecast changes of error and stem travel, and the true ones, on the recorded day and on the next one [-]."""
 
     forecast: tuple[Estimate, Estimate]
     came: tuple[tuple[float, float], tuple[float, float]]
 
     def held(self, day: int, k: int) -> bool:
-        """Whether the 90 % interval holds a figure's change on a day."""
+        """Whether the 90 % interval contains a figure's change on a day."""
         return self.forecast[k].low <= self.came[day][k] <= self.forecast[k].high
 
 
@@ -65,7 +65,7 @@ def changes(d: Drawn, new: Controller, day: int) -> tuple[float, float]:
 
 
 def promises(kind: str, seeds: list[int], each: int, way: str, jobs: int) -> list[Promise]:
-    """The promises to all loops of a kind that get new settings."""
+    """The forecasts for all loops of a kind that get new settings."""
     found = []
     for seed in seeds:
         loops = drawn(seed, each, (kind,))
@@ -105,10 +105,12 @@ def line(kind: str, found: list[Promise]) -> tuple[object, ...]:
 
 
 def main() -> None:
-    """Draw, record, assess, forecast, type in, compare."""
+    """Draw, record, assess, forecast, set the new settings, compare."""
     kinds = ["backlash", "stiction", "tight", "sluggish"]
-    asked = command_line(__doc__, seed=[1], each=8, way="plain", jobs=2, kinds=kinds)
-    rows = [line(k, promises(k, asked.seed, asked.each, asked.way, asked.jobs)) for k in asked.kinds]
+    options = command_line(__doc__, seed=[1], each=8, way="plain", jobs=2, kinds=kinds)
+    rows = [
+        line(k, promises(k, options.seed, options.each, options.way, options.jobs)) for k in options.kinds
+    ]
     heads = (
         "kind|settings|error forecast, median %|came|within 90 %|next day|travel forecast, median %|came|within "
         "90 %|next day|fall forecast, rise came"

@@ -1,4 +1,4 @@
-"""What a historian keeps of a loop: everyday ways of recording that leave the fault as it is."""
+"""A historian's recording of a loop: everyday ways of recording that do not change the fault."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ WAYS = (
 EXCEPTION = 0.05
 """Change of PV or OP from which a historian by exception keeps a new value [% of span]."""
 HOUR_BACK = 0.4
-"""When the clock of a historian in local time goes back by an hour, as a share of the day."""
+"""Time at which the clock of a historian in local time goes back by an hour, as a share of the day."""
 GAPS = ((0.2, 0.215), (0.55, 0.58), (0.8, 0.8035))
-"""Holes of 22, 43 and 5 minutes in a day, as shares of it: two outages of the recorder and a restart."""
+"""Gaps of 22, 43 and 5 minutes in a day, as shares of it: two outages of the recorder and a restart."""
 
 
 def plain(t: Trends, every: int = 1) -> Recording:
-    """Snapshots of every so many scans."""
+    """Snapshots of every `every`-th scan."""
     k = np.arange(0, t.pv.size, every)
     return {"stamp_s": k * t.scan_s, "sp": t.sp[k], "pv": np.round(t.pv[k], 4), "op": np.round(t.op[k], 4)}
 
 
 def by_exception(x: Floats) -> Floats:
-    """A signal of which each new value is kept when it differs from the last one kept, held in between."""
+    """A signal recorded by exception: a value is kept when it differs from the last kept one, and held in between."""
     out, held = np.empty_like(x), x[0]
     for k, value in enumerate(x):
         held = value if abs(value - held) > EXCEPTION else held
@@ -36,7 +36,7 @@ def by_exception(x: Floats) -> Floats:
 
 
 def recorded(t: Trends, way: str, seed: int) -> Recording:
-    """A loop's trends kept in one of WAYS."""
+    """A loop's trends recorded in one of WAYS."""
     rng = np.random.default_rng(seed)
     if way.startswith("every"):
         return plain(t, int(way.split()[1]))

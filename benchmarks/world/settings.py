@@ -1,6 +1,6 @@
-"""Advice taken: new settings typed in on the true plant under the same load: python -m
-benchmarks.world.settings --seed 1. With --grid also the loops that some settings would improve; with --nights 2 the
-loop is recorded with its new settings on another day, and what is then advised is typed in too."""
+"""Advice applied: new settings are set in the true plant under the same load: python -m benchmarks.world.settings
+--seed 1. With --grid the loops that some settings would improve are counted too. With --nights 2 the loop is recorded
+with its new settings on another day, and the next advice is applied too."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from proofs.common import command_line, table
 
 
 def outcome(d: Drawn, new: Controller, day: int = 0) -> tuple[float, float, float, float]:
-    """Error and stem travel over those before, on a day of the same kind of load, and maximum sensitivity before and
-    after, all [-]."""
+    """Error and stem travel relative to those before, on a day with the same kind of load, and maximum sensitivity
+    before and after, all [-]."""
     old, ours = (run(d, day, settings=c, alike=True) for c in (d.controller, new))
     error = [float(np.mean(np.abs(t.pv - t.sp))) for t in (old, ours)]
     travel = [float(np.abs(np.diff(t.stem)).sum()) for t in (old, ours)]
@@ -28,7 +28,7 @@ def outcome(d: Drawn, new: Controller, day: int = 0) -> tuple[float, float, floa
 
 
 GAINS, TIMES, MOST_MS = np.geomspace(0.15, 12.0, 14), np.geomspace(0.3, 12.0, 12), 2.0
-"""Settings of the grid over the present ones, and the largest sensitivity that it allows [-]."""
+"""Settings of the grid relative to the present ones, and its largest permitted sensitivity [-]."""
 
 
 def reachable(d: Drawn) -> bool:
@@ -43,7 +43,7 @@ def reachable(d: Drawn) -> bool:
 
 
 def verdict(error: float, travel: float, kind: str = "") -> str:
-    """Improved, better, none or harm: improved where travel or error falls by 30 % and neither rises by 15 %. Of a
+    """Improved, better, none or harm. Improved: travel or error falls by 30 % and neither rises by 15 %. For a
     sluggish loop, whose valve has to move more, only the error counts."""
     travel = error if kind == "sluggish" else travel
     if max(error, travel) > 1.15:
@@ -52,7 +52,7 @@ def verdict(error: float, travel: float, kind: str = "") -> str:
 
 
 def line(d: Drawn, row: dict[str, Any], found: tuple[float, ...] | None) -> str:
-    """What was advised and what came of it."""
+    """The advice and its effect."""
     c, p = d.controller, d.process
     process = f"K {p.gain:.3g} T {p.lag_s:.0f}+{p.second_s:.0f} L {p.dead_s:.0f}"
     what = f"{d.name} {process} Kp {c.kp:.3g} Ti {c.ti_s:.0f} Ms {d.ms:.1f}"
@@ -66,8 +66,8 @@ def line(d: Drawn, row: dict[str, Any], found: tuple[float, ...] | None) -> str:
 def advised(
     loops: list[Drawn], way: str, nights: int, jobs: int
 ) -> list[tuple[Drawn, dict[str, Any], Controller]]:
-    """Each loop, its last row with settings or its first one, and its controller after so many nights of advice."""
-    told_of, typed = {}, {d.name: d.controller for d in loops}
+    """Each loop, its last row with settings or its first one, and its controller after `nights` nights of advice."""
+    last_rows, typed = {}, {d.name: d.controller for d in loops}
     for night in range(nights):
         now = [replace(d, controller=typed[d.name]) for d in loops]
         rows = night_rows(now, {d.name: recorded(run(d, night, alike=True), way, d.seed) for d in now}, jobs)
@@ -76,33 +76,33 @@ def advised(
             if row["kp_new"] is not None:
                 typed[d.name] = replace(d.controller, kp=row["kp_new"], ti_s=row["ti_new"])
             if night == 0 or row["kp_new"] is not None:
-                told_of[d.name] = row
-    return [(d, told_of[d.name], typed[d.name]) for d in loops]
+                last_rows[d.name] = row
+    return [(d, last_rows[d.name], typed[d.name]) for d in loops]
 
 
 def main() -> None:
-    """Draw, record, assess, type in, count."""
-    asked = command_line(
+    """Draw, record, assess, set the new settings, count."""
+    options = command_line(
         __doc__, seed=[1], each=8, way="plain", jobs=2, kinds=["tight"], show=False, grid=False, nights=1
     )
-    rows, n = [], asked.each * len(asked.seed)
-    for kind in asked.kinds:
+    rows, n = [], options.each * len(options.seed)
+    for kind in options.kinds:
         found: list[tuple[float, ...]] = []
         possible = 0
-        for seed in asked.seed:
-            loops = drawn(seed, asked.each, (kind,))
-            possible += sum(reachable(d) for d in loops) if asked.grid else 0
-            for d, row, new in advised(loops, asked.way, asked.nights, asked.jobs):
+        for seed in options.seed:
+            loops = drawn(seed, options.each, (kind,))
+            possible += sum(reachable(d) for d in loops) if options.grid else 0
+            for d, row, new in advised(loops, options.way, options.nights, options.jobs):
                 came = None if new == d.controller else outcome(d, new)
                 found += [] if came is None else [came]
-                if asked.show:
+                if options.show:
                     print(line(d, row, came), file=sys.stderr)
-        said = [verdict(e, t, kind) for e, t, *_ in found]
+        verdicts = [verdict(e, t, kind) for e, t, *_ in found]
         a = np.array(found).reshape(-1, 4)
         middle = [f"{100 * (np.median(a[:, k]) - 1):+.0f}" if found else "" for k in (0, 1)]
         worst = f"{100 * (a[:, 0].max() - 1):+.0f}" if found else ""
         ms = f"{a[:, 3].max():.2f}" if found else ""
-        counts = (said.count("improved"), possible if asked.grid else "", said.count("harm"))
+        counts = (verdicts.count("improved"), possible if options.grid else "", verdicts.count("harm"))
         rows.append((kind, n, len(found), *counts, *middle, worst, ms))
     heads = (
         "kind|loops|new settings|improved|a grid improves|harm|error, median %|stem travel, median %|"

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 NO_FAULT, BACKLASH, HE, KANO, KARNOPP = range(5)
-"""Valves: ideal; play of full width; stick-slip after He et al. 2007 and Kano 2004; Coulomb and static
-friction with a spring that follows OP (as Karnopp 1985)."""
+"""Valves: ideal; backlash of full width; stick-slip after He et al. 2007 and Kano 2004; Coulomb and static friction
+with a spring that follows OP (as Karnopp 1985)."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Controller:
 
 @dataclass(frozen=True)
 class Valve:
-    """Kind as above, its band (full width of the play, or stickband) and slip jump [% OP]."""
+    """Kind as above, its band (full width of the backlash, or stickband) and slip jump [% OP]."""
 
     kind: int = NO_FAULT
     band: float = 0.0
@@ -53,14 +53,14 @@ def _stem(kind: int, band: float, jump: float, op: float, state: Floats) -> floa
     if kind == 1:
         half = 0.5 * band
         state[0] = min(max(state[0], op - half), op + half)
-    elif kind == 2:  # it jumps when the force passes static friction, and rests at once
+    elif kind == 2:  # it jumps when the force exceeds static friction, and stops at once
         static, kinetic = 0.5 * (band + jump), 0.5 * (band - jump)
         gap = op - state[0]
         if gap > static:
             state[0] = op - kinetic
         elif gap < -static:
             state[0] = op + kinetic
-    elif kind == 3:  # it moves on until OP reverses or stops
+    elif kind == 3:  # it moves further until OP reverses or stops
         change = op - state[2]
         if state[3] == 1.0:
             if change * state[1] <= 0.0:
@@ -151,7 +151,7 @@ def _run(
 
 @dataclass(frozen=True)
 class Trends:
-    """What the plant does, one value a scan, shape (n,) [% of span]."""
+    """The output of the plant, one value a scan, shape (n,) [% of span]."""
 
     sp: Floats
     pv: Floats
@@ -171,7 +171,7 @@ def simulate(
     auto: NDArray[np.bool_] | None = None,
     rest: float = 50.0,
 ) -> Trends:
-    """The loop under loads before [% OP] and behind [% PV] the process; all of shape (n,), a value a scan."""
+    """The loop under loads before [% OP] and after [% PV] the process; all of shape (n,), one value a scan."""
     p, c = process, controller
     plant = (p.gain, p.lag_s, p.second_s, p.dead_s, p.lead_s, p.bend, c.kp, c.ti_s, c.pv_filter_s)
     loop = np.array([*plant, float(valve.kind), valve.band, valve.jump, rest])
@@ -180,8 +180,8 @@ def simulate(
 
 
 def sensitivity(process: Process, controller: Controller) -> tuple[float, float]:
-    """Largest |1/(1 + GC)| over frequency and the period [s] at which it is; inf where the loop is unstable by the
-    Nyquist criterion counted on its phase crossover."""
+    """Largest |1/(1 + GC)| over frequency, and its period [s]; inf where the loop is unstable by the Nyquist
+    criterion, counted on its phase crossover."""
     p, c = process, controller
     w = np.geomspace(1e-6, math.pi / c.scan_s, 6000)
     s = 1j * w
