@@ -161,7 +161,7 @@ def main() -> None:
     ours(made[0])
     text = table(made, [ours(r) for r in made], theirs(made, options.peer))
     about = "Medians of processor time of a record of 6 h at 1 s; see the docstring for what is compared."
-    publish(__file__, "Beside stictionanalyser", command(__file__, peer="PYTHON"), about, text)
+    publish(__file__, "Comparison with stictionanalyser", command(__file__, peer="PYTHON"), about, text)
 
 
 if __name__ == "__main__":

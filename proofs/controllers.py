@@ -174,15 +174,16 @@ def main() -> None:
         "Loops whose stated settings are reported as not those of the controller. Where the settings are stated as "
         "they are, each report is a false alarm; in the other columns each report is right. A fast PI (integral time "
         "of 3 to 10 s) at 10 s is a control case: no report is right for it. A gain schedule is stated by its gain "
-        "below an OP of 50 %. A series form with a Td of a tenth of its Ti is within 10 % of an ideal one: samples "
+        "below an OP of 50 %. A series form with a Td of a tenth of its Ti is within 10 % of an ideal one. Samples "
         "slower than the scan cannot distinguish them.",
         table(heads, rows),
         f"A report of wrong settings also gives gain and integral time. Their errors, as median and 90 % quantile: "
         f"{_quantiles(off)}.",
-        "The next table shows how often a feature of the controller that is not stated is recognized within 25 %, "
-        "where its settings are stated as they are. It shows how often a feature is reported that the controller "
-        "does not have. The last columns are for settings that are not stated at all. These are reported where the "
-        "control law explains more than 90 % of OP's increments; right is within 10 % at 1 s and 25 % at 10 s:",
+        "The next table is for features of the controller that are not stated. It shows how often they are "
+        "recognized within 25 %, where the settings are stated as they are. It shows how often a feature is reported that the "
+        "controller does not have. The last columns are for settings that are not stated at all. These are reported "
+        "where the control law explains more than 90 % of OP's increments. Right is within 10 % at 1 s and 25 % at "
+        "10 s:",
         table(
             "controller | " + " | ".join(f"{w}, {e} s" for w in FEATURES for e in (1, 10)),
             [[f, *(cell(of[f, e], e) for cell in FEATURES.values() for e in (1, 10))] for f in FORMS],

@@ -3,9 +3,9 @@
 The tables compare each index, at its published limits, with the answer of this tool: worn valves found, and other
 valves blamed. SHARED holds recordings/isdb and refinery, plants and wild. The first two are labelled by people; a
 controller counts once, by the majority of its recordings. Plants and wild are simulated (a and b); the world is
-benchmarks/world. A worn valve counts where its fault shows, by the rules that score the simulated data: the spread of
-the error is 1.5 times that without the fault, and the error has a rhythm. All other loops are without a valve fault,
-also where they oscillate. Writes field_indices.md here.
+benchmarks/world. A worn valve counts where its fault shows, by the rules that score the simulated data. By these
+rules the spread of the error is 1.5 times that without the fault, and the error has a rhythm. All other loops are
+without a valve fault, also where they oscillate. Writes field_indices.md here.
 """
 
 from __future__ import annotations

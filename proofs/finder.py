@@ -2,10 +2,11 @@
 
 Tags lose their names and their order. Twenty signals that belong to no loop are added: drift, slow noise,
 oscillations, sensors that follow a PV, white noise. The plants are those of the shared folder, if it exists, at 1, 10
-and 60 s; its recording of the Tennessee Eastman process at 3 s; and the sample mill at 10 s. A pair is right where PV
-and OP belong to one loop; only sure pairs count. Gains and integral times are compared with loops.csv where the
-control law explains .9 of OP's moves. False pairs are also counted in sets without a controller: the same plants
-without OP and without moving set points, and a thousand tags of noise, drift and oscillations. Writes finder.md here.
+and 60 s, and the sample mill at 10 s. The folder's recording of the Tennessee Eastman process is used at 3 s. A pair
+is right where PV and OP belong to one loop; only sure pairs count. Gains and integral times are compared with
+loops.csv where the control law explains .9 of OP's moves. False pairs are also counted in sets without a controller.
+These are the same plants without OP and without moving set points, and a thousand tags of noise, drift and
+oscillations. Writes finder.md here.
 """
 
 from __future__ import annotations
@@ -157,9 +158,9 @@ def main() -> None:
     """Look for the loops of all plants and write the page."""
     given = command_line(__doc__, shared=Path("../shared"), seeds=[1, 2], worlds=[41, 42, 43, 44])
     rows, nothing = [], 0
-    totals = {"limits were set on": Counter[str](), "of another hand": Counter[str]()}
+    totals = {"limits were set on": Counter[str](), "of an independent generator": Counter[str]()}
     fitted = ((x, "limits were set on") for x in bags(given.shared))
-    others = ((x, "of another hand") for seed in given.worlds for x in of_world(seed))
+    others = ((x, "of an independent generator") for seed in given.worlds for x in of_world(seed))
     for (name, held, dt_s, stated), group in chain(fitted, others):
         found, took_s = Counter[str](), 0.0
         for seed in given.seeds:

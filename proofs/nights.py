@@ -2,8 +2,8 @@
 
 Each night of the sample mill is a separate run; all runs go into one store. One series uses loops.csv alone, like a
 plant without a list of changes. From 2026-03-09 on this file is out of date for the seven loops retuned on that day.
-The other series also uses changes.csv. Every advised pair of settings is set in the true loop, and the load and noise
-of the night are simulated again with old and new settings. The tables list the changes reported each morning with the
+The other series also uses changes.csv. Every advised pair of settings is set in the true loop. The load and noise of
+the night are simulated again with old and new settings. The tables list the changes reported each morning with the
 truth. Writes nights.md here.
 """
 

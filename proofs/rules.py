@@ -136,11 +136,11 @@ def counts(name: str, loops: list[Judged]) -> list[int]:
 HELD = """\
 Some rules do not improve the counts of these draws. Other data need them:
 
-- *stickbands of any size*: without it the valve of a slow loop without a fault is blamed in a record of a day
-  (tests/analyzer/loop/test_cause.py); the draws include no record of this length.
+- *stickbands of any size*: without it a slow loop's valve without a fault is blamed in a record of a day
+  (tests/analyzer/loop/test_cause.py). The draws include no record of this length.
 - *PV that sticks and jumps*: without it a valve is blamed behind a sensor that sticks
   (tests/analyzer/loop/test_sticking_sensor.py); the draws have no such sensor.
-- *backlash within PV's grid*: seven valves without a fault were blamed in loops that do not oscillate; four of these
+- *backlash within PV's grid*: seven valves without a fault were blamed in loops that do not oscillate. Four of these
   trends covered few steps of a grid (cause.grid_covered in analyzer/limits.toml).
 - *likely valves of compressed trends*: two of 30 such cycles of another cause resembled valve faults
   (cause.compressed_pct).

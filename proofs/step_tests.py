@@ -99,8 +99,8 @@ def table(found: list[tuple[Truth, list[Constant]]]) -> Iterator[str]:
     yield f"\nIntervals of all constants: {100 * sum(a.holds for a in some) / len(some):.0f} % contain the truth."
     yield f"Wrong signs: {wrong} of {len(gains)}."
     yield (
-        "\nDead times: the bound of Cramer and Rao gives the smallest scatter that the noise of each test allows, "
-        "with gain, lags, zero, backlash, offset and drift unknown. Unbiased estimates with this scatter would be "
+        "\nDead times: the bound of Cramer and Rao gives the smallest scatter that the noise of each test allows. "
+        "Gain, lags, zero, backlash, offset and drift are unknown. Unbiased estimates with this scatter would be "
         "right in "
         f"{100 * possible(every):.0f} %."
     )

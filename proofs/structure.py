@@ -4,8 +4,8 @@
 Each plant has ten cascades, four ratios and eight single loops (proofs/structure_plant.py), ten hours, recorded every
 two seconds; loops.csv states no master. The table counts the masters and leaders that are reported, and reported
 links of loops that depend on no loop or on another one. It counts faults reported at the right loop, of faults that
-increase the loop's error by .3. It also counts three kinds of false alarms: a valve fault of a master, which has no
-valve; a blamed valve without a fault; and new settings for a loop without a fault. Writes structure.md here.
+increase the loop's error by .3. It also counts three kinds of false alarms. They are a valve fault of a master, which
+has no valve; a blamed valve without a fault; and new settings for a loop without a fault. Writes structure.md here.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
 The plant has 24 loops whose backlash grows linearly from .3 to 3 % of OP in sixty nights, and twelve loops without a
 fault. Each night has twelve hours with new load and noise; the physics is that of the sample mill. The table shows
-the first night with a reported worn valve, and the first night with reported wear. It shows the days between which
-the backlash is predicted to reach 5 %, by the data up to the night before the last, and the true day. Writes wear.md
-here.
+the first night with a reported worn valve, and the first night with reported wear. It shows the true day on which the
+backlash reaches 5 %, and the days between which this is predicted. The prediction uses the data up to the night
+before the last. Writes wear.md here.
 """
 
 from __future__ import annotations

@@ -77,7 +77,7 @@ def drawn(rng: np.random.Generator, plant: Plant, natural: np.ndarray, n: int) -
 
 
 def beat(rng: np.random.Generator, n: int, scans: float) -> np.ndarray:
-    """A periodic load of about unit amplitude: a sine, a square wave or a pump's on and off; its phase varies."""
+    """A periodic load of about unit amplitude: a sine, a square signal or a pump's on and off; its phase varies."""
     pace = 1 + rng.uniform(0.01, 0.06) * coloured(rng, n, rng.uniform(2, 8) * scans)
     phase = np.cumsum(np.maximum(pace, 0.2) / scans) + rng.random()
     kind, part = rng.integers(3), phase % 1
