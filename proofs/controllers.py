@@ -180,10 +180,10 @@ def main() -> None:
         f"A report of wrong settings also gives gain and integral time. Their errors, as median and 90 % quantile: "
         f"{_quantiles(off)}.",
         "The next table is for features of the controller that are not stated. It shows how often they are "
-        "recognized within 25 %, where the settings are stated as they are. It shows how often a feature is reported that the "
-        "controller does not have. The last columns are for settings that are not stated at all. These are reported "
-        "where the control law explains more than 90 % of OP's increments. Right is within 10 % at 1 s and 25 % at "
-        "10 s:",
+        "recognized within 25 %, where the settings are stated as they are. It shows how often a feature is "
+        "reported that the controller does not have. The last columns are for settings that are not stated at all. "
+        "These are reported where the control law explains more than 90 % of OP's increments. Right is within 10 % "
+        "at 1 s and 25 % at 10 s:",
         table(
             "controller | " + " | ".join(f"{w}, {e} s" for w in FEATURES for e in (1, 10)),
             [[f, *(cell(of[f, e], e) for cell in FEATURES.values() for e in (1, 10))] for f in FORMS],

@@ -48,7 +48,8 @@ to +5 % and load rejection within two factors. The largest deviation after a loa
 {peak:g} times that of SIMC. The integral of the error is at most {lag:g} times ({ramp:g} on a level) that of SIMC's
 gain with Ti = max(T, SIMC's Ti). The limits of the search were set on seeds 1, 2, 11 and 12. Loads, noise and
 friction were set so that the rule on seed 1 cuts about as much travel as on other simulated loops
-with everything known. It cuts 81 % on lags with backlash, 12 % with stick-slip. With larger loads any tuning gains less."""
+with everything known. It cuts 81 % on lags with backlash, 12 % with stick-slip. With larger loads any tuning
+gains less."""
 """Text of the page before its tables."""
 TI_UNITS = ("s", "min", "repeats/min")
 
