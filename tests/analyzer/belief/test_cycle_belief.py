@@ -73,8 +73,8 @@ def test_a_smaller_cycle_is_reported_by_amplitude_and_error() -> None:
         ([20, 21, 2, 0, 3, 0, 2], ["", LESS, "", "", "", ""]),
         ([20, 20, 0, 20], ["", "stopped oscillating", "began to oscillate"]),
         ([20, 8, 20, 8, 20], ["", "", "", ""]),
-        ([20, 20, 8, 8, 8], ["", "", "oscillates less than it used to: ±0.8 % of span", ""]),
-        ([20, 20, 60, 60, 60], ["", "", "oscillates more than it used to: ±6 % of span", ""]),
+        ([20, 20, 8, 8, 8], ["", "", "oscillates less than before: ±0.8 % of span", ""]),
+        ([20, 20, 60, 60, 60], ["", "", "oscillates more than before: ±6 % of span", ""]),
     ],
 )
 def test_reported_changes_of_amplitude_depend_on_earlier_nights(

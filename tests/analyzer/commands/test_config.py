@@ -80,7 +80,10 @@ def test_sections_are_printed_with_the_description_of_their_class():
     printed = limits_document(Config())
     descriptions = re.findall(r"^# (.*)\n\[(\w+)\]$", printed, re.MULTILINE)
     assert len({words for words, _ in descriptions}) == len(descriptions) == len(fields(Config))
-    assert ("What finding out about an export may cost before it is given up.", "opening") in descriptions
+    assert (
+        "Limits of time and memory for opening an export, above which it is given up.",
+        "opening",
+    ) in descriptions
 
 
 def test_a_file_changes_what_it_states_and_nothing_else(tmp_path: Path):

@@ -324,7 +324,7 @@ def test_a_stuck_valve_is_the_cause_without_oscillation():
     found = assess(prepared(wound()), None, CONFIG)
     assert found.oscillations.first is None
     assert (found.verdict.cause, found.verdict.fault) == ("valve", "undecided")
-    assert "OP winds over 60 %" in sign_text(found.verdict.signs[0])
+    assert "OP moves over 60 %" in sign_text(found.verdict.signs[0])
 
 
 def test_a_valve_that_responds_is_not_stuck():

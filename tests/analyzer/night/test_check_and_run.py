@@ -17,7 +17,7 @@ FLOW = Sketch("none", (1.1, 12.0, 4.0), 0.3, 20.0, kind="flow")
     ("columns", "every", "lack", "text"),
     [
         ("L,0.3,20,0,100", 1, None, "fit for all questions"),
-        ("L,0.3,20,0,10000", 1, "OP's range", "fit for all but new settings: OP runs from"),
+        ("L,0.3,20,0,10000", 1, "OP's range", "fit for all but new settings: recorded OP lies between"),
     ],
 )
 def test_check_and_run_agree(tmp_path, columns, every, lack, text):

@@ -55,7 +55,7 @@ def test_a_relative_store_is_refused_on_a_cluster(tmp_path):
     result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 2
     assert "--store store with --scheduler" in result.stderr
-    assert f"say {Path('store').resolve()}" in result.stderr
+    assert f"state --store {Path('store').resolve()}" in result.stderr
     assert not Path("store").exists()
 
 

@@ -28,10 +28,10 @@ def test_only_an_open_loop_record_is_an_experiment() -> None:
 
 
 @pytest.mark.parametrize("seed", [41, 42])
-def test_a_plain_process_under_a_slow_load_is_none(seed: int) -> None:
-    """A load that wanders more slowly than the process answers makes no physics of a plain process."""
-    said, _ = answered("plain", seed)
-    assert said.verdict == "none"
+def test_a_process_without_an_effect_under_a_slow_load_is_none(seed: int) -> None:
+    """A load that varies more slowly than the process responds gives the verdict `none`."""
+    found_answer, _ = answered("plain", seed)
+    assert found_answer.verdict == "none"
 
 
 def test_a_slow_mode_is_found_from_one_step_and_carries_over() -> None:

@@ -14,11 +14,11 @@ PAGE = Path(__file__).resolve().parents[3] / "docs" / "first-hour.md"
 
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda m: m.what)
 def test_each_mistake_is_answered(mistake: Mistake, tmp_path: Path) -> None:
-    """Exit status, sentence and, where a night was written, action and reason are those of the page."""
-    status, said, action, reason = answered(mistake, tmp_path)
-    assert status == mistake.status, said
-    assert mistake.message in said
-    assert "Traceback" not in said
+    """Exit status, message and, if a night was written, action and reason agree with the page."""
+    status, message, action, reason = answered(mistake, tmp_path)
+    assert status == mistake.status, message
+    assert mistake.message in message
+    assert "Traceback" not in message
     if mistake.what in LISTED:
         wanted, part = LISTED[mistake.what]
         assert action == wanted
