@@ -26,9 +26,9 @@ from analyzer.config import Config
 from analyzer.loop import assess as of_night
 from analyzer.loop.advice import tune as of_settings
 from analyzer.loop.advice.advise import withheld
-from analyzer.night.asked import asked_of
 from analyzer.night.nights import Plant, PlantLoop
 from analyzer.night.opened import opened
+from analyzer.night.request import asked_of
 from analyzer.store.store import Store
 from identification.errors import InputError, NotAssessedError
 from identification.models import Estimate, Loop, Pid, Process, Valve

@@ -16,7 +16,7 @@ from analyzer.loop.decisions import Lane
 from reports.texts import visible
 
 if TYPE_CHECKING:
-    from analyzer.night.asked import Asked
+    from analyzer.night.request import ExportRequest
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
@@ -41,7 +41,7 @@ def main() -> None:
 @main.command()
 @options.finding
 @options.export_options
-def check(asked: Asked) -> None:
+def check(asked: ExportRequest) -> None:
     """Check an export: loops, tags, gaps, quality, and the analyses that the data allow.
 
     Example: triage check export.csv --loops loops.csv
@@ -52,7 +52,7 @@ def check(asked: Asked) -> None:
     for line, bad in check_lines(asked):
         lost += bad
         click.echo(visible(line))  # one line, also if a tag contains control characters
-    sys.exit(options.SOME_LOST if lost else 0)
+    sys.exit(options.EXIT_SOME_FAILED if lost else 0)
 
 
 @main.command()
@@ -106,7 +106,7 @@ def rank(
 @options.DECIDED
 @options.formats("text", "json")
 @click.option("--out", type=options.FOLDER, help="Directory for pictures, and a page to simulate settings.")
-def tune(asked: Asked, tag: str, store: Path | None, form: str, out: Path | None) -> None:
+def tune(asked: ExportRequest, tag: str, store: Path | None, form: str, out: Path | None) -> None:
     """One loop: the night's decision, model, predicted limit cycle, new Kp and Ti, forecast, travel map.
 
     Example: triage tune export.parquet --loops loops.csv --loop LIC2107 --store store --out pictures

@@ -97,7 +97,7 @@ SETTINGS = (*_KEYS, *TABLES["compared"])
 """Columns of the table of compared settings: one row per loop."""
 GROUPS = (*_KEYS, *TABLES["group"])
 """Columns of the table of groups: one row per loop and group."""
-RESTING = tuple(
+REPLACED_BY_BELIEF = tuple(
     BY_NAME[name]
     for name in (
         *("osc_valve_pct", "osc_tuning_pct", "osc_load_pct", "cause", "valve_fault", "source_loop"),
@@ -106,7 +106,7 @@ RESTING = tuple(
     )
 )
 """Columns of a night's row based on all nights: a belief replaces them."""
-BELIEFS = (*_KEYS, *RESTING, *BELIEVED)
+BELIEFS = (*_KEYS, *REPLACED_BY_BELIEF, *BELIEVED)
 """Columns of the table of beliefs: one row per loop and night."""
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-NOTHING_DONE = 2
+EXIT_NOTHING_DONE = 2
 """Exit status of a program that could not start; Python's own would be 1, which means that a night was written."""
 
 
@@ -18,5 +18,5 @@ def main() -> None:
             f"triage: cannot start ({why}); expected all that it was installed with; install it again",
             file=sys.stderr,
         )
-        sys.exit(NOTHING_DONE)
+        sys.exit(EXIT_NOTHING_DONE)
     commands()

@@ -16,7 +16,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analyzer.belief.nights import settle, settle_anew
+from analyzer.belief.nights import recompute_beliefs, update_beliefs
 from analyzer.config import Config
 from analyzer.history.export import open_export
 from analyzer.loops.tags import match, read_loops
@@ -62,11 +62,11 @@ def main() -> None:
             night = (date(2026, 3, 2) + timedelta(days=k)).isoformat()
             store.write("nights", night, plant(rows, given.loops, night))
         started = time.perf_counter()
-        lost = settle_anew(store, Config())
+        lost = recompute_beliefs(store, Config())
         again_s = time.perf_counter() - started
         assert not lost
         started = time.perf_counter()
-        settle(store, night, Config())
+        update_beliefs(store, night, Config())
         last = time.perf_counter() - started
     publish(
         __file__,

@@ -21,7 +21,7 @@ import pyarrow.parquet as pq
 from analyzer.config import PlantLimits
 from analyzer.loop.decisions import Cause, Finding, Status
 from analyzer.plantwide.night import trace
-from analyzer.plantwide.wave import BESIDE, REACH, Wave, waves_in, waves_table
+from analyzer.plantwide.oscillation_lines import BESIDE, REACH, OscillationLines, waves_in, waves_table
 from proofs.common import command, parser_of, publish, table
 
 DAY_S = 86_400.0
@@ -45,18 +45,20 @@ def shape(rng: np.random.Generator, period: float) -> tuple[int, np.ndarray, np.
 
 def oscillation(
     rng: np.random.Generator, loop: str, period: float, shared: np.ndarray | None, own: bool
-) -> Wave:
+) -> OscillationLines:
     """One oscillation of a loop: noise, and a shared or an independent oscillation."""
     first, noise, mine = shape(rng, period)
     lines = noise + (shared if shared is not None else mine if own else 0.0)
     clear = 60.0 if own else 2.0
-    return Wave(loop, period, 1, own, 0.0, DAY_S, first, clear, 0.5, 0.1, lines.astype(np.complex64))
+    return OscillationLines(
+        loop, period, 1, own, 0.0, DAY_S, first, clear, 0.5, 0.1, lines.astype(np.complex64)
+    )
 
 
-def plant(loops: int, seed: int = 1) -> list[Wave]:
+def plant(loops: int, seed: int = 1) -> list[OscillationLines]:
     """Oscillations of a plant."""
     rng = np.random.default_rng(seed)
-    out: list[Wave] = []
+    out: list[OscillationLines] = []
     at = 0
     while at < loops:
         size = int(rng.integers(2, 41)) if rng.random() < GROUPED / 10 else 1

@@ -19,18 +19,18 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analyzer.belief.nights import settle_anew
+from analyzer.belief.nights import recompute_beliefs
 from analyzer.config import Config
 from analyzer.history.export import open_export
 from analyzer.loops.tags import match, read_loops
 from analyzer.night.chunk import Task, work
 from analyzer.night.finish import finish_night
 from analyzer.night.nights import Plant, nights_of
+from analyzer.plantwide.oscillation_lines import waves_in, waves_table
 from analyzer.plantwide.structure import moves_in, moves_table
-from analyzer.plantwide.wave import waves_in, waves_table
 from analyzer.store.draft import drafted
 from analyzer.store.store import Store
-from analyzer.store.table import KEPT, read_stored, tables_beside, write_table
+from analyzer.store.table import KEPT, further_tables, read_stored, write_table
 from benchmarks import Own, own_of
 from benchmarks.plant_night import DISTINCT, make, tenth
 from proofs.common import command, command_line, publish, table
@@ -61,7 +61,7 @@ def repeat(small: Store, of: str, big: Store, night: str, loops: int) -> None:
         if key == 0:
             turns = np.exp(2j * np.pi * rng.random(1 << 17))
             moved = int(rng.integers(50, 5000))
-        for name in (*tables_beside(small.part(of, "nights", keys[key])), "nights"):
+        for name in (*further_tables(small.part(of, "nights", keys[key])), "nights"):
             held = read_stored(small.part(of, name, keys[key])).slice(0)
             if name == "waves":
                 waves = (
@@ -157,7 +157,7 @@ def readings(small: Store, of: str, loops: int, nights: int, folder: Path) -> st
     for night in list(nights_from(of, nights))[1:]:
         for kept in KEPT:
             store.write(kept.name, night, (_moved(t, of, night) for t in store.parts_if_there(kept.name, of)))
-    settle_anew(store, Config())
+    recompute_beliefs(store, Config())
     place, rows, triage = str(store.path), [], [sys.executable, "-m", "analyzer.cli"]
     pages = ["pages", place, "--out", str(folder / "pages")]
     first = [*pages, "--top", "20"]

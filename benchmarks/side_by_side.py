@@ -23,7 +23,7 @@ from importlib.util import find_spec
 import numpy as np
 
 from analyzer.config import Config
-from analyzer.loop.identification.fit_data import window_of
+from analyzer.loop.identification.fit_data import problem_of
 from analyzer.loop.identification.measure import measure, time_scale
 from identification.estimation.backlash_stiction import fit_linear
 from identification.models import Backlash, Fopdt, Loop, Pid
@@ -92,8 +92,8 @@ def ours(made: Case) -> Model:
 
 def plain(made: Case) -> Model:
     """The process behind an ideal valve."""
-    window = window_of(made.record, time_scale(made.record, None, made.controller), Config().cause)
-    p = fit_linear(window, time_scale(made.record, None, made.controller)).process
+    problem = problem_of(made.record, time_scale(made.record, None, made.controller), Config().cause)
+    p = fit_linear(problem, time_scale(made.record, None, made.controller)).process
     return p.gain, p.time_constant_s, p.dead_time_s
 
 

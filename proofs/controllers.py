@@ -25,9 +25,9 @@ from analyzer.loop.identification.measure import time_scale
 from analyzer.loop.oscillation.detection import counting, detect
 from analyzer.loop.record.judged_stretch import controller_of, shown
 from analyzer.loop.record.quality import prepare
-from analyzer.loops.slips import slip
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import match, read_loops
+from analyzer.loops.typing_errors import typing_error
 from identification.models import Pid
 from proofs.common import command, command_line, publish, table
 from proofs.controllers_plant import FORMS, SCENES, Controlled, controlled
@@ -110,7 +110,7 @@ def judged(c: Controlled, every: int) -> Judged:
             stated = controller_of(spec, p)
             assert stated is not None
             seen = shown(p.record, stated, time_scale(p.record, cycle, stated), config.settings)
-            named = seen.other is not None and bool(slip(spec, seen.other, p.scale.span))
+            named = seen.other is not None and bool(typing_error(spec, seen.other, p.scale.span))
             off = None if seen.other is None else _off(seen.other, c.ideal)
             out.ways.append((what, seen.other is not None, named, off))
             if what == TRUE:

@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 
-from analyzer.finder.pair import LAW_TOLD, SURE_PCT, FoundPair
+from analyzer.finder.pair import LEAST_LAW_SHARE, SURE_PCT, FoundPair
 from analyzer.finder.pairs import found_pairs
 from analyzer.loops.spec import LoopSpec, read_loops
 from analyzer.loops.tags import controller
@@ -126,7 +126,7 @@ def _settings(pair: FoundPair, spec: LoopSpec, dt_s: float) -> Counter[str]:
     """Whether gain and integral time agree with the stated ones."""
     span = (spec.pv_hi or 100.0) - (spec.pv_lo or 0.0)
     pid = controller(spec, span)
-    if pid is None or pair.told < LAW_TOLD:
+    if pid is None or pair.law_share < LEAST_LAW_SHARE:
         return Counter()
     kp, ti = pair.kp * span / (spec.op_hi - spec.op_lo), (pair.ti_samples or 0.0) * dt_s
     near_ti = ti == pid.ti_s or abs(ti / pid.ti_s - 1) < NEAR

@@ -46,7 +46,7 @@ def _recording(folder: Path, tag: str) -> Recording:
     source, specs = plant.export, plant.specs
     spec = spec_of(specs, tag)
     series = source.read([*spec.tags, *(t for other in specs for t in other.tags)])
-    return case(spec, specs, series, DEFAULT).subject
+    return case(spec, specs, series, DEFAULT).recording
 
 
 @cache

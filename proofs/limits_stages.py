@@ -16,14 +16,14 @@ from analyzer.loop.advice.advise import advise
 from analyzer.loop.assess import assess, cause_of, verdict_by_measures
 from analyzer.loop.cause.dead_valve import dead_valve
 from analyzer.loop.cause.fitness import at_limits
-from analyzer.loop.decisions import Finding, SignKind, Status, Swing
+from analyzer.loop.decisions import Finding, OscillationFigures, SignKind, Status
 from analyzer.loop.oscillation.detection import counting, detect, subthreshold_period
 from analyzer.loop.oscillation.figures import assess_span
 from analyzer.loop.record.judged_stretch import differing
 from analyzer.loop.record.quality import prepare
 from analyzer.loops.changes import behaviour_change
 from analyzer.plantwide.night import followers_of, following, likely, swing_of, trace
-from analyzer.plantwide.wave import waves_of
+from analyzer.plantwide.oscillation_lines import error_lines_of
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
 from identification.record import LoopRecord
 from proofs.limits_samples import (
@@ -149,12 +149,12 @@ def of_plant(c: Config) -> list[Any]:
     out: list[Any] = []
     for loops in plants():
         by_name = {x.name: x for x in loops}
-        oscillations = [w for x in loops for w in waves_of(x.name, x.found, x.end_s, c.plant)]
+        oscillations = [w for x in loops for w in error_lines_of(x.name, x.found, x.end_s, c.plant)]
         traced = trace(oscillations, {x.name: x.peer for x in loops}, c.plant)
         out += [(t.group.loops, t.source, tuple(likely(t, c.plant))) for t in traced]
         for loop, (source, oscillation) in sorted(followers_of(traced).items()):
             first = counting(by_name[loop].found)
-            swing = Swing(0.0, first.oscillating_pct) if first else Swing()
+            swing = OscillationFigures(0.0, first.oscillating_pct) if first else OscillationFigures()
             own, known = by_name[loop].confidence, {"usable_h": 8.0}
             alone = Finding(loop, "", Status.OK, swing=swing, confidence=own, known=known)
             sure = following(alone, source, swing, (SignKind.FOLLOWS, ()), c.plant).confidence

@@ -23,7 +23,7 @@ from analyzer import api
 from analyzer.explain.case import case, tags_of
 from analyzer.explain.explained import explained
 from identification.errors import NotAssessedError
-from identification.mismatch.plain_loop import inputs_of, prepared
+from identification.mismatch.baseline import inputs_of, prepared
 from identification.mismatch.proof import HeldOut, held_out
 from identification.mismatch.recording import Recording
 from identification.record import Floats
@@ -110,7 +110,7 @@ def of_recording(path: Path) -> tuple[str, float | None]:
         e = explained(c, lambda _: None)
     except NotAssessedError:
         return path.stem, None
-    return path.stem, ratio(e.found.proven, c.subject.pv, c.subject.op)
+    return path.stem, ratio(e.found.proven, c.recording.pv, c.recording.op)
 
 
 def summary(name: str, ratios: list[float]) -> list[str]:

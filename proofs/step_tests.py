@@ -18,7 +18,7 @@ from scipy.special import erf
 from analyzer.config import Config
 from analyzer.history.series import Series
 from analyzer.loop.decisions import LacksError
-from analyzer.loop.experiments.found import learned
+from analyzer.loop.experiments.found import experiment_results
 from analyzer.loop.record.quality import prepare
 from analyzer.loops.spec import LoopSpec
 from proofs.step_test_plant import Truth, best_scatter, drawn, recorded
@@ -57,7 +57,7 @@ def tested(seed: int) -> tuple[Truth, list[Constant]]:
     spec = LoopSpec("T", pv="T.PV", op="T.OP", pv_lo=0.0, pv_hi=100.0)
     config = Config()
     try:
-        found = learned(spec, series, prepare(spec, series, config.quality), config)
+        found = experiment_results(spec, series, prepare(spec, series, config.quality), config)
     except LacksError:  # a test too short for a record
         found = None
     model = None if found is None else found.model

@@ -393,14 +393,14 @@ class Section:
     closed: bool = False
 
 
-def there(*parts: T | None) -> tuple[T, ...]:
+def without_none(*parts: T | None) -> tuple[T, ...]:
     """The given parts of a page, without those that are None."""
     return tuple(part for part in parts if part is not None)
 
 
 def section(title: str, *blocks: Block | None, closed: bool = False) -> Section | None:
     """A section of the given blocks, without those that are None; None if empty."""
-    shown: tuple[Block, ...] = there(*blocks)
+    shown: tuple[Block, ...] = without_none(*blocks)
     return Section(title, shown, closed) if shown else None
 
 

@@ -89,7 +89,7 @@ def sliding(amplitude: ArrayLike, stickband: float, slip_jump: float) -> Complex
     return np.where(a > 0.5 * stickband, 2.0 / (np.pi * a) * (rest + follow), 0.0)
 
 
-def is_play(valve: Valve) -> bool:
+def is_backlash(valve: Valve) -> bool:
     """Whether the valve has backlash, or stick-slip with a negligible jump."""
     return isinstance(valve, Backlash) or (
         isinstance(valve, Stiction) and valve.slip_jump <= PLAY_JUMP_SHARE * valve.stickband
@@ -114,12 +114,12 @@ def scaled_valve(valve: Valve, factor: float) -> Valve:
 
 def moves_by_jumps(valve: Valve) -> bool:
     """Whether the stem moves only by whole jumps, and so has a describing function for each number of them."""
-    return isinstance(valve, Stiction) and valve.motion is Motion.RESTS and not is_play(valve)
+    return isinstance(valve, Stiction) and valve.motion is Motion.RESTS and not is_backlash(valve)
 
 
 def describing_function(valve: Backlash | Stiction, amplitude: ArrayLike, jumps: int = 1) -> Complexes:
     """N(A) of a faulty valve at amplitudes [% OP] of any shape; `jumps` per half cycle if it moves by jumps."""
-    if isinstance(valve, Backlash) or is_play(valve):
+    if isinstance(valve, Backlash) or is_backlash(valve):
         return backlash(amplitude, band(valve))
     if valve.motion is not Motion.RESTS:
         return sliding(amplitude, valve.stickband, valve.slip_jump)
@@ -193,7 +193,7 @@ def branches(valve: Valve) -> tuple[Branch, ...]:
     width = band(valve)
     if valve is None or width <= 0.0:
         return ()
-    if isinstance(valve, Backlash) or is_play(valve):
+    if isinstance(valve, Backlash) or is_backlash(valve):
         return (_play_branch(width),)
     if valve.motion is not Motion.RESTS:
         amplitude = width / (1.0 + np.cos(np.linspace(0.0, np.pi, TABLE_SIZE + 1)[:-1]))

@@ -15,7 +15,7 @@ import numpy as np
 
 from identification.models import Loop
 from identification.record import Floats, Mask
-from tuning.describing import Branch, Complexes, band, branches, curve, is_play
+from tuning.describing import Branch, Complexes, band, branches, curve, is_backlash
 from tuning.frequency_response import controller_response, frequencies, loop_response, spaced, stable_gains
 
 POLISH_STEPS = 6
@@ -226,6 +226,6 @@ def travel_map(loop: Loop, kp: Floats, ti_s: Floats) -> TravelMap:
         ti_s,
         travel=np.where(cycles, amplitude, 0.0) / np.where(cycles, period, 1.0),
         period_s=period,
-        rests=~cycles & stable & (band(loop.valve) <= 0.0 or is_play(loop.valve)),
+        rests=~cycles & stable & (band(loop.valve) <= 0.0 or is_backlash(loop.valve)),
         unstable=~stable,
     )

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from importlib.resources import files
 
 from identification.models import Backlash, Integrator, Loop, Pid
-from tuning.describing import band, is_play
+from tuning.describing import band, is_backlash
 from tuning.frequency_response import integral_s
 from tuning.limit_cycle import Confirmed, Cycle
 from tuning.search import (
@@ -44,7 +44,7 @@ def fault_told(loop: Loop) -> str:
     width = band(loop.valve)
     return (
         f"backlash of {width:.2g} %"
-        if is_play(loop.valve)
+        if is_backlash(loop.valve)
         else f"stick-slip with a stickband of {width:.2g} %"
     )
 
@@ -73,7 +73,7 @@ def why_calmer(best: Candidate, before: Confirmed, after: Confirmed, ms_before: 
         error=percent_text(best.error),
         peak=peaks[0] / peaks[1],
     )
-    if not is_play(loop.valve):
+    if not is_backlash(loop.valve):
         return f"{why} {WHY['stick_slip_stays']}"
     if isinstance(loop.process, Integrator):
         return f"{why} {WHY['play_always_cycles']}"

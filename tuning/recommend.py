@@ -16,7 +16,7 @@ from identification.models import Fopdt, Loop, Pid, Process
 from identification.record import Floats
 from identification.simulation.closed_loop import scan_step
 from tuning import Action, Cause
-from tuning.describing import band, is_play
+from tuning.describing import band, is_backlash
 from tuning.first_step import calmest, steps
 from tuning.forecast import in_digits
 from tuning.frequency_response import integral_s, maximum_sensitivity, rejects_s, resonance_s
@@ -384,7 +384,7 @@ def _confirmed(
     worth = [c for c in candidates if _worth(c, first.controller, limits)]
     worthy = _apart(worth, limits.apart)[: limits.confirmed]
     samples = [(one, confirm(one)) for one in table.loops[1 : 1 + limits.samples_confirmed]] if worthy else []
-    growth = limits.cycle_growth if is_play(first.valve) else limits.cycle_growth_stick
+    growth = limits.cycle_growth if is_backlash(first.valve) else limits.cycle_growth_stick
     for candidate in worthy:
         after = confirm(replace(table.loops[0], controller=candidate.controller))
         if _smaller(after, before, growth) and all(

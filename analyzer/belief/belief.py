@@ -71,7 +71,7 @@ class NightDecision:
 
 
 @dataclass(frozen=True, slots=True)
-class Calm:
+class NightFigures:
     """Figures of a loop in its last night under some settings: significance [% h], share [%] and period [s] of its
     oscillation, amplitude of PV and average absolute error [% of span]."""
 
@@ -102,8 +102,8 @@ class Belief:
     remedy: RemedyBelief = field(default_factory=RemedyBelief)
     constants: Mapping[str, Pool] = field(default_factory=dict)
     widths: tuple[Width, ...] = ()
-    before: Calm | None = None
-    last: Calm | None = None
+    before: NightFigures | None = None
+    last: NightFigures | None = None
     told: NightDecision = field(default_factory=NightDecision)
     straight_pct: float | None = None
     recorder: str = ""
@@ -175,17 +175,17 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], config: C
     done = cycle.remedy_with_night(RemedyBelief() if ended else now.remedy, share, row, limits)
     size, share_pct = float(row["oscillation_significance"] or 0.0), float(row["oscillating_pct"])
     sizes = row["period_s"], row["pv_amplitude_pct"], row["average_absolute_error_pct"]
-    seen = Calm(row["night"], size, share_pct, *sizes)
+    seen = NightFigures(row["night"], size, share_pct, *sizes)
     phases = with_repetitions(now.phases, row, REPETITIONS)
     now = replace(now, night=row["night"], end_s=_span(row)[1], remedy=done, last=seen, phases=phases)
-    return replace(now, kp=row["kp"], ti=row["ti"], told=tell(now, row, limits))
+    return replace(now, kp=row["kp"], ti=row["ti"], told=night_decision(now, row, limits))
 
 
 def _with_constants(now: Belief, row: Row, limits: BeliefLimits) -> Belief:
     """The belief with the constants of an experiment, from a night without other results."""
     share = valve.faded_over(now.night, row["night"], limits) if now.night else 1.0
     constants = {k: pool.faded(share) for k, pool in now.constants.items()}
-    said = said_of(row) or {}
+    said = evidence_of(row) or {}
     for name in set(CONSTANTS) & said.keys():
         value, deviation = said[name]
         pool = constants.get(name, Pool())
@@ -234,7 +234,7 @@ def _with_witness(now: Belief, share: float, row: Row, repaired_s: Sequence[floa
     start_s, end_s = _span(row)
     mixed = any(start_s < at < end_s for at in repaired_s)
     constants = {k: pool.faded(share) for k, pool in now.constants.items()}
-    said, limits = None if mixed else said_of(row), config.belief
+    said, limits = None if mixed else evidence_of(row), config.belief
     if said is None:
         return replace(now, constants=constants)
     wrong = valve.doubt(said, now.cycle.cause, counts(row["oscillating_pct"]), config)
@@ -253,7 +253,7 @@ def _with_witness(now: Belief, share: float, row: Row, repaired_s: Sequence[floa
     return replace(now, valve=replace(found, certain=certain), constants=constants, widths=widths)
 
 
-def said_of(row: Row) -> Witness | None:
+def evidence_of(row: Row) -> Witness | None:
     """Results of a night on valve and process; for a night of an earlier version from the fault in its row."""
     if row["witness"]:
         return json.loads(row["witness"])  # type: ignore[no-any-return]
@@ -266,7 +266,7 @@ def said_of(row: Row) -> Witness | None:
     return {"profile": profile, "needed": NEEDED, "op_range": width, "jump": jump, "width": [width, EARLIER]}
 
 
-def tell(now: Belief, row: Row, limits: BeliefLimits) -> NightDecision:
+def night_decision(now: Belief, row: Row, limits: BeliefLimits) -> NightDecision:
     """The decision on a loop in a night, from the belief including that night."""
     own = _own(row)
     alone = now.cycle.nights == 1 and now.valve.nights <= 1
@@ -274,11 +274,11 @@ def tell(now: Belief, row: Row, limits: BeliefLimits) -> NightDecision:
     dead = own.cause is Cause.VALVE and own.fault is Fault.UNDECIDED and not cycles
     told = own if alone or dead else (_of_cycle if cycles else _of_calm)(now, own, limits)
     if cycles and told.cause is Cause.VALVE and now.is_calmed(limits):
-        told = _left_alone(told)
+        told = _without_new_settings(told)
     return replace(told, own=GIST(told) == GIST(own))
 
 
-def _left_alone(told: NightDecision) -> NightDecision:
+def _without_new_settings(told: NightDecision) -> NightDecision:
     """Decision for a loop with a worn valve whose cycle became much smaller after a change of settings. It
     has no further settings; the repair is due at the next shutdown."""
     if not action.is_urgent(told.action, told.due):

@@ -10,7 +10,7 @@ from hashlib import blake2b
 from itertools import pairwise
 
 from analyzer.config import Config
-from analyzer.places import content
+from analyzer.locations import content
 from analyzer.store.store import SCHEMA, Store
 from analyzer.store.table import mark_of
 

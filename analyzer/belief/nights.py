@@ -19,7 +19,7 @@ from analyzer.columns import names as names_of
 from analyzer.config import Config
 from analyzer.loop.decisions import CAUSES, Lane
 from analyzer.store import notes
-from analyzer.store.care import Problem
+from analyzer.store.maintenance import Problem
 from analyzer.store.store import Store
 from analyzer.store.table import DamagedError, marked, rows_table
 from analyzer.words import belief as words
@@ -49,7 +49,7 @@ class UnreadableError(Exception):
     """Beliefs of a night are damaged, missing, or of another version."""
 
 
-def settle(store: Store, night: str, config: Config) -> list[str]:
+def update_beliefs(store: Store, night: str, config: Config) -> list[str]:
     """Write the beliefs of a night and of all after it, and of any earlier one without; return sentences on loops
     that failed."""
     names = store.nights()
@@ -58,7 +58,7 @@ def settle(store: Store, night: str, config: Config) -> list[str]:
     try:
         return _write_all(store, names[len(earlier) :], earlier[-1] if earlier else None, config)
     except UnreadableError:
-        return settle_anew(store, config)
+        return recompute_beliefs(store, config)
 
 
 def held_pairs(store: Store, night: str) -> dict[str, Held]:
@@ -75,13 +75,13 @@ def held_pairs(store: Store, night: str) -> dict[str, Held]:
     return out
 
 
-def settle_anew(store: Store, config: Config) -> list[str]:
+def recompute_beliefs(store: Store, config: Config) -> list[str]:
     """Recompute all beliefs of a store from its nights; return sentences as in `settle`."""
     names = store.nights()
     return _write_all(store, names, names[0] if names else None, config)
 
 
-def unfounded(store: Store, config: Config) -> list[Problem]:
+def inconsistent_beliefs(store: Store, config: Config) -> list[Problem]:
     """Beliefs of a store that do not follow from its nights; empty if a table of nights is damaged, or an earlier
     version stored no beliefs."""
     if not store.files("beliefs"):

@@ -40,13 +40,13 @@ def wear(widths: Sequence[Width], limits: WearLimits) -> dict[str, Any] | None:
     days = np.array([date.fromisoformat(night).toordinal() for night, _, _ in widths], dtype=np.float64)
     width = np.array([w for _, w, _ in widths])
     deviation = width * np.array([max(s, limits.least_deviation) for _, _, s in widths])
-    at = bend(days, width, deviation, limits)
+    at = change_point(days, width, deviation, limits)
     if at is None:
         return None
     return _wear_forecast(days[days >= at], width[days >= at], limits)
 
 
-def bend(days: Floats, width: Floats, deviation: Floats, limits: WearLimits) -> float | None:
+def change_point(days: Floats, width: Floats, deviation: Floats, limits: WearLimits) -> float | None:
     """The day from which a width, or another figure, grows; None if a line with one bend fits no better than
     a constant. Days, figure and its standard deviation are of shape (n,)."""
     weight = 1.0 / deviation
@@ -162,7 +162,7 @@ def growth(phase: PhaseKnown, limits: WearLimits) -> Growth | None:
     if len(phase.shown) < limits.nights:
         return None
     number, start, size = (np.array(x, dtype=np.float64) for x in zip(*phase.shown, strict=True))
-    at = bend(number, size, np.full(size.size, limits.overshoot_deviation), limits)
+    at = change_point(number, size, np.full(size.size, limits.overshoot_deviation), limits)
     if at is None:
         return None
     some = int(limits.growing_nights)

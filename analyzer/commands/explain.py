@@ -13,9 +13,9 @@ import click
 
 from analyzer.commands.options import (
     DECIDED,
+    EXIT_NOTHING_DONE,
     FILE,
     FOLDER,
-    NOTHING_DONE,
     PLACE,
     decision_of,
     export_options,
@@ -28,7 +28,7 @@ from analyzer.loop.decisions import decided_fault
 from identification.errors import NotAssessedError
 
 if TYPE_CHECKING:
-    from analyzer.night.asked import Asked
+    from analyzer.night.request import ExportRequest
     from reports.pages import Page
 
 
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     help="Folder for the page and Markdown's pictures. Default: HTML for a terminal goes here.",
 )
 def explain(
-    asked: Asked,
+    asked: ExportRequest,
     tag: str,
     store: Path | None,
     model: Path | None,
@@ -74,16 +74,16 @@ def explain(
     decision = None
     try:
         with trying() as tell:
-            brought = read_model(model, tag) if model is not None else None
+            user_model = read_model(model, tag) if model is not None else None
             plant = guarded(asked)
             decision = decision_of(plant, tag, store)
             case, others = asked_cases(asked, plant, tag, held_out, decided_fault(decision))
-            found = explained(case, tell, brought, others)
+            found = explained(case, tell, user_model, others)
     except NotAssessedError as error:
         data = with_night(abstained(tag, str(error)), decision)
         _show(data, lambda: abstention(data), form, out)
         click.echo(f"triage: {error}", err=True)
-        sys.exit(NOTHING_DONE)
+        sys.exit(EXIT_NOTHING_DONE)
     found = replace(found, data=with_night(found.data, decision))
     if save_model is not None:
         save_model.write_text(json.dumps(found.model(), indent=1))
@@ -121,7 +121,7 @@ def _show(data: dict[str, Any], page: Callable[[], Page], form: str, out: Path |
 @click.option(
     "--closed-loop", is_flag=True, help="Run the stated controller from SP instead of the recorded OP."
 )
-def simulate(model: Path, asked: Asked, tag: str, out: Path, closed_loop: bool) -> None:
+def simulate(model: Path, asked: ExportRequest, tag: str, out: Path, closed_loop: bool) -> None:
     """Simulate a saved model on another recording of its loop; only a constant bias is fitted.
 
     Example: triage simulate model.json week2.parquet --loops loops.csv --loop FIC101 --out week2-sim.parquet

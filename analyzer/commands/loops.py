@@ -10,7 +10,7 @@ import click
 from analyzer.commands.options import bar, export_options, say
 
 if TYPE_CHECKING:
-    from analyzer.night.asked import Asked
+    from analyzer.night.request import ExportRequest
 
 
 @click.command()
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     type=click.Path(dir_okay=False, path_type=Path),
     help="File that the draft is written to. Default: stdout.",
 )
-def loops(asked: Asked, out: Path | None) -> None:
+def loops(asked: ExportRequest, out: Path | None) -> None:
     """Write a draft of loops.csv: the loops of an export, found by their tags' names and by the data.
 
     Loops stated with --loops are kept. A loop with low confidence is written after a #, with the evidence for it.

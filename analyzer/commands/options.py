@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.places import is_outage, place, refused
+from analyzer.locations import is_outage, place, refused
 from identification.errors import InputError, NotAssessedError, TriageError
 from reports.texts import visible, visible_lines
 from reports.whole_file import is_full
@@ -32,7 +32,7 @@ OLD_D = 7.0
 accident."""
 
 Command = Callable[..., Any]
-SOME_LOST, NOTHING_DONE, AGAIN = 1, 2, 75
+EXIT_SOME_FAILED, EXIT_NOTHING_DONE, EXIT_TRY_LATER = 1, 2, 75
 """Exit status if some loops failed, if nothing could be done, and if a run ended because shared storage
 failed. After the last one the same command may succeed later (EX_TEMPFAIL of sysexits)."""
 MOST_SAID = 600
@@ -61,7 +61,7 @@ class OneLineErrors(click.Group):
             if line is None and sys.flags.dev_mode:
                 raise
             click.echo(f"triage: {line or unforeseen(error)}", err=True)
-        sys.exit(NOTHING_DONE)
+        sys.exit(EXIT_NOTHING_DONE)
 
 
 def what_went_wrong(error: Exception) -> str | None:
@@ -239,7 +239,7 @@ def export_options(command: Command) -> Command:
         export: tuple[Path, ...], loops: Path | None, changes: Path | None, config: Path | None, **given: Any
     ) -> Any:
         from analyzer.config import read_config
-        from analyzer.night.asked import asked_of
+        from analyzer.night.request import asked_of
 
         reading = {name: given.pop(name) for name in ("since", "until", *names)}
         reading["finding"] = given.pop("finding", False)

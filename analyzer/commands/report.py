@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from analyzer.commands import options
-from analyzer.commands.options import FILE, FOLDER, SOME_LOST, Command, opened_store, say
+from analyzer.commands.options import EXIT_SOME_FAILED, FILE, FOLDER, Command, opened_store, say
 from identification.errors import InputError
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def report(
     write(kept, [page], form, single_file, out)
     for tag, reason in missing:
         say(f"{tag}: {reason}", err=True)
-    sys.exit(SOME_LOST if missing else 0)
+    sys.exit(EXIT_SOME_FAILED if missing else 0)
 
 
 def _span_given(texts: Sequence[str] | None, option: str, zone: str) -> Span | None:
@@ -179,13 +179,13 @@ def pages(
     def page_of(night: str) -> Path:
         return out / f"{night_pages.name_of(night)}.html"
 
-    def stands(night: str) -> bool:
+    def is_up_to_date(night: str) -> bool:
         """Whether a night's dated page was written after its results."""
         page, results = page_of(night), kept.file("nights", night)
         return page.exists() and page.stat().st_mtime > results.stat().st_mtime
 
     found = night_pages.pages_of_night(kept, night, top)
-    dated = night_pages.dated_pages(kept, night, stands) if form == "html" else ()
+    dated = night_pages.dated_pages(kept, night, is_up_to_date) if form == "html" else ()
     written = write(kept, chain(found, dated), form, single_file, out)
     if form == "html":
         forget_stale(out, written, kept_names={page_of(night).name for night in kept.nights()})

@@ -22,10 +22,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from analyzer.commands.options import (
-    AGAIN,
-    NOTHING_DONE,
+    EXIT_NOTHING_DONE,
+    EXIT_SOME_FAILED,
+    EXIT_TRY_LATER,
     PLACE,
-    SOME_LOST,
     age_told,
     bar,
     export_options,
@@ -41,9 +41,9 @@ from reports.texts import visible
 from reports.whole_file import is_full
 
 if TYPE_CHECKING:
-    from analyzer.night.asked import Asked
     from analyzer.night.batch import Outcome
     from analyzer.night.nights import Night, Plant
+    from analyzer.night.request import ExportRequest
     from analyzer.store.store import Store
 
 STOPPED = 128
@@ -142,7 +142,7 @@ def stoppable() -> Iterator[None]:
     help="File to which each event is appended as a line.",
 )
 @click.option("--explain", "explaining", is_flag=True, help="Explain the last night's flagged loops as well.")
-def run(asked: Asked, store: Path, log_file: Path | None, explaining: bool, **how: Any) -> None:
+def run(asked: ExportRequest, store: Path, log_file: Path | None, explaining: bool, **how: Any) -> None:
     """The nightly batch: assess every loop and keep the results in a store.
 
     An export of several days is split by day; new settings are advised for the last day. A second export of a night
@@ -172,24 +172,24 @@ def run(asked: Asked, store: Path, log_file: Path | None, explaining: bool, **ho
             what_went_wrong(error) or unforeseen(error),
             _may_answer_again(error, (store, *asked.export)),
         )
-        log.say("nothing done", error=said, status=AGAIN if again else NOTHING_DONE)
+        log.say("nothing done", error=said, status=EXIT_TRY_LATER if again else EXIT_NOTHING_DONE)
         if again:
             why = said.partition("; ")[0]
             why = why if "://" in why else f"{store}: {why}"
             say(f"triage: {why}; the storage failed for minutes: {_go_on(store)}", err=True)
-            sys.exit(AGAIN)
+            sys.exit(EXIT_TRY_LATER)
         if isinstance(error, OSError) and is_full(error):
             raise InputError(what_failed(error), "room to write", f"make room; {_go_on(store)}") from error
         raise
-    lost = NOTHING_DONE if len(outcome.failed) + len(outcome.unassessed) == loops else SOME_LOST
-    status = lost if outcome.failed or lost == NOTHING_DONE else 0
+    lost = EXIT_NOTHING_DONE if len(outcome.failed) + len(outcome.unassessed) == loops else EXIT_SOME_FAILED
+    status = lost if outcome.failed or lost == EXIT_NOTHING_DONE else 0
     log.say("end", status=status, night=outcome.nights[-1].name, seconds=time.monotonic() - begun_s)
     sys.exit(status)
 
 
-def _for_all_workers(asked: Asked, store: Path, scheduler: str | None) -> Asked:
+def _for_all_workers(asked: ExportRequest, store: Path, scheduler: str | None) -> ExportRequest:
     """The request in a form valid for remote workers. Raises InputError if their store would be a different one."""
-    from analyzer.places import is_remote
+    from analyzer.locations import is_remote
 
     if scheduler is None:
         return asked
@@ -203,7 +203,7 @@ def _for_all_workers(asked: Asked, store: Path, scheduler: str | None) -> Asked:
 
 def _may_answer_again(error: Exception, places: Sequence[Path]) -> bool:
     """Whether a run ends because shared storage failed temporarily."""
-    from analyzer.places import is_outage, is_remote
+    from analyzer.locations import is_outage, is_remote
 
     return any(map(is_remote, places)) and is_outage(error)
 
@@ -213,7 +213,7 @@ def _go_on(store: Path) -> str:
 
 
 def _run_night(
-    asked: Asked, place: Path, log: RunLog, explaining: bool, how: Mapping[str, Any]
+    asked: ExportRequest, place: Path, log: RunLog, explaining: bool, how: Mapping[str, Any]
 ) -> tuple[Outcome, int]:
     """Read the export, assess it with the options `how` of analyzer/night/batch.py and, if requested, explain it;
     return the outcome and the number of loops."""

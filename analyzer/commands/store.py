@@ -11,9 +11,9 @@ import click
 
 from analyzer.commands.options import (
     CONFIG,
+    EXIT_SOME_FAILED,
     NIGHT,
     PLACE,
-    SOME_LOST,
     STORE,
     age_told,
     formats,
@@ -56,18 +56,18 @@ def check_store(path: Path, config: Path | None) -> None:
 
     Example: triage store check store
     """
-    from analyzer.belief.nights import unfounded
+    from analyzer.belief.nights import inconsistent_beliefs
     from analyzer.config import read_config
-    from analyzer.store import care as store_care
+    from analyzer.store import maintenance
     from analyzer.store.store import Store
 
     kept, limits = Store(path), read_config(config)
     found = 0
-    for problem in (*store_care.problems(kept), *unfounded(kept, limits)):
+    for problem in (*maintenance.problems(kept), *inconsistent_beliefs(kept, limits)):
         found += 1
         click.echo(f"{problem.seen}: {problem.remedy}")
-    click.echo(f"{path}: {store_care.size_text(kept)}; " + (f"problems: {found}" if found else "no problem"))
-    sys.exit(SOME_LOST if found else 0)
+    click.echo(f"{path}: {maintenance.size_text(kept)}; " + (f"problems: {found}" if found else "no problem"))
+    sys.exit(EXIT_SOME_FAILED if found else 0)
 
 
 @store.command()
@@ -80,13 +80,13 @@ def prune(path: Path, keep: str, keep_trends: str | None, dry_run: bool) -> None
 
     Example: triage store prune store --keep 400d --keep-trends 90d
     """
-    from analyzer.store import care as store_care
+    from analyzer.store import maintenance
     from analyzer.store.lock import locked
 
     kept = opened_store(path)
     detail = None if keep_trends is None else days(keep_trends, "--keep-trends")
     with locked(path):
-        gone = store_care.pruned(kept, days(keep, "--keep"), detail, dry_run)
+        gone = maintenance.pruned(kept, days(keep, "--keep"), detail, dry_run)
     done = "would be deleted" if dry_run else "deleted"
     for file in gone[:SHOWN]:
         click.echo(f"{done}: {file.relative_to(path)}")
@@ -105,17 +105,17 @@ def beliefs(path: Path, config: Path | None) -> None:
 
     Example: triage store beliefs store
     """
-    from analyzer.belief.nights import settle_anew
+    from analyzer.belief.nights import recompute_beliefs
     from analyzer.config import read_config
     from analyzer.store.lock import locked
 
     kept = opened_store(path)
     with locked(path):
-        lost = settle_anew(kept, read_config(config))
+        lost = recompute_beliefs(kept, read_config(config))
     for line in lost:
         click.echo(line)
     click.echo(f"{path}: beliefs of {len(kept.nights())} nights computed again")
-    sys.exit(SOME_LOST if lost else 0)
+    sys.exit(EXIT_SOME_FAILED if lost else 0)
 
 
 @click.command()

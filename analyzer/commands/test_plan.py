@@ -10,14 +10,14 @@ import click
 from analyzer.commands.options import PLACE, export_options, of_loop, say
 
 if TYPE_CHECKING:
-    from analyzer.night.asked import Asked
+    from analyzer.night.request import ExportRequest
 
 
 @click.command(name="test-plan")
 @export_options
 @of_loop("The loop to test.")
 @click.option("--store", type=PLACE, help="Store whose nights describe the loop.")
-def test_plan(asked: Asked, tag: str, store: Path | None) -> None:
+def test_plan(asked: ExportRequest, tag: str, store: Path | None) -> None:
     """The step test for the unknown parameters of a loop: size, levels, times, and expected precision.
 
     Example: triage test-plan export.parquet --loops loops.csv --loop TIC2106 --store store

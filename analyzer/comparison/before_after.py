@@ -107,8 +107,8 @@ def reasons_of_load(
 ) -> list[str]:
     """Differences between two spans that tuning of the loop cannot cause: noise, load, an external oscillation."""
     found, sides = [], (weeks.before, weeks.after)
-    if abs(weeks.louder_db) > limits.noise_db:
-        found.append(f"different noise: {10 ** (weeks.louder_db / 20):.2g} times as large after")
+    if abs(weeks.noise_increase_db) > limits.noise_db:
+        found.append(f"different noise: {10 ** (weeks.noise_increase_db / 20):.2g} times as large after")
     a, b = (
         _moves_of_load(*(gridded(hours, span, x) for x in ("op_mean_pct", "sp_mean_pct"))) for span in spans
     )

@@ -97,18 +97,18 @@ class Weeks:
         return self.old == self.new and not self.repaired
 
     @property
-    def louder_db(self) -> float:
+    def noise_increase_db(self) -> float:
         """Increase of PV's fastest noise after the change [dB]."""
         before, after = (float(np.median([n.noise_db for n in side])) for side in (self.before, self.after))
         return after - before
 
     @property
-    def cured(self) -> bool:
+    def fault_removed(self) -> bool:
         """Whether the fault of a valve was removed: most nights before the change show it, and few nights
         after it. A night with a cycle after the change counts as one with the fault, because a cycle hides
         it."""
-        was = sum(n.worn_alone for n in self.before) / len(self.before)
-        is_now = sum(n.worn_alone or n.cycles for n in self.after) / len(self.after)
+        was = sum(n.faulty_this_night for n in self.before) / len(self.before)
+        is_now = sum(n.faulty_this_night or n.cycles for n in self.after) / len(self.after)
         return any(n.at_fault for n in self.before) and was > 0.5 and is_now <= 0.5 * was
 
 
@@ -304,5 +304,5 @@ def weeks_of(
     if pids[0] is None or pids[1] is None:
         return None
     weeks = Weeks(nights[0], nights[1], pids[0], pids[1])
-    quiet = abs(weeks.louder_db) <= limits.noise_db  # strong noise moves a stem within its backlash
-    return replace(weeks, repaired=pids[0] == pids[1] and quiet and weeks.cured)
+    quiet = abs(weeks.noise_increase_db) <= limits.noise_db  # strong noise moves a stem within its backlash
+    return replace(weeks, repaired=pids[0] == pids[1] and quiet and weeks.fault_removed)

@@ -23,12 +23,13 @@ from identification.signals.spectrum import PEAK_BAND
 class LoopNight:
     """Results of one night for a loop.
 
-    constants, logs of slope [%/(% s)], time constant and dead time [s], and deviations of the logs, shape (3,) each,
-    None without a fit; sign, of the slope; width, jump, of the valve's fault [% OP]; at_fault, whether it has one by
-    all nights, and worn_alone by this one; cycle_s, period of a cycle caused by the valve [s], 0 for none; frequency
-    [Hz] and level [dB of % PV per line], shape (b,), of the error without the part explained by the set point;
-    duration_s; error [% PV], its recorded average; op_travel [%/h]; moves [1/h] and their size [% PV] of the set
-    point; from_outside, whether a load's cycle was found; cycles, whether the loop cycles at all.
+    constants, logs of slope [%/(% s)], time constant and dead time [s], and deviations of the logs, shape (3,)
+    each, None without a fit; sign, of the slope; width, jump, of the valve's fault [% OP]; at_fault, whether it
+    has one by all nights, and faulty_this_night by this one; cycle_s, period of a cycle caused by the valve [s], 0
+    for none; frequency [Hz] and level [dB of % PV per line], shape (b,), of the error without the part explained
+    by the set point; duration_s; error [% PV], its recorded average; op_travel [%/h]; moves [1/h] and their size
+    [% PV] of the set point; from_outside, whether a load's cycle was found; cycles, whether the loop cycles at
+    all.
     """
 
     constants: tuple[Floats, Floats] | None
@@ -36,7 +37,7 @@ class LoopNight:
     width: float
     jump: float
     at_fault: bool
-    worn_alone: bool
+    faulty_this_night: bool
     cycle_s: float
     frequency: Floats
     level: Floats

@@ -24,7 +24,7 @@ from analyzer.loop.assess import judged_where
 from analyzer.loop.cause.fitness import at_limits, pv_that_jumps
 from analyzer.loop.cause.verdict import NO_CAUSE, Verdict
 from analyzer.loop.decisions import Cause, Fault
-from analyzer.loop.experiments.found import Learned, learned
+from analyzer.loop.experiments.found import ExperimentResults, experiment_results
 from analyzer.loop.identification.intervals import intervals
 from analyzer.loop.identification.measure import time_scale
 from analyzer.loop.oscillation.cycling_span import detect_where_it_cycles
@@ -35,9 +35,9 @@ from analyzer.loop.record.sample_clock import onto_clock, snapped
 from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import controller
-from analyzer.night.asked import ALWAYS, Asked
 from analyzer.night.nights import Night, Plant, cut
 from analyzer.night.opened import guarded
+from analyzer.night.request import ALWAYS, ExportRequest
 from identification.controller.check import StatedSettings
 from identification.errors import InputError, NotAssessedError
 from identification.estimation.evidence import trials_between_moves
@@ -70,9 +70,9 @@ class Case:
 
     spec: LoopSpec
     prepared: Prepared
-    subject: Recording
+    recording: Recording
     shortened: str = ""
-    learned: Learned | None = None
+    learned: ExperimentResults | None = None
 
 
 def tags_of(spec: LoopSpec, specs: Sequence[LoopSpec]) -> list[str]:
@@ -100,7 +100,7 @@ def stated_law(spec: LoopSpec, prepared: Prepared, period_s: float, config: Conf
     return replace(said, confirmed=differing(prepared.record, pid, scale_s, config.settings) is None)
 
 
-def ops_beside(
+def neighbour_ops(
     spec: LoopSpec, specs: tuple[LoopSpec, ...], series: Mapping[str, Series], p: Prepared, config: Config
 ) -> tuple[Floats, ...]:
     """The measured load stated in loops.csv [% of its recorded range], and OPs of the export's other loops, on this
@@ -135,7 +135,7 @@ def seen_in_cycles(verdict: Verdict, limits: AdviceLimits) -> SeenInCycles | Non
     shown = m.trials or trials_between_moves(fit, m.linear)
     if valve is None or shown is None:
         return None
-    cycle_s = 2.0 * m.window.duration_s / shown.count
+    cycle_s = 2.0 * m.problem.duration_s / shown.count
     known = intervals(fit, True, limits, m.controller)
     told = {name: known[name] for name in VALVE_FIGURES if name in known}
     return SeenInCycles(fit.process, valve, shown.count, shown.agreeing, cycle_s, m.trials is not None, told)
@@ -172,7 +172,7 @@ def as_given(prepared: Prepared) -> Prepared:
     return replace(prepared, record=moved)
 
 
-def telling_stretch(prepared: Prepared, most: int | None) -> tuple[Prepared, str]:
+def informative_stretch(prepared: Prepared, most: int | None) -> tuple[Prepared, str]:
     """The stretch with the most OP travel of a recording of more than `most` samples, and a sentence on it."""
     r = prepared.record
     if most is None or len(r) <= most:
@@ -200,7 +200,7 @@ def stretch_of_night(prepared: Prepared, verdict: Verdict, most: int) -> tuple[P
     if len(r) > most:
         n, fitted = (
             min(most, STRETCH_SAMPLES),
-            m.window.blocks.first + m.window.y.size * m.window.blocks.factor,
+            m.problem.blocks.first + m.problem.y.size * m.problem.blocks.factor,
         )
         first = min(max(fitted - n, 0), len(r) - n)
         night = replace(night, record=r.span(first, first + n))
@@ -228,7 +228,9 @@ def case(
     raw = series[spec.pv or ""]
     series = snapped(series, spec.pv or "")
     whole = prepare(spec, series, config.quality)
-    taught = learned(spec, series, whole, config, beside=ops_beside(spec, specs, series, whole, config))
+    taught = experiment_results(
+        spec, series, whole, config, beside=neighbour_ops(spec, specs, series, whole, config)
+    )
     known = controller(spec, whole.scale.span) is not None
     coarse = whole if most is None or len(whole.record) <= most else coarser(whole, taught, config, known)
     verdict, period_s = verdict_on(spec, latest_night(whole), config)
@@ -236,7 +238,7 @@ def case(
     if most is not None and len(coarse.record) > most and coarse is whole and verdict.cause is Cause.VALVE:
         prepared, shortened = stretch_of_night(as_given(whole), verdict, most)
     else:
-        prepared, shortened = telling_stretch(as_given(coarse), most)
+        prepared, shortened = informative_stretch(as_given(coarse), most)
     if coarse is not whole:
         stated = f"each {coarse.record.dt_s:.3g} s: its experiments need no more."
         shortened = (
@@ -252,21 +254,21 @@ def case(
         raise NotAssessedError(f"{spec.loop}: {lacks}")
     stamps = raw.stamp_s[~raw.bad]
     stamps = stamps[(stamps >= r.start_s - r.dt_s) & (stamps <= r.start_s + r.duration_s)]
-    others = ops_beside(spec, specs, series, prepared, config)
-    subject = subject_of(spec, prepared, stamps, (verdict, period_s), others, config)
-    factor = coarser_by(subject) if is_experiment(subject) else 1
+    others = neighbour_ops(spec, specs, series, prepared, config)
+    recording = recording_of(spec, prepared, stamps, (verdict, period_s), others, config)
+    factor = coarser_by(recording) if is_experiment(recording) else 1
     if factor == 1:
-        return Case(spec, prepared, subject, shortened, taught)
+        return Case(spec, prepared, recording, shortened, taught)
     thin = replace(prepared, record=r.thinned(factor))
     said = (
         f"Judged at one sample in {factor}, each {thin.record.dt_s:.3g} s: its time constant needs no more."
     )
     others = tuple(x[: len(thin.record) * factor : factor] for x in others)
-    subject = subject_of(spec, thin, stamps[::factor], (verdict, period_s), others, config)
-    return Case(spec, thin, subject, f"{shortened} {said}".strip(), taught)
+    recording = recording_of(spec, thin, stamps[::factor], (verdict, period_s), others, config)
+    return Case(spec, thin, recording, f"{shortened} {said}".strip(), taught)
 
 
-def coarser(whole: Prepared, taught: Learned | None, config: Config, known: bool) -> Prepared:
+def coarser(whole: Prepared, taught: ExperimentResults | None, config: Config, known: bool) -> Prepared:
     """A record that is too fast for its experiments, with a larger step, so that none of them is cut; unchanged for
     experiments in automatic with a known controller, which acts between the samples of a coarser record."""
     if taught is None or taught.model is None or (known and taught.model.used[0].experiment.course.closed):
@@ -278,7 +280,7 @@ def coarser(whole: Prepared, taught: Learned | None, config: Config, known: bool
     return whole if factor < 2 else replace(whole, record=record.thinned(factor))
 
 
-def subject_of(
+def recording_of(
     spec: LoopSpec,
     prepared: Prepared,
     stamps: Floats,
@@ -371,7 +373,7 @@ def loop_trends(plant: Plant, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...],
     return spec, specs, series
 
 
-def whole(asked: Asked, tag: str) -> tuple[Case, Series]:
+def whole(asked: ExportRequest, tag: str) -> tuple[Case, Series]:
     """A loop's case over a whole export, under its last settings, and its PV."""
     spec, specs, series = loop_trends(guarded(asked), tag)
     pv = series[spec.pv or ""]
@@ -380,7 +382,7 @@ def whole(asked: Asked, tag: str) -> tuple[Case, Series]:
 
 
 def asked_cases(
-    asked: Asked, plant: Plant, tag: str, held_out: Sequence[Path], fault: Fault | None = None
+    asked: ExportRequest, plant: Plant, tag: str, held_out: Sequence[Path], fault: Fault | None = None
 ) -> tuple[Case, dict[str, Case]]:
     """The case to be explained, and those held out by name: parts under other settings, and other exports; plant, the
     opened request; fault as in `case`."""

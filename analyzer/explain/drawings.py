@@ -52,13 +52,13 @@ def simulations(e: Explained) -> dict[str, Floats]:
     names = ("baseline", "model") if e.found.accepted else ("baseline",)
     drawn = dict(zip(names, proof.drawn, strict=False))
     out = {k: p.inputs.level + course(p, c, proof.window, proof.placed) for k, c in drawn.items()}
-    return out if e.brought is None else out | {"brought": e.brought.simulated}
+    return out if e.user_model is None else out | {"brought": e.user_model.simulated}
 
 
 def drawn_trends(e: Explained) -> tuple[Trend, ...]:
     """The whole recording, and the most informative stretch at full resolution."""
     marked = bool(e.said.where.get("spans"))
-    drawn, n, part = signals(e), e.case.subject.pv.size, close_part(e)
+    drawn, n, part = signals(e), e.case.recording.pv.size, close_part(e)
     how = NOTES["shaded"] * marked + NOTES["zoom"]
     whole = trend(e, drawn, slice(0, n), WHOLE, ("recording", "The whole recording", how))
     if part.stop - part.start >= n:
@@ -69,7 +69,7 @@ def drawn_trends(e: Explained) -> tuple[Trend, ...]:
 
 def signals(e: Explained) -> list[tuple[str, str, int, Floats]]:
     """Label, colour, panel and values of everything drawn over time."""
-    s, pv, simulated = e.case.subject, recorded_pv(e), simulations(e)
+    s, pv, simulated = e.case.recording, recorded_pv(e), simulations(e)
     out = [] if s.sp is None else [("SP", "sp", 0, s.sp)]
     out.append(("PV, clock set right" if e.found.late_s else "PV recorded", "recorded", 0, pv))
     out += [(LABELS[k], k, 0, x) for k, x in simulated.items()]
@@ -85,7 +85,7 @@ def trend(
     words: tuple[str, str, str],
 ) -> Trend:
     """A part of the time courses, with relevant spans marked; its name, title and caption."""
-    r, usable = e.case.prepared.record, e.case.subject.usable
+    r, usable = e.case.prepared.record, e.case.recording.usable
     n = part.stop - part.start
     edges = (np.arange(min(buckets, n)) * n) // min(buckets, n)
     bands = []
@@ -103,7 +103,7 @@ def trend(
 
 def close_part(e: Explained) -> slice:
     """The stretch of the close-up: where the evidence is largest, or where OP travels most."""
-    s, c = e.case.subject, e.found.plain.model.c
+    s, c = e.case.recording, e.found.plain.model.c
     memory = CLOSE_MEMORIES * float(c[Slot.T] + c[Slot.L]) / s.dt_s
     length = min(int(np.clip(memory, LEAST_CLOSE, CLOSE)), s.pv.size)
     w = weight(e)
@@ -112,17 +112,17 @@ def close_part(e: Explained) -> slice:
 
 def weight(e: Explained) -> Floats:
     """Weight of each sample in the verdict, shape (n,)."""
-    found, n = e.found, e.case.subject.pv.size
+    found, n = e.found, e.case.recording.pv.size
     if found.finding is not None and not found.finding.where.all():
         return np.concatenate((found.finding.where.astype(float), np.zeros(n)))[:n]
     if found.accepted:
         return np.maximum(won_over(found.p, found.plain, found.best)[0], 0.0)
-    return located_in(found.p, found.plain, e.case.subject).local if found.left > 0 else np.zeros(n)
+    return located_in(found.p, found.plain, e.case.recording).local if found.left > 0 else np.zeros(n)
 
 
 def misfit_panels(e: Explained) -> Panels:
     """The one-step errors along each feature that needs a plot, and the spectrum, before and after."""
-    at = located_in(e.found.p, e.found.plain, e.case.subject)
+    at = located_in(e.found.p, e.found.plain, e.case.recording)
     known = {f.name: f for f in at.features}
     along = (feature_plot(e, g, known.get(g.name)) for g in at.groups if "axis" in FEATURES[g.name])
     plots = *along, spectrum_plot(e)
@@ -167,7 +167,7 @@ def note_of(f: Feature | None) -> str:
 
 def spectrum_plot(e: Explained) -> Plot:
     """Spectrum of the simulation errors, as the share of the rms per octave of period."""
-    pv, dt_s = recorded_pv(e), e.case.subject.dt_s
+    pv, dt_s = recorded_pv(e), e.case.recording.dt_s
     left = {k: pv - x for k, x in simulations(e).items() if k != "brought"}
     lines = tuple(Line(SHORT[k], *spectrum(x, dt_s), kind=k) for k, x in left.items())
     words = "misfit-spectrum", "Spectrum of the residual", "period [s]", "% PV per octave"
@@ -194,7 +194,7 @@ def found_plot(e: Explained) -> Plot | None:
         free, shown = plain.copy(), fault(finding.name)
         free[Slot.CLIP_HI], free[Slot.CLIP_LO] = np.inf, -np.inf
         model = inputs.level + simulate(inputs, free)
-        return shape_plot(shown.drawn and shown.drawn(finding, e.case.subject, model), shown.caption)
+        return shape_plot(shown.drawn and shown.drawn(finding, e.case.recording, model), shown.caption)
     if said.outside is not None and found.outside is not None:
         fit, known = found.outside.fit, said.outside.parameters
         added = found.outside.row
@@ -212,7 +212,7 @@ def law_plot(e: Explained) -> Plot | None:
     """OP recomputed by the stated settings if no fault was found in them."""
     if e.found.controller is not None or e.found.law is None:
         return None
-    shape, said = by_stated_law(e.case.subject), NOTES["sound_controller"]
+    shape, said = by_stated_law(e.case.recording), NOTES["sound_controller"]
     return shape_plot(shape, said, "law", "OP rebuilt and recorded")
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from analyzer.columns import Row
 from analyzer.explain.case import Case
 from analyzer.explain.models import SCALE, UserModel, judged, plain_start, rescaled, span_note
-from analyzer.loop.experiments.found import Learned
+from analyzer.loop.experiments.found import ExperimentResults
 from analyzer.words.decision import as_data as decision_data
 from analyzer.words.experiments import in_a_clause
 from identification.controller.pi_regression import ControlLaw
@@ -39,7 +39,7 @@ class Explained:
     found: Explanation
     said: Answer
     data: dict[str, Any]
-    brought: UserModel | None = None
+    user_model: UserModel | None = None
 
     def model(self) -> dict[str, Any]:
         """The improved model, or the baseline model without findings, as data for a file."""
@@ -53,24 +53,24 @@ class Explained:
 def explained(
     c: Case,
     tell: Callable[[str], None],
-    brought: Mapping[str, Any] | None = None,
+    user_model: Mapping[str, Any] | None = None,
     held_out: Mapping[str, Case] | None = None,
 ) -> Explained:
     """Explain one loop.
 
-    tell : called with each step; brought : the user's own model, which is judged and is one more start of the search;
-    held_out : other recordings of the loop by name, on which the explanation is proven.
+    tell : called with each step; user_model : the user's own model, which is judged and is one more start of the
+    search; held_out : other recordings of the loop by name, on which the explanation is proven.
     """
     own, others, scale = None, held_out or {}, c.prepared.scale
     with np.errstate(all="ignore"):  # a diverging candidate loses; its overflow needs no warning
-        start = None if brought is None else plain_start(brought)
-        found = proven_on(explain(c.subject, tell, start), [in_percent_of(c, x) for x in others.values()])
-        said = answer(found, c.subject)
-        if brought is not None:
-            own = judged(brought, found, c.subject, span_note(scale, brought))
+        start = None if user_model is None else plain_start(user_model)
+        found = proven_on(explain(c.recording, tell, start), [in_percent_of(c, x) for x in others.values()])
+        said = answer(found, c.recording)
+        if user_model is not None:
+            own = judged(user_model, found, c.recording, span_note(scale, user_model))
     data = as_data(c, said, own)
-    if c.subject.stated is None:  # if they are stated, the controller check reports
-        data |= law_data(found.law, c.subject.dt_s)
+    if c.recording.stated is None:  # if they are stated, the controller check reports
+        data |= law_data(found.law, c.recording.dt_s)
     if c.learned is not None and c.learned.model is not None:
         data["experiments"] = json_ready(experiment_data(c.learned))
         clause = in_a_clause(c.learned)
@@ -93,7 +93,7 @@ def with_night(data: dict[str, Any], decision: Row | None) -> dict[str, Any]:
     return data if decision is None else data | {"night": json_ready(decision_data(decision))}
 
 
-def experiment_data(of: Learned) -> dict[str, Any]:
+def experiment_data(of: ExperimentResults) -> dict[str, Any]:
     """Results of experiments: kind of response, constants with 90 % intervals, and their time courses."""
     model = of.model
     assert model is not None  # called only with a model
@@ -107,16 +107,16 @@ def experiment_data(of: Learned) -> dict[str, Any]:
 
 def in_percent_of(c: Case, other: Case) -> Recording:
     """Another recording in the percent of the fitted one; without stated ranges they differ."""
-    pv, op = rescaled(other.prepared.scale, c.prepared.scale, other.subject.pv, other.subject.op)
-    return replace(other.subject, pv=pv, op=op, sp=None)
+    pv, op = rescaled(other.prepared.scale, c.prepared.scale, other.recording.pv, other.recording.op)
+    return replace(other.recording, pv=pv, op=op, sp=None)
 
 
-def as_data(c: Case, said: Answer, brought: UserModel | None = None) -> dict[str, Any]:
+def as_data(c: Case, said: Answer, user_model: UserModel | None = None) -> dict[str, Any]:
     """The answer as JSON-compatible data."""
     data = answer_data(c.spec.loop, said, f"{reason(said)} {c.shortened}".strip())
-    if brought is not None:
-        judgement = {"fitted": asdict(brought.fitted), "held_out": asdict(brought.held_out)}
-        data["fit"]["brought"] = judgement | {"note": brought.note}
+    if user_model is not None:
+        judgement = {"fitted": asdict(user_model.fitted), "held_out": asdict(user_model.held_out)}
+        data["fit"]["brought"] = judgement | {"note": user_model.note}
     if said.outside is not None:
         outside = asdict(said.outside)
         data["outside"] = {k: outside[k] for k in ("name", "block", "parameters")}

@@ -83,9 +83,9 @@ def checked(data: Mapping[str, Any], path: Path) -> None:
     constants(dict(data))
 
 
-def plain_start(brought: Mapping[str, Any]) -> Floats:
+def plain_start(user_model: Mapping[str, Any]) -> Floats:
     """Baseline constants of a model, shape (SIZE,), as a start; its other constants are only judged."""
-    own, out = constants(dict(brought)), neutral()
+    own, out = constants(dict(user_model)), neutral()
     for slot in (Slot.T, Slot.L, Slot.K):
         out[slot] = own[slot]
     return out
@@ -155,9 +155,9 @@ def wrong_units(own: Floats, found: Mapping[str, float]) -> str:
     return "; ".join(said)
 
 
-def span_note(now: Scale, brought: Mapping[str, Any]) -> str:
+def span_note(now: Scale, user_model: Mapping[str, Any]) -> str:
     """Note for a model made with another PV span than that of the record; otherwise empty."""
-    scale = brought.get("scale")
+    scale = user_model.get("scale")
     then = scale.get("pv_span") if isinstance(scale, dict) else None
     if not isinstance(then, int | float) or abs(then / now.span - 1.0) < SPAN_DIFFERS:
         return ""
@@ -190,7 +190,7 @@ def simulated(c: Case, data: dict[str, Any], stamps: Floats, closed: bool) -> tu
     InputError
         A closed loop is requested and its controller is unknown.
     """
-    r, law, now = c.prepared.record, c.subject.stated, c.prepared.scale
+    r, law, now = c.prepared.record, c.recording.stated, c.prepared.scale
     scale = saved_scale(data, now)
     pv, op = rescaled(now, scale, r.pv, r.op)
     sp, _ = rescaled(now, scale, r.sp, r.op)

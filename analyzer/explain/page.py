@@ -71,12 +71,12 @@ def _footer(e: Explained) -> str:
 
 
 def _verdict_blocks(e: Explained) -> tuple[Block | None, ...]:
-    brought = None if e.brought is None else Text((e.brought.note,))
+    user_model = None if e.user_model is None else Text((e.user_model.note,))
     night = e.data.get("night")
     first = None if night is None else Text((decided(e.data),), "lead")
-    beside = "" if night is None else words.beside_night(night, e.data["verdict"], e.data["block"])
+    beside = "" if night is None else words.night_note(night, e.data["verdict"], e.data["block"])
     said = tuple(filter(None, (words.improvement(e.data), beside, words.no_better(e.data), check(e.data))))
-    return first, Text((e.data["reason"],), "lead"), Text(said), brought, Tiles(tuple(_tiles(e)))
+    return first, Text((e.data["reason"],), "lead"), Text(said), user_model, Tiles(tuple(_tiles(e)))
 
 
 def _tiles(e: Explained) -> list[tuple[str, str, str]]:
@@ -118,7 +118,7 @@ def _fit_note(e: Explained) -> str:
 
 
 def _controller_blocks(e: Explained) -> tuple[Block, ...]:
-    drawn, s, law = drawings.law_plot(e), e.case.subject, e.found.law
+    drawn, s, law = drawings.law_plot(e), e.case.recording, e.found.law
     if drawn is None or s.stated is None or law is None:
         return ()
     ti_s = law.kp / law.ki * s.dt_s if law.ki else None

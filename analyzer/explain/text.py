@@ -26,7 +26,7 @@ def answer_lines(data: Mapping[str, Any]) -> list[str]:
     night = data.get("night")
     out = [*wrap(decided(data), WIDTH), ""] if night else []
     improvement = words.improvement(data) if fit else ""
-    beside = words.beside_night(night, data["verdict"], data["block"]) if night and fit else ""
+    beside = words.night_note(night, data["verdict"], data["block"]) if night and fit else ""
     told = (data["reason"], improvement, beside, check(data))
     out += [
         head + block,
@@ -39,8 +39,8 @@ def answer_lines(data: Mapping[str, Any]) -> list[str]:
     others = [(name, plain, "→", *rest) for name, plain, *rest in _texts(words.others(data))]
     held_out = _headed(("", "baseline", "", "improved", "removed"), others)
     out += _part("On the recordings held out", held_out, (1, 3, 4))
-    brought = fit.get("brought", {}).get("note", "")
-    for sentence in filter(None, (words.no_better(data), *remarks(fit), brought)):
+    user_model = fit.get("brought", {}).get("note", "")
+    for sentence in filter(None, (words.no_better(data), *remarks(fit), user_model)):
         out += ["", *wrap(sentence, WIDTH)]
     out += _part("Where", _where_rows(data))
     moved = [(name, before, "→", after, unit) for name, before, after, _, unit in _texts(words.moved(data))]

@@ -233,7 +233,7 @@ def _standing(c: Candidate, taken: set[str]) -> str:
     return "gain below the penalty" if c.penalised <= 0 else "less gain, or not proven"
 
 
-def beside_night(row: Mapping[str, Any], verdict: str, block: str) -> str:
+def night_note(row: Mapping[str, Any], verdict: str, block: str) -> str:
     """One sentence on the agreement of a night's finding with the explanation; '' if there is nothing to add."""
     told = TOLD["beside_verdict"]
     if row["action"] == Action.CHECK_MEASUREMENT and Lane.FROZEN in lanes_in(row):

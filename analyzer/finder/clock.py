@@ -40,7 +40,7 @@ def sampled(
     export: Export,
     tags: Sequence[str],
     span: tuple[float, float],
-    told: Callable[[int, int], None] = lambda done, total: None,
+    report: Callable[[int, int], None] = lambda done, total: None,
 ) -> Sampled:
     """Values of numeric tags, and texts, over the last day of a span [s since 1970-01-01 UTC].
 
@@ -65,7 +65,7 @@ def sampled(
             elif held is not None:
                 names.append(tag)
                 columns.append(held)
-        told(min(k + AT_ONCE, len(tags)), len(tags))
+        report(min(k + AT_ONCE, len(tags)), len(tags))
     if clock is None or not columns:
         return Sampled((), np.empty((0, 0)), 1.0)
     return Sampled(tuple(names), np.column_stack(columns), float(clock[1] - clock[0]), texts)

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from analyzer.finder.as_csv import SETTINGS, Row
-from analyzer.finder.beside import may_be_mode, modes, positions
 from analyzer.finder.clock import Sampled, sampled
 from analyzer.finder.held import LIMITED_SHARE
 from analyzer.finder.law import LEAST_BLOCKS
-from analyzer.finder.pair import LAW_TOLD, SURE_PCT, SUREST_PCT, FoundPair, known_pair
+from analyzer.finder.pair import LEAST_LAW_SHARE, SURE_PCT, SUREST_PCT, FoundPair, known_pair
 from analyzer.finder.pairs import found_pairs
+from analyzer.finder.position_and_mode import may_be_mode, modes, positions
 from analyzer.finder.relations import at_rest, equal_at_times, halves, masters_of, ratios_to, scan_of
 from analyzer.finder.terms import terms_of
 from analyzer.history.export import Export
@@ -43,11 +43,11 @@ def draft(
     export: Export,
     stated: Sequence[LoopSpec] = (),
     span: tuple[float, float] = (-math.inf, math.inf),
-    told: Callable[[int, int], None] = lambda done, total: None,
+    report: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Row]:
     """The loops of an export: stated ones unchanged, others by names, then by data of the remaining tags.
 
-    span : of time, of which the last day is used [s since 1970-01-01 UTC]; told : called with the number of tags
+    span : of time, of which the last day is used [s since 1970-01-01 UTC]; report : called with the number of tags
     read, and of all. Raises InputError where the export cannot be read.
     """
     taken = {tag for spec in stated for tag in spec.tags}
@@ -59,7 +59,7 @@ def draft(
     taken |= {tag for spec in whole for tag in spec.tags}
     free = [tag for tag in export.tags if tag not in taken]
     asked = [*free, *(tag for spec in (*whole, *open_ones) for tag in spec.tags)]
-    held = sampled(export, list(dict.fromkeys(asked)), span, told)
+    held = sampled(export, list(dict.fromkeys(asked)), span, report)
     recorded = {spec.loop: spec for spec in open_ones}
     rows = [_stated(held, spec, recorded.get(spec.loop)) for spec in stated]
     rows += [_named(held, spec) for spec in whole]
@@ -145,7 +145,7 @@ def _named(held: Sampled, spec: LoopSpec) -> Row:
     own = held.of(known)
     pair = known_pair(own.values)
     shown = _shown(own, pair)
-    law = f"; {_law(own, pair)}" if pair.told >= LAW_TOLD and pair.kp else ""
+    law = f"; {_law(own, pair)}" if pair.law_share >= LEAST_LAW_SHARE and pair.kp else ""
     found = replace(spec, type=type_of(spec.loop), pv_unit=unit_of(str(spec.pv)), **shown)
     return Row(found, "names", SUREST_PCT, said + law + _beyond(shown, found.type))
 
@@ -166,7 +166,7 @@ def _stated(held: Sampled, spec: LoopSpec, with_tags: LoopSpec | None) -> Row:
     return Row(found, RECORDED, SURE_PCT, f"stated except for its settings; {_law(own, pair)}")
 
 
-def found_told(rows: Sequence[Row]) -> tuple[str, ...]:
+def found_text(rows: Sequence[Row]) -> tuple[str, ...]:
     """Sentences on the loops found by data, and on those left out because of low confidence."""
     seen = [row for row in rows if row.found_by == "data"]
     sure = tuple(
@@ -239,7 +239,7 @@ def _shown(held: Sampled, pair: FoundPair, certain: bool = True) -> dict[str, An
     terms = _terms(held, pair, (pv_lo, pv_hi), (op_lo, op_hi)) if certain else {}
     if terms:
         return {**shown, **terms}
-    if pair.told < LAW_TOLD or not pair.kp or pair.ti_samples is None:
+    if pair.law_share < LEAST_LAW_SHARE or not pair.kp or pair.ti_samples is None:
         return shown
     ti = 0.0 if math.isinf(pair.ti_samples) else pair.ti_samples * held.dt_s
     return {**shown, "kp": pair.kp, "ti": ti, "gain_unit": "engineering"}
@@ -267,7 +267,7 @@ def _law(held: Sampled, pair: FoundPair) -> str:
     way = "direct" if pair.kp < 0 else "reverse"
     law = (
         f"{'P alone' if pair.ti_samples == math.inf else 'PI'}, {way} acting"
-        if pair.told
+        if pair.law_share
         else "of unknown sign"
     )
     shown = f"explains {100 * pair.law:.0f} % of its moves"

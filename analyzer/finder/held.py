@@ -12,8 +12,8 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from analyzer.finder.beside import POSITION
 from analyzer.finder.law import PAST, TINY, Matrix, Moves, blocks, explained_share, fitted, shared_noise
+from analyzer.finder.position_and_mode import POSITION
 
 LEAST_MOVES = 100  # Moves of a tag below which it is neither PV nor OP [moves]: proofs/finder.md
 SLOW_BLOCKS = 300
@@ -65,7 +65,7 @@ def closeness(away: Matrix, spread: Matrix | float) -> Matrix:
     return np.asarray(-np.log(np.clip(away / np.maximum(spread, TINY), NEAREST, 1.0)))
 
 
-def apart(x: Matrix, level: Matrix, near: Matrix) -> float:
+def nearness_margin(x: Matrix, level: Matrix, near: Matrix) -> float:
     """How much nearer a tag is to the nearest set point than to the next one at another level, natural log: for
     levels unrelated to the tag the distance exceeds this with odds exp(-this).
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analyzer.finder.bag import Bag, Cause, errors, held_at
 from analyzer.finder.held import alike
 from analyzer.finder.law import Moves, explained_either_way, shared_noise, widths
+from analyzer.finder.tag_set import Cause, TagSet, errors, held_at
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class Scores:
         return np.asarray(self.law[at] * np.sqrt(self.noise[at]))
 
 
-def scored(bag: Bag) -> Scores:
+def scored(bag: TagSet) -> Scores:
     """Similarity of each pair of cause and live tag to a controller."""
     held = held_at(bag)
     others = [k for k in bag.moving if k not in bag.live]

@@ -20,7 +20,7 @@ from pathlib import Path
 import pyarrow as pa
 
 from analyzer.history.clock import is_of_day
-from analyzer.history.files import Mark, export_files, is_parquet, mark_of, packed_beside, unpacked
+from analyzer.history.files import Mark, export_files, is_parquet, mark_of, unpacked, unsupported_archives
 from analyzer.history.layouts import Source, source_of, tag_column
 from analyzer.history.parquet import converted, open_parquet
 from analyzer.history.plant_clock import zone_of
@@ -28,7 +28,7 @@ from analyzer.history.series import MainSpan, NoStampError, Series, joined_piece
 from analyzer.history.sheet import WHOLE_BYTES, Sheet
 from analyzer.history.sniff import open_sheet
 from analyzer.history.table import ReadOptions
-from analyzer.places import at_hand, bring, is_remote
+from analyzer.locations import fetch_missing, is_remote, local_copies
 from identification.errors import InputError
 
 WHOLE_ROWS = 2000000
@@ -79,7 +79,7 @@ class Export:
         homes = sorted({home for tag in tags for home in self._homes[tag]})
         pieces = []
         for home in homes:
-            bring(self.sources[home].path, self.origins)
+            fetch_missing(self.sources[home].path, self.origins)
             with _faults_told(self.sources[home].path):
                 pieces.append(self.sources[home].read(tags))
         series = {}
@@ -105,7 +105,7 @@ class Export:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was detected, one sentence each: for every file, and for the samples of all tags read so far."""
-        return (*self.file_notes, *met_told(self.met(self._met)))
+        return (*self.file_notes, *problems_text(self.met(self._met)))
 
     @property
     def file_notes(self) -> tuple[str, ...]:
@@ -138,7 +138,7 @@ def open_export(paths: Sequence[Path], options: ReadOptions | None = None) -> Ex
     Parameters
     ----------
     paths : sequence of Path
-        Files, or folders of them; those of shared storage (places.py) are copied first.
+        Files, or folders of them; those of shared storage (locations.py) are copied first.
     options : ReadOptions
         What the user states; the rest is detected.
 
@@ -149,14 +149,14 @@ def open_export(paths: Sequence[Path], options: ReadOptions | None = None) -> Ex
     """
     options = options or ReadOptions()
     _check_stated(options)
-    paths, origins = at_hand(paths, options.place) if any(map(is_remote, paths)) else (paths, {})
+    paths, origins = local_copies(paths, options.place) if any(map(is_remote, paths)) else (paths, {})
     marks = _marks(export_files(paths))
     opened, skipped = _readable_files(paths, options)
     sources = _agreed(opened)
     homes: dict[str, tuple[int, ...]] = {}
     for i, source in enumerate(sources):
         homes.update({tag: (*homes.get(tag, ()), i) for tag in source.tags})
-    return Export(sources, tuple(homes), homes, (*skipped, *packed_beside(paths)), origins, marks)
+    return Export(sources, tuple(homes), homes, (*skipped, *unsupported_archives(paths)), origins, marks)
 
 
 def _marks(paths: Iterable[Path]) -> dict[Path, Mark]:
@@ -255,7 +255,7 @@ def _agreed(sources: Sequence[Source]) -> tuple[Source, ...]:
     return tuple(s.with_clock(order=sure) if d else s for s, d in zip(sources, doubtful, strict=True))
 
 
-def met_told(met: Counter[str]) -> list[str]:
+def problems_text(met: Counter[str]) -> list[str]:
     """Sentences on problems in samples, the most frequent first."""
     return [f"{count} {what}" for what, count in met.most_common()]
 

@@ -24,7 +24,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any
 
-from analyzer.history.spans import require_dense
+from analyzer.history.cell_spread import require_dense
 from identification.errors import InputError
 
 ENDS_BYTES = 65536
@@ -156,7 +156,7 @@ def is_parquet(path: Path) -> bool:
     return start == PARQUET or path.suffix.lower() in PARQUET_ENDINGS
 
 
-def packed_beside(paths: Sequence[Path]) -> list[str]:
+def unsupported_archives(paths: Sequence[Path]) -> list[str]:
     """Sentences on export files in the given folders that are packed in an unsupported way."""
     said = []
     for folder in (Path(p) for p in paths if Path(p).is_dir()):
@@ -175,7 +175,7 @@ def _exports_at(path: Path) -> list[Path]:
             return [path]
         files = [found for found in sorted(path.iterdir()) if found.is_file() and _is_export(found)]
         files = files or [p for p in sorted(path.rglob("*")) if p.suffix.lower() in PARQUET_ENDINGS]
-        seen = next(iter(packed_beside([path])), f"{path}: a folder without exports")
+        seen = next(iter(unsupported_archives([path])), f"{path}: a folder without exports")
     except OSError as error:
         seen = f"{path}: cannot be opened ({error.strerror or error})"
         raise InputError(seen, "a file that may be read", "grant the permission to read") from error

@@ -43,7 +43,7 @@ from analyzer.loop.page_trends import BUCKETS, FINE_BUCKETS, close_view, thinned
 from analyzer.loop.record.judged_stretch import Earlier, Shown, Stretch, as_recorded, judged_stretch, shown
 from analyzer.loop.record.quality import Prepared
 from analyzer.loop.record.shared_valve import Shared
-from analyzer.plantwide.wave import Wave, waves_of
+from analyzer.plantwide.oscillation_lines import OscillationLines, error_lines_of
 from identification.controller.free_law import FreeLaw
 from identification.controller.gain_pieces import ScheduledGain
 from identification.errors import NotAssessedError
@@ -87,7 +87,7 @@ class Assessment:
     law: FreeLaw | None = None
     harris: float | None = None
     moves: tuple[Move, ...] = ()
-    waves: tuple[Wave, ...] = ()
+    waves: tuple[OscillationLines, ...] = ()
     trend: Mapping[str, np.ndarray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     needs: Requirement | None = None
@@ -161,10 +161,10 @@ def with_valve_oscillation(
     period_s = ringing_period(quiet, config.cause)
     if period_s is None:
         return found, verdict
-    return _rung(prepared, period_s, controller, config, kind) or (found, verdict)
+    return _ringing_cycle(prepared, period_s, controller, config, kind) or (found, verdict)
 
 
-def _rung(
+def _ringing_cycle(
     prepared: Prepared, period_s: float, controller: Pid | None, config: Config, kind: str
 ) -> tuple[Oscillations, Verdict] | None:
     """Oscillations and cause of a loop whose identified model rings at a period [s]; None if the error does not."""
@@ -203,7 +203,7 @@ def _known_without_op(figures: Assessments, op: bool) -> Assessments:
     return figures if op else replace(figures, **OF_OP)
 
 
-def hidden(
+def aliasing_requirement(
     record: LoopRecord, found: Oscillations, controller: Pid | None, config: Config
 ) -> Requirement | None:
     """Required sampling if the loop may cycle too fast for the record; None if not. In such a record
@@ -259,7 +259,7 @@ def _judge_stretch(prepared: Prepared, stretch: Stretch, config: Config, kind: s
         seen = shown(part.record, stated, scale, config.settings)
     acting = _acting(seen, stated)
     found, verdict = judged_where(part, found, span, acting, config, kind)
-    thin = None if verdict.told_between_rows else too_thin(record.dt_s, acting, config)
+    thin = None if verdict.identified_between_rows else too_thin(record.dt_s, acting, config)
     if _hours_in(part.record) < config.advice.least_h or thin is not None:
         verdict = cap_confidence(verdict, config.advice.hint_pct)
     return _Judged(part, found if whole else of_all, found, verdict, seen)
@@ -338,10 +338,12 @@ def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: C
         law=judged.shown.law,
         harris=harris_index(record.error, record.usable, record.dt_s, dead_time) if dead_time else None,
         moves=moves(record, night.noise_band_pct or 0.0, config.figures),
-        waves=waves_of(record.tag, judged.of_all, end_s, config.plant),
+        waves=error_lines_of(record.tag, judged.of_all, end_s, config.plant),
         trend=thinned(record, FINE_BUCKETS if counting(found) else BUCKETS, close),
         notes=prepared.notes,
-        needs=hidden(judged.part.record, found, judged.shown.other or stretch.controller, config),
+        needs=aliasing_requirement(
+            judged.part.record, found, judged.shown.other or stretch.controller, config
+        ),
         close_s=None if close is None else (_at(record, close[0]), _at(record, close[1])),
         for_settings=unfit_for_settings(prepared, config),
         judged_h=_hours_in(judged.part.record),

@@ -14,7 +14,17 @@ from analyzer.loop.advice.advise import Advice
 from analyzer.loop.assess import Assessment
 from analyzer.loop.cause.verdict import Verdict
 from analyzer.loop.cost import RECORDED, STATED, loss
-from analyzer.loop.decisions import Action, Cause, Cell, Fault, Finding, Remedy, Requirement, Status, Swing
+from analyzer.loop.decisions import (
+    Action,
+    Cause,
+    Cell,
+    Fault,
+    Finding,
+    OscillationFigures,
+    Remedy,
+    Requirement,
+    Status,
+)
 from analyzer.loop.identification.identified import gain_room
 from analyzer.loop.identification.intervals import intervals, is_known
 from analyzer.loop.identification.measure import Measured
@@ -90,11 +100,11 @@ def concluded(
     )
 
 
-def _swing(found: Oscillations) -> Swing:
+def _swing(found: Oscillations) -> OscillationFigures:
     first = found.first
     if first is None:
-        return Swing()
-    return Swing(first.significance, first.oscillating_pct, first.period_s, first.amplitude_pct)
+        return OscillationFigures()
+    return OscillationFigures(first.significance, first.oscillating_pct, first.period_s, first.amplitude_pct)
 
 
 def _cycle_known(a: Assessment) -> Known:

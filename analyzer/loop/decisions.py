@@ -198,7 +198,7 @@ class Sign:
 
 
 @dataclass(frozen=True, slots=True)
-class Swing:
+class OscillationFigures:
     """The oscillation: significance [% h], share of the time [%], period [s] and amplitude of PV [% of span]."""
 
     significance: float = 0.0
@@ -227,7 +227,7 @@ class Remedy:
 
 
 @dataclass(frozen=True, slots=True)
-class Root:
+class SourceLoop:
     """The loop that another one follows: coherence of the two [-], delay of the follower [s], None if unknown, and
     confidence that the oscillation starts there [%]."""
 
@@ -253,14 +253,14 @@ class Finding:
     status: Status
     lacking: Requirement | None = None
     lack: MissingData | None = None
-    swing: Swing | None = None
+    swing: OscillationFigures | None = None
     cause: Cause | None = None
     fault: Fault | None = None
     confidence: Mapping[Cause, float] = field(default_factory=dict)
     signs: tuple[Sign, ...] = ()
     remedy: Remedy = Remedy()
     known: Mapping[str, Cell] = field(default_factory=dict)
-    follows: Root | None = None
+    follows: SourceLoop | None = None
     moves: tuple[str, ...] = ()
     lanes: tuple[Lane, ...] = ()
     group: str | None = None

@@ -13,7 +13,7 @@ from analyzer.loop.oscillation.detection import Oscillations, counting
 from analyzer.loop.record.quality import Prepared
 from identification.estimation.model import Fitted
 from identification.record import LoopRecord
-from identification.signals.turns import StemMarks, halves, turns_of
+from identification.signals.reversals import StemMarks, halves, op_reversals
 
 if TYPE_CHECKING:
     from analyzer.loop.assess import Assessment
@@ -106,7 +106,7 @@ def _marks(faulty: Fitted | None, fit: Fitted | None, period_s: float) -> StemMa
     return StemMarks(0.0 if faulty is None else float(faulty.valve.stickband), fit.dead_time_s, answered)
 
 
-def turn_events(prepared: Prepared, found: Assessment) -> str | None:
+def half_cycle_data(prepared: Prepared, found: Assessment) -> str | None:
     """Half-cycles as JSON: step_s, dead_s, of each start_s (of the epoch), op, pv, late and stuck; None without."""
     record, first = prepared.record, counting(found.oscillations)
     if first is None or not prepared.op_known or found.close_s is None or found.needs is not None:
@@ -116,7 +116,7 @@ def turn_events(prepared: Prepared, found: Assessment) -> str | None:
     part = slice(begin, end)
     fit = None if found.verdict.measured is None else found.verdict.fit
     marks = _marks(fit if found.verdict.cause is Cause.VALVE else None, fit, first.period_s)
-    turns = turns_of(record.op[part], first.period_s / record.dt_s)
+    turns = op_reversals(record.op[part], first.period_s / record.dt_s)
     good = record.usable[part]
     kept = halves(record.op[part], record.pv[part], good, turns, record.dt_s, first.period_s, marks, HALVES)
     if len(kept) < 2:

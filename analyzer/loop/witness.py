@@ -61,7 +61,7 @@ def _profile(m: Measured, noise_widths: float) -> Floats:
     widths under `noise_widths` deviations of OP's noise, which sometimes crosses such a backlash."""
     found = width_profile(m.linear, m.play)
     crossed = (
-        noise_widths * robust_deviation(np.abs(np.diff(m.window.blocks.op, 2))) / math.sqrt(6.0) > WIDTHS
+        noise_widths * robust_deviation(np.abs(np.diff(m.problem.blocks.op, 2))) / math.sqrt(6.0) > WIDTHS
     )
     found[crossed] = 0.0
     most = float(found.max())

@@ -22,16 +22,16 @@ from typing import Any
 from analyzer.belief.nights import held_pairs
 from analyzer.columns import Row
 from analyzer.config import Config
-from analyzer.history.export import met_told
+from analyzer.history.export import problems_text
 from analyzer.history.files import ChangedError, ends_of, require_unchanged
+from analyzer.locations import afresh, is_passing, not_now
 from analyzer.loop.decisions import Status
 from analyzer.loops.tags import no_loops
 from analyzer.night import chunk
 from analyzer.night.chunk import Done, Task
-from analyzer.night.finish import TELLS_EMPTY, finish_night, is_empty
+from analyzer.night.finish import PRESENCE_COLUMNS, finish_night, is_empty
 from analyzer.night.nights import Night, Plant, nights_of
 from analyzer.night.workers import Executor, WorkerDeath, executor
-from analyzer.places import afresh, is_passing, not_now
 from analyzer.store.draft import drafted
 from analyzer.store.lock import locked
 from analyzer.store.store import GO_ON, Store
@@ -111,7 +111,7 @@ def _retry_or_give_up(workers: Executor[Task, Done], died: WorkerDeath[Task]) ->
         yield chunk.lose(task.part(hand, "lost"), died.why)
 
 
-def in_one_order(value: object) -> bytes:
+def canonical_bytes(value: object) -> bytes:
     """A value as bytes that are the same in every process: sets and mappings sorted, dataclasses by their fields;
     TypeError for contents whose text may differ between processes."""
 
@@ -160,9 +160,9 @@ def identity(plant: Plant) -> Identity:
     mark = hashlib.blake2b(of_code(), digest_size=16)
     for source in plant.export.sources:
         mark.update(ends_of(source.path))
-        mark.update(in_one_order(source.clock))
+        mark.update(canonical_bytes(source.clock))
     stated = (*plant.specs, *plant.changes, plant.zone)
-    mark.update(in_one_order((stated, *plant.span, plant.config)))
+    mark.update(canonical_bytes((stated, *plant.span, plant.config)))
     first, *others = [source.path.name for source in plant.export.sources]
     read = first + (f" and {len(others)} more files" if others else "")
     now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
@@ -239,7 +239,7 @@ def run(
             store.drop_parts()
             raise
         written, more = _finished(plant, store, nights, keys, replacing)
-        return _outcome(plant, store, written, (*plant.export.file_notes, *met_told(met), *said, *more))
+        return _outcome(plant, store, written, (*plant.export.file_notes, *problems_text(met), *said, *more))
 
 
 def _require_one_clock(store: Store, zone: str, replaced: Sequence[str]) -> None:
@@ -282,7 +282,7 @@ def _finished(
 
 def _require_all(store: Store, night: str, keys: Sequence[str], order: Sequence[str]) -> list[Row]:
     """Contents of a night's pieces for each loop of the run. Raises DamagedError if a loop is missing."""
-    table = store.read_parts(night, "nights", keys, ("loop", *TELLS_EMPTY))
+    table = store.read_parts(night, "nights", keys, ("loop", *PRESENCE_COLUMNS))
     rows = [] if table is None else table.to_pylist()
     missing = set(order) - {r["loop"] for r in rows}
     if missing:

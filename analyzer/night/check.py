@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 
 from analyzer.config import Config
 from analyzer.history.plant_clock import stamp
-from analyzer.loop.assess import hidden, unassessable
+from analyzer.loop.assess import aliasing_requirement, unassessable
 from analyzer.loop.cause.fitness import too_thin, unfit_for_cause, unfit_for_settings
 from analyzer.loop.decisions import Requirement
-from analyzer.loop.experiments.found import Learned, found_in
+from analyzer.loop.experiments.found import ExperimentResults, found_in
 from analyzer.loop.identification.measure import time_scale
 from analyzer.loop.oscillation.detection import counting, detect
 from analyzer.loop.record.judged_stretch import controller_of, differing
@@ -17,9 +17,9 @@ from analyzer.loop.record.quality import Prepared, prepare
 from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import no_loops
-from analyzer.night.asked import Asked
 from analyzer.night.nights import Plant
 from analyzer.night.opened import guarded
+from analyzer.night.request import ExportRequest
 from analyzer.words.experiments import found_lines
 from identification.errors import TriageError
 
@@ -39,11 +39,13 @@ def _fit_for(lacking: Requirement | None, spec: LoopSpec, prepared: Prepared, co
         return f"fit for nothing: {lacking}"
     stated = controller_of(spec, prepared) if prepared.op_scaled else None
     found = detect(prepared.record, config.oscillation)
-    unseen = hidden(prepared.record, found, stated, config)
+    unseen = aliasing_requirement(prepared.record, found, stated, config)
     if unseen is not None and stated is not None:
         scale = time_scale(prepared.record, counting(found), stated)
         recorded = differing(prepared.record, stated, scale, config.settings)
-        unseen = unseen if recorded is None else hidden(prepared.record, found, recorded, config)
+        unseen = (
+            unseen if recorded is None else aliasing_requirement(prepared.record, found, recorded, config)
+        )
         stated = recorded or stated
     if unseen is not None:
         return f"fit only for the figures of the assessment: {unseen}"
@@ -69,7 +71,7 @@ def loop_line(plant: Plant, spec: LoopSpec) -> tuple[str, bool]:
     record = prepared.record
     lacking = unassessable(record, plant.config)
     fit = _fit_for(lacking, spec, prepared, plant.config)
-    taught = Learned(found_in(spec, prepared, series, plant.config), prepared)
+    taught = ExperimentResults(found_in(spec, prepared, series, plant.config), prepared)
     by_hand = any(not x.course.closed for x in taught.found)
     fit = fit.replace("fit for nothing", ALONE) if by_hand else fit
     parts = [_tags(spec), f"{len(record)} samples every {record.dt_s:g} s", *prepared.notes, fit]
@@ -85,7 +87,7 @@ def _changes_counted(changes: Sequence[TuningChange], specs: Sequence[LoopSpec])
     return text + (f"; not of {', '.join(others[:MOST_NAMES])}" if others else "")
 
 
-def check_lines(asked: Asked) -> Iterator[tuple[str, bool]]:
+def check_lines(asked: ExportRequest) -> Iterator[tuple[str, bool]]:
     """All lines on an export, each with whether one of its loops cannot be assessed. Raises InputError if it cannot
     be used, after the lines on it if it has no loops."""
     plant = guarded(asked)

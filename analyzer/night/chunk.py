@@ -19,13 +19,14 @@ from analyzer.columns import HOURS, NIGHTS, SETTINGS
 from analyzer.config import Config
 from analyzer.history.plant_clock import stamp
 from analyzer.history.series import Series
-from analyzer.lanes.standing import standing
+from analyzer.lanes.figures import standing
+from analyzer.locations import each, enable_retries
 from analyzer.loop.advice.advise import (
     Advice,
     advise,
     advise_beyond_faults,
     on_recorded,
-    with_controller_told,
+    with_controller_note,
 )
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.conclusion import FailedLoop, concluded
@@ -39,10 +40,10 @@ from analyzer.loop.decisions import (
     Status,
 )
 from analyzer.loop.experiments.finding import by_experiment, with_experiment
-from analyzer.loop.experiments.found import learned
+from analyzer.loop.experiments.found import experiment_results
 from analyzer.loop.oscillation.detection import counting
 from analyzer.loop.oscillation.field_indices import field_indices
-from analyzer.loop.page_trends import thinned, turn_events
+from analyzer.loop.page_trends import half_cycle_data, thinned
 from analyzer.loop.record.judged_stretch import Earlier, controller_of, earlier_settings
 from analyzer.loop.record.quality import Prepared, prepare
 from analyzer.loop.record.sample_clock import interval
@@ -51,9 +52,8 @@ from analyzer.loops.changes import TuningChange, in_force, settings_from
 from analyzer.loops.spec import LoopSpec, controller_columns
 from analyzer.night.nights import Night, Plant, cut
 from analyzer.pages import compared as settings_pages
-from analyzer.places import be_patient, each
+from analyzer.plantwide.oscillation_lines import waves_table
 from analyzer.plantwide.structure import Moves, moves_of, moves_table
-from analyzer.plantwide.wave import waves_table
 from analyzer.store.rows import hour_rows, piece_row
 from analyzer.store.store import Store
 from analyzer.store.table import naming, rows_table, write_table
@@ -108,7 +108,7 @@ def assess_loop(
     The advice is for the controller completed by what the record shows, or for recorded settings if none are stated.
     """
     stated = controller_of(spec, prepared)
-    found = with_controller_told(assess(prepared, stated, config, spec.type, earlier), spec, stated, prepared)
+    found = with_controller_note(assess(prepared, stated, config, spec.type, earlier), spec, stated, prepared)
     if not advising:
         return found, Advice(WITHOUT_SETTINGS.get(found.verdict.cause))  # settings are only for the next day
     pair = None
@@ -159,7 +159,7 @@ def _loop_row(
         earlier, present = earlier_settings(stated, changes, prepared), controller_of(spec, prepared)
         known["controller"] = _controller_terms(spec, prepared)
         known |= _of_trends(prepared) | standing(prepared, present, spec.type, config)
-        taught = learned(spec, part, prepared, config, closed=False)
+        taught = experiment_results(spec, part, prepared, config, closed=False)
         try:
             found, advice = assess_loop(spec, prepared, config, advising, earlier, held)
         except LacksError as error:
@@ -169,7 +169,7 @@ def _loop_row(
             kept.trends.append((spec.loop, thinned(prepared.record)))
             return
         known |= _typed_in(earlier, spec, found, night.zone)
-        known["turns"] = turn_events(prepared, found) if advising else None
+        known["turns"] = half_cycle_data(prepared, found) if advising else None
         known |= _signs_kept(prepared, found, found.settings or present, spec.type, config)
         told = concluded(found, advice, spec, night.name, config.advice, **known)
         if taught is not None:
@@ -269,7 +269,7 @@ def _samples_of(task: Task, spec: LoopSpec) -> dict[str, Series] | FailedLoop:
 
 def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
     """Assess a chunk and write its pieces; `began` is called with the number of each started loop."""
-    be_patient(task.store.path)
+    enable_retries(task.store.path)
     assessed(task, began)
     met = task.plant.export.met(tag for spec in task.specs for tag in spec.tags)
     return Done(task.key, len(task.specs), met)

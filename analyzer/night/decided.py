@@ -20,8 +20,8 @@ from analyzer.night.chunk import Task, assessed
 from analyzer.night.finish import finish_night
 from analyzer.night.nights import Night, Plant
 from analyzer.plantwide.groups import groups_of
+from analyzer.plantwide.oscillation_lines import OscillationLines, error_lines_of
 from analyzer.plantwide.structure import Moves, links_of, moves_of
-from analyzer.plantwide.wave import Wave, waves_of
 from analyzer.store.store import Store
 from identification.errors import InputError, NotAssessedError
 
@@ -97,14 +97,14 @@ def _stated(spec: LoopSpec) -> Iterable[str]:
 def _seen(plant: Plant, night: Night) -> Sequence[tuple[str, str]]:
     """Pairs of loops with a common oscillation, or in which one's output moves the other's set point."""
     series = plant.trends(list(dict.fromkeys(tag for spec in plant.specs for tag in spec.tags)), night)
-    waves: list[Wave] = []
+    waves: list[OscillationLines] = []
     moves: list[Moves] = []
     config = plant.config
     for spec in plant.specs:
         with suppress(NotAssessedError):
             record = prepare(spec, {t: series[t] for t in spec.tags}, config.quality).record
             end_s = record.start_s + record.duration_s
-            waves += waves_of(spec.loop, detect(record, config.oscillation), end_s, config.plant)
+            waves += error_lines_of(spec.loop, detect(record, config.oscillation), end_s, config.plant)
             moves += filter(None, [moves_of(record)])
     shared = [
         (group.loops[0], other) for group in groups_of(waves, config.plant) for other in group.loops[1:]

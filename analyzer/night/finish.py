@@ -15,7 +15,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from analyzer.belief.nights import settle
+from analyzer.belief.nights import update_beliefs
 from analyzer.columns import GROUPS, NIGHTS, Column, Row, names
 from analyzer.config import Config, NightLimits
 from analyzer.lanes.lanes import in_lanes
@@ -24,15 +24,15 @@ from analyzer.plantwide import cascade
 from analyzer.plantwide import night as plantwide
 from analyzer.plantwide.cascade import linked, reassign_sources
 from analyzer.plantwide.night import traced_night
+from analyzer.plantwide.oscillation_lines import waves_in
 from analyzer.plantwide.structure import links_of, moves_in
-from analyzer.plantwide.wave import waves_in
 from analyzer.store.rows import TYPED, finding_of, night_row
 from analyzer.store.store import Store
 from analyzer.store.table import KEPT, rows_of_loops, rows_table
 
 JOINED = tuple(t.name for t in KEPT if t.in_pieces and t.name != "nights")
 """Tables whose pieces are used unchanged; the tables of nights and groups are computed from them."""
-TELLS_EMPTY = ("status", "good_h")
+PRESENCE_COLUMNS = ("status", "good_h")
 """Columns that show whether there is anything to keep of a night."""
 PLANT_WIDE = (*TYPED, *plantwide.READ, *cascade.READ, "good_h")
 """Columns of a loop for the plant-wide pass, and for comparing records."""
@@ -97,7 +97,7 @@ def finish_night(
     store.write("nights", night, _joined_rows(held, joined, {k: loops[k] for k in mine}, config))
     store.forget_explained(night, None if replace else mine)
     store.forget_compared()
-    return (*settle(store, night, config), *_joining_told(night, loops, old, kept, beside))
+    return (*update_beliefs(store, night, config), *_joining_told(night, loops, old, kept, beside))
 
 
 class Pieces:

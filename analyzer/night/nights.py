@@ -18,7 +18,7 @@ from analyzer.loop.record.judged_stretch import Earlier, controller_of, earlier_
 from analyzer.loop.record.quality import Prepared, prepare
 from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec, spec_of
-from analyzer.night.asked import ALWAYS, Span
+from analyzer.night.request import ALWAYS, Span
 from identification.errors import InputError
 from identification.models import Pid
 from identification.record import LoopRecord

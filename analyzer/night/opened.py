@@ -12,17 +12,17 @@ from weakref import finalize
 
 from analyzer.config import WorkerLimits
 from analyzer.finder.as_csv import Row
-from analyzer.finder.draft import MA_HIGH, MA_LOW, draft, found_told
+from analyzer.finder.draft import MA_HIGH, MA_LOW, draft, found_text
 from analyzer.history.export import Export, ReadOptions, open_export
 from analyzer.history.files import own_scratch
 from analyzer.history.series import Series
+from analyzer.locations import is_remote
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.spec import ROLES, LoopSpec, unknown_columns
 from analyzer.loops.tags import find_loops, match, read_loops
-from analyzer.night.asked import Asked
 from analyzer.night.nights import Plant
+from analyzer.night.request import ExportRequest
 from analyzer.night.workers import WorkerDeath, Workers
-from analyzer.places import is_remote
 from identification.errors import InputError
 
 MA_LOOPS = 20  # Loops whose OPs are tested; the first in percent ends the test [loops]
@@ -31,7 +31,7 @@ MOST_NAMES = 10
 """Maximum number of loops listed in a note; the others are counted."""
 
 
-def opened(asked: Asked) -> Plant:
+def opened(asked: ExportRequest) -> Plant:
     """The export and its loops, found by their tags' endings without a loops.csv, and notes on them and on the
     changes."""
     stated = (
@@ -43,7 +43,7 @@ def opened(asked: Asked) -> Plant:
     if asked.loops is None and asked.finding:
         rows = draft(source, (), asked.span)
         specs = tuple(row.as_run for row in rows if row.sure)
-        notes = found_told(rows)
+        notes = found_text(rows)
     elif asked.loops is None:
         specs = find_loops(source.tags)
     else:
@@ -57,7 +57,7 @@ def opened(asked: Asked) -> Plant:
     return Plant(source, specs, asked.config, asked.span, asked.changes, asked.zone, notes)
 
 
-def drafted(asked: Asked, told: Callable[[int, int], None]) -> list[Row]:
+def drafted(asked: ExportRequest, told: Callable[[int, int], None]) -> list[Row]:
     """The rows of a draft of loops.csv, those of a given one first; `told` is called with the number of tags read,
     and of all. Raises InputError where the export cannot be used."""
     plant = guarded(asked)
@@ -99,10 +99,10 @@ def _of_no_loop(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> t
     return (f"--changes: {text}: correct the name",) if strange else ()
 
 
-def opened_apart(asked: Asked) -> Plant:
+def opened_apart(asked: ExportRequest) -> Plant:
     """The request, opened in a worker process, because a damaged file may need unlimited memory or time. Raises
     InputError if the export cannot be used, or the process that read it died."""
-    with Workers(1, find_out, _allowed(asked)) as workers:
+    with Workers(1, opened_with_spans, _allowed(asked)) as workers:
         workers.submit(asked)
         (found,) = workers.results()
     if isinstance(found, WorkerDeath):
@@ -116,7 +116,7 @@ def _ended(path: Path, why: str) -> InputError:
     return InputError(seen, "files that are whole and fit into memory", remedy)
 
 
-def guarded(asked: Asked) -> Plant:
+def guarded(asked: ExportRequest) -> Plant:
     """The same, with its samples also read in a worker process; errors as of `opened_apart`, also on reading
     samples."""
     scratch = asked.reading.get("scratch") or own_scratch()  # removed with this process in any case
@@ -173,7 +173,7 @@ def _be_silent() -> None:
         os.dup2(nowhere.fileno(), 2)
 
 
-def _allowed(asked: Asked) -> WorkerLimits:
+def _allowed(asked: ExportRequest) -> WorkerLimits:
     """Limits for opening the export, by its size; for shared storage the copying is not known beforehand."""
     near = [path for path in asked.export if not is_remote(path)]
     files = [file for path in near for file in (path.rglob("*") if path.is_dir() else [path])]
@@ -184,7 +184,7 @@ def _allowed(asked: Asked) -> WorkerLimits:
     return replace(asked.config.workers, memory_mb=limits.memory_mb, **taking)
 
 
-def find_out(asked: Asked, began: Callable[[int], None]) -> Plant:
+def opened_with_spans(asked: ExportRequest, began: Callable[[int], None]) -> Plant:
     """Open an export in a worker, including its span of time."""
     _be_silent()
     plant = opened(asked)

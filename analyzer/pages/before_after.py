@@ -233,7 +233,7 @@ def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> parts.
     names = ("Settings", "Changed", "Before", "After")
     facts = parts.Facts(tuple(zip(names, (_settings_typed(case), when, *spans), strict=True)))
     wear = wear_texts(found, case.row)
-    blocks: tuple[parts.Block, ...] = parts.there(
+    blocks: tuple[parts.Block, ...] = parts.without_none(
         words.lead(outcome(found)),
         facts,
         _parts_told(found),
@@ -317,7 +317,7 @@ def changes_page(
     limits = cases[0].found.limits if cases else LIMITS
     said = {"m": limits, "error": 100 * (1 - limits.confidence), "share": 100 * limits.usable_share}
     method = parts.Text(tuple(text.format(**said) for text in words.texts("method").values()))
-    sections = parts.there(
+    sections = parts.without_none(
         parts.section("In short", seen, _outcome_tiles(cases), changes_in_short(cases), lost),
         parts.section("In pictures", *charts),
         *(loop_section(c, i, zone) for i, c in enumerate(cases)),

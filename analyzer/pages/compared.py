@@ -22,7 +22,7 @@ from identification.simulation.pi import per_scan
 from identification.simulation.valve import law_of
 from reports import pages as parts
 from reports.texts import slug
-from tuning.describing import band, is_play
+from tuning.describing import band, is_backlash
 from tuning.forecast import (
     CALMER,
     DERIVATIVE,
@@ -141,7 +141,9 @@ def table(c: Comparison, spec: LoopSpec, unit: str) -> parts.Table:
     said, lasts = texts("settings_tried"), duration(c.load.size * scan_step(c.loop))
     note = said["note"].format(lasts=lasts) + said["derivative"] * (c.loop.controller.td_s > 0.0)
     return page_table(
-        "settings", (_tried_row(t, c, spec, unit) for t in parts.there(*c.tried, c.repaired)), note=note
+        "settings",
+        (_tried_row(t, c, spec, unit) for t in parts.without_none(*c.tried, c.repaired)),
+        note=note,
     )
 
 
@@ -195,7 +197,7 @@ def _place(x: float, y: float, t: Tried) -> parts.Place:
     return parts.Place(x, y, t.name, PLACED.get(t.name, "rule"))
 
 
-def price(c: Comparison, unit: str) -> parts.Plot | None:
+def trade_off_plot(c: Comparison, unit: str) -> parts.Plot | None:
     """Travel over error of the settings that are not inferior in both, and of those compared; None without such."""
     if len(c.curve) < 2:
         return None
@@ -220,7 +222,7 @@ def field(c: Comparison) -> parts.Field | None:
         return None
     known = [t for t in c.tried if math.isfinite(t.controller.ti_s)]
     places = [_place(abs(t.controller.kp), t.controller.ti_s, t) for t in known]
-    rest = "" if is_play(c.loop.valve) else " (seldom with stick-slip)"
+    rest = "" if is_backlash(c.loop.valve) else " (seldom with stick-slip)"
     title = "Travel by describing function, without load"
     caption = "Kp in percent of OP over percent of PV, independently of the controller's unit."
     return replace(travel_field(c.travel, places, title, "the stem", rest), caption=caption)
@@ -300,9 +302,11 @@ def settings_page(loop: str, night: str, c: Comparison, spec: LoopSpec) -> parts
     )
     first = (parts.Text((opening(c, spec, unit),), "lead"), panels(c, unit), table(c, spec, unit))
     tried = parts.WhatIf("try", said["title"], model(c, spec, unit), c.load, said["caption"])
-    named = parts.Listing(tuple((f"{t.name}:", meant[t.name]) for t in parts.there(*c.tried, c.repaired)))
+    named = parts.Listing(
+        tuple((f"{t.name}:", meant[t.name]) for t in parts.without_none(*c.tried, c.repaired))
+    )
     sections = (
-        parts.Section("Settings compared", parts.there(*first, price(c, unit), field(c))),
+        parts.Section("Settings compared", parts.without_none(*first, trade_off_plot(c, unit), field(c))),
         parts.Section("Try settings", (parts.Text((said["hint"],)), tried)),
         parts.Section("What the settings are, for experts", (named,), closed=True),
     )

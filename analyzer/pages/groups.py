@@ -167,7 +167,7 @@ def group_page(g: GroupView, trends: Mapping[str, Thinned], night: ShownNight) -
         facts += [("Fix first", g.source["loop"]), ("Action there", action_there(g))]
     facts.append(("Error in others", f"{number(g.gain_pct)} % of span"))
     facts.append(("It starts elsewhere", f"{g.unseen_pct:.0f} %"))
-    sections = parts.there(
+    sections = parts.without_none(
         parts.Section("What and where", (words.lead(sentence(g)), parts.Facts(tuple(facts)), graph(g))),
         parts.Section("Loops", (_members_table(g, night),)),
         parts.Section("Why there", (_signs_table(g),)),
@@ -189,7 +189,7 @@ def member_section(g: GroupView, loop: str, trends: Mapping[str, Thinned]) -> pa
         said.append(f"{loop} follows {source['loop']} with a coherence of {row['coherence']:.2f}{late}.")
     beneath = [loop, *[r["loop"] for r in g.rows if r["loop"] != loop][:1]]
     return parts.Section(
-        "Moves with other loops", parts.there(parts.Text(tuple(said)), aligned(g, trends, beneath))
+        "Moves with other loops", parts.without_none(parts.Text(tuple(said)), aligned(g, trends, beneath))
     )
 
 

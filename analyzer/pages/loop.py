@@ -12,7 +12,7 @@ from urllib.parse import quote
 import numpy as np
 
 from analyzer.columns import BY_NAME
-from analyzer.explain.words import beside_night, title
+from analyzer.explain.words import night_note, title
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES, Fault, Status
@@ -71,7 +71,7 @@ def loop_page(
         The page on which settings are simulated; its opening is also shown here.
     """
     row = rows[-1]
-    sections = parts.there(
+    sections = parts.without_none(
         _first_section(row, thin),
         parts.section("Notes", words.listing(reversed(notes)) if notes else None),
         parts.section("What and why", _facts(row, thin), _believed(row) if row["believed_nights"] else None),
@@ -117,7 +117,9 @@ def _first_section(row: Row, thin: Thinned | None) -> parts.Section:
         name = "SP, PV and OP" + (", the last ten periods" if opening else "")
         drawn = loop_pictures.trend_block("trend", name, thin, (), scale, opening)
     do, events = parts.Listing(lines) if lines else None, loop_pictures.turn_panels(row, scale)
-    return parts.Section("What to do", parts.there(lead(reason or "nothing was found"), do, drawn, events))
+    return parts.Section(
+        "What to do", parts.without_none(lead(reason or "nothing was found"), do, drawn, events)
+    )
 
 
 def manual_since(row: Row, thin: Thinned | None) -> tuple[str, str] | None:
@@ -170,7 +172,7 @@ def _explained_section(found: Row | None, row: Row) -> parts.Section | None:
     """Effects that the baseline model does not include, if explained, and agreement with the night's verdict."""
     if found is None:
         return None
-    together = beside_night(row, found["verdict"], found["block"])
+    together = night_note(row, found["verdict"], found["block"])
     said = (f"{title(found['verdict']).capitalize()}: {found['reason']}", check(found))
     return parts.Section(
         "Physics missing in the baseline model", (parts.Text((*said, together) if together else said),)
@@ -190,7 +192,7 @@ def _evidence_section(row: Row) -> parts.Section:
     ]
     more = in_short(row["reason"] or "")[1]
     known = known_figures(row, keys("model"))
-    blocks: tuple[parts.Block, ...] = parts.there(
+    blocks: tuple[parts.Block, ...] = parts.without_none(
         parts.Text(lead(more).paragraphs) if more else None,
         page_table("evidence", rows) if rows else parts.Text(("No sign of a fault.",)),
         known if known.items else None,
@@ -300,10 +302,10 @@ def nights_section(rows: Sequence[Row]) -> parts.Section:
             _by_night(told, "certain", "nights together", kind="op"),
         )
         plots.append(_over_nights("widths", "Width of the valve's fault", "% of OP", 1.0, day, *lines))
-    shown = parts.there(*plots)
+    shown = parts.without_none(*plots)
     drawn = parts.Panels("nights", "Night by night", shown) if shown else None
     table = page_table("history", map(_night_cells, reversed(rows)))
-    return parts.Section("Over the nights", parts.there(drawn, table))
+    return parts.Section("Over the nights", parts.without_none(drawn, table))
 
 
 def _night_cells(row: Row) -> tuple[words.NightDecision, ...]:

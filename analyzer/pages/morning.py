@@ -33,7 +33,7 @@ from reports.pages import (
     Tiles,
     TreeMap,
     section,
-    there,
+    without_none,
 )
 
 HISTORY = 60  # Nights of history on a page [nights]: two months, as a maintenance round takes
@@ -244,12 +244,12 @@ def morning_page(
     seen = [r for r in night.rows if r["loop"] not in night.hidden]
     first = Listing((*(("", text) for text in first_things(seen, groups)), *waiting(night)))
     drawn, lost = plant_map(night), lost_table(night)
-    sections = there(
+    sections = without_none(
         Section("First", (first, _night_tiles(night))),
         since(night),
         Section("Loops worth a look", (worst_table(night),)),
         section("One cause, several loops", morning_table(groups, bool(night.paged)) if groups else None),
-        Section("The plant", there(drawn, plant_history(sums))) if drawn is not None else None,
+        Section("The plant", without_none(drawn, plant_history(sums))) if drawn is not None else None,
         Section("Areas", (area_table(night.rows),)),
         Section("All loops", (ranking(night),)),
         Section(f"Not assessed ({len(lost.rows)})", (lost,)),

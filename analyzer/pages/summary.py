@@ -14,7 +14,7 @@ from analyzer.store.store import Store
 from analyzer.words import orders
 from analyzer.words.orders import order
 from analyzer.words.units import changed_settings
-from reports.pages import Block, Cell, Page, Section, Table, Text, section, there
+from reports.pages import Block, Cell, Page, Section, Table, Text, section, without_none
 
 SENTENCES = 3  # Sentences of a summary at most
 NAMED = 3  # Loops that a sentence names; the rest is counted [loops]
@@ -162,7 +162,7 @@ def summary_page(store: Store, name: str | None = None) -> Page:
     left, lines, most = sum(map(needs_a_look, seen)) - len(night.worst), news_lines(night), NEWS
     news = [*lines[:most], f"{len(lines) - most} more"] if len(lines) > most else lines
     told = words.listing(news) if news else Text(("Nothing new.",))
-    sections = there(
+    sections = without_none(
         Section("First", (first, Text((_counts(night),)))),
         section(f"Since {night.before_name}", told) if night.before_name else None,
         Section("Loops worth a look", (_worst(night, left) if night.worst else Text(("None.",)),)),

@@ -16,7 +16,7 @@ from analyzer.store.notes import FINISHED, Work, work_on
 from analyzer.store.store import Store
 from analyzer.words.belief import wear_text
 from analyzer.words.orders import fault_width, stroke
-from reports.pages import Cell, Page, Section, Table, Text, Tiles, section, there
+from reports.pages import Cell, Page, Section, Table, Text, Tiles, section, without_none
 
 TRAVELLED = 20  # Valves that the page of maintenance lists for their travel alone [loops]
 WORK_NIGHTS = 62  # Nights that the list of work looks at [nights]: a month, and the month before it
@@ -72,7 +72,7 @@ def worn(night: ShownNight) -> Table:
 def maintenance_page(night: ShownNight) -> Page:
     """The sheet of a night."""
     first, growing = faulty(night), wearing(night)
-    sections = there(
+    sections = without_none(
         Section(f"Valves at fault ({len(first.rows)})", (first,)),
         section(f"Valves that wear ({len(growing.rows)})", growing if growing.rows else None),
         Section("Valves that travel most", (worn(night),)),
@@ -122,7 +122,7 @@ def _change(before: float, since: float) -> str:
     return f"{100.0 * (since / before - 1.0):+.0f} %".replace("-", "\u2212")
 
 
-def won(night: ShownNight, works: Mapping[str, Work], parted: Mapping[str, Sides]) -> Tiles | None:
+def improvements(night: ShownNight, works: Mapping[str, Work], parted: Mapping[str, Sides]) -> Tiles | None:
     """Improvements by work finished since the start of the month; None without any."""
     month = night.name[:7]
     finished = [loop for loop, w in works.items() if w.state in FINISHED]
@@ -165,8 +165,8 @@ def work_page(store: Store, night: ShownNight) -> Page:
     rows = sorted((r for r in night.rows if r["loop"] in works), key=urgency)
     note = f"Since: nights after the day of the note, compared with the {BEFORE_WORK} nights before it."
     empty = Text(('Nothing is noted: triage note STORE LOOP "..." --state open --due DATE.',))
-    sections = there(
-        section(f"Improvement since {night.name[:7]}-01", won(night, works, parted)),
+    sections = without_none(
+        section(f"Improvement since {night.name[:7]}-01", improvements(night, works, parted)),
         Section("Work", (night.table("work", rows, own, note=note) if rows else empty,)),
     )
     links = (ALL_LOOPS, ("As CSV", f"csv/{WORK}-work-list.csv"))

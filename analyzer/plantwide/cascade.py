@@ -17,8 +17,8 @@ from analyzer.loop.decisions import (
     GroupRole,
     MissingData,
     Remedy,
-    Root,
     SignKind,
+    SourceLoop,
     Status,
 )
 from analyzer.plantwide.night import following
@@ -74,14 +74,14 @@ def _with_halves(own: Finding, halves: Sequence[Finding], limits: PlantLimits) -
     return replace(own, remedy=Remedy(Action.NEEDS_DATA, text), lack=MissingData.NEIGHBOUR)
 
 
-def _send_on(done: dict[str, Finding], led: Sequence[str], above: str, root: Root) -> None:
+def _send_on(done: dict[str, Finding], led: Sequence[str], above: str, root: SourceLoop) -> None:
     """Let the loops that a master moves follow the loop that the master follows."""
     sent = []
     for k in led:
         old = done[k].follows
         if old is not None and old.loop == above:
             level, sure = min(old.coherence, root.coherence), min(old.confidence_pct, root.confidence_pct)
-            done[k] = replace(done[k], follows=Root(root.loop, level, None, sure))
+            done[k] = replace(done[k], follows=SourceLoop(root.loop, level, None, sure))
             sent.append(k)
     done[above] = replace(done[above], moves=())
     done[root.loop] = replace(done[root.loop], moves=_moves_with(done[root.loop], *sent))
@@ -124,7 +124,7 @@ def _judged_together(
     blamed = {Tie.MASTER: faulty or above.cause is Cause.VALVE, Tie.SPLIT: faulty, Tie.RATIO: False}[tie]
     if blamed and (above.oscillates or above.cause in OWN):
         cause = Cause.TUNING if below.cause is Cause.TUNING else Cause.VALVE
-        root = Root(below.loop, level, None, max(f.confidence.get(cause, 0.0) for f in (above, below)))
+        root = SourceLoop(below.loop, level, None, max(f.confidence.get(cause, 0.0) for f in (above, below)))
         if above.cause is Cause.VALVE or _alike(above, below, limits) or not below.oscillates:
             seen = SignKind.OF_BELOW, (below.loop, below.cause, tie)
             # the repair could wait for a single loop, but the master cycles because of it
@@ -137,7 +137,7 @@ def _judged_together(
             return replace(above, remedy=remedy, lack=MissingData.NEIGHBOUR), below
         return above, below
     if not faulty and below.oscillates and above.oscillates and _alike(above, below, limits):
-        root = Root(above.loop, level, None, max(above.confidence.values(), default=0.0))
+        root = SourceLoop(above.loop, level, None, max(above.confidence.values(), default=0.0))
         hangs = SignKind.OF_ABOVE, (above.loop, tie)
         leads = replace(above, moves=_moves_with(above, below.loop))
         return leads, following(below, root, below.swing, hangs, limits)

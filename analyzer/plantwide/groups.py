@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from analyzer.config import PlantLimits
-from analyzer.plantwide.source import foresight
-from analyzer.plantwide.wave import Wave, on_one_clock
+from analyzer.plantwide.oscillation_lines import OscillationLines, on_one_clock
+from analyzer.plantwide.source import median_granger_f
 from identification.record import Floats
 from identification.signals.cross_spectrum import Whole, band, chance_coherence, coherences, drift, tapered
 
@@ -34,7 +34,7 @@ class Group:
     """Loops with a common oscillation, each with its oscillation and its coherence with that of the leader [-]; the
     leader is the first, the others follow by coherence."""
 
-    waves: Mapping[str, Wave]
+    waves: Mapping[str, OscillationLines]
     coherence: Mapping[str, float]
 
     @property
@@ -47,7 +47,7 @@ class Group:
         """Names of its loops."""
         return tuple(self.waves)
 
-    def with_lacking(self, waves: Mapping[str, Wave], coherence: Mapping[str, float]) -> Group:
+    def with_lacking(self, waves: Mapping[str, OscillationLines], coherence: Mapping[str, float]) -> Group:
         """The group with additional loops."""
         lacking = [loop for loop in waves if loop not in self.waves]
         more = {loop: waves[loop] for loop in lacking}, {loop: coherence[loop] for loop in lacking}
@@ -57,7 +57,7 @@ class Group:
 class _Neighbours:
     """Oscillations of one clock by rising frequency, and which are coherent; each is computed once."""
 
-    def __init__(self, waves: Sequence[Wave], limits: PlantLimits) -> None:
+    def __init__(self, waves: Sequence[OscillationLines], limits: PlantLimits) -> None:
         self.waves = sorted(waves, key=lambda w: w.line)
         self._limits = limits
         lines = [tapered(w.lines).astype(np.complex64) for w in self.waves]
@@ -135,7 +135,7 @@ class _Neighbours:
         return np.asarray(np.max(found, axis=0))
 
     @staticmethod
-    def _drifts(one: Wave, others: Sequence[Wave]) -> Floats:
+    def _drifts(one: OscillationLines, others: Sequence[OscillationLines]) -> Floats:
         """Phase drift [turns over the record] of other oscillations against a given one, near its period."""
         if not others:
             return np.zeros(0)
@@ -144,7 +144,7 @@ class _Neighbours:
         return np.abs(drift(x, np.array(y)))
 
 
-def groups_of(waves: Sequence[Wave], limits: PlantLimits) -> list[Group]:
+def groups_of(waves: Sequence[OscillationLines], limits: PlantLimits) -> list[Group]:
     """Groups of loops with a common oscillation from all oscillations of a night, larger groups first; none of a
     single loop."""
     known = [w for w in on_one_clock(waves) if w.line >= limits.follow_cycles and np.any(w.lines)]
@@ -155,7 +155,7 @@ def groups_of(waves: Sequence[Wave], limits: PlantLimits) -> list[Group]:
     return sorted(merged, key=lambda g: (-len(g.waves), g.loops))
 
 
-def _shows(wave: Wave, limits: PlantLimits) -> bool:
+def _shows(wave: OscillationLines, limits: PlantLimits) -> bool:
     """Whether an oscillation is found, or indicated, in its loop alone."""
     return wave.own or wave.prominence >= limits.hint_prominence
 
@@ -177,7 +177,7 @@ def _led(beside: _Neighbours, limits: PlantLimits) -> list[Group]:
     return found
 
 
-def _is_wave(waves: Sequence[Wave], limits: PlantLimits) -> bool:
+def _is_wave(waves: Sequence[OscillationLines], limits: PlantLimits) -> bool:
     """Whether the common signal is an oscillation, and not the load of neighbours: one loop shows it alone, or
     several indicate it."""
     hints = sum(w.prominence >= limits.hint_prominence for w in waves)
@@ -219,8 +219,8 @@ def _with_foresight(group: Group, beside: _Neighbours, limits: PlantLimits) -> G
     clearest = sorted(group.waves.values(), key=lambda w: -w.prominence)[:HEARD]
     near = (beside.waves[k] for k in beside.near(next(iter(group.waves.values())).line, NEAR_PERIOD))
     asked = [w for w in near if w.loop not in group.waves and w.harmonic == 1 and _shows(w, limits)]
-    best: dict[str, tuple[float, Wave]] = {}
-    for wave, level in zip(asked, foresight(asked, clearest), strict=True):
+    best: dict[str, tuple[float, OscillationLines]] = {}
+    for wave, level in zip(asked, median_granger_f(asked, clearest), strict=True):
         if level >= limits.foresight and level > best.get(wave.loop, (0.0, wave))[0]:
             best[wave.loop] = level, wave
     return group.with_lacking({loop: wave for loop, (_, wave) in best.items()}, dict.fromkeys(best, 0.0))

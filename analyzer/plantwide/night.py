@@ -20,16 +20,16 @@ from analyzer.loop.decisions import (
     Figures,
     Finding,
     GroupRole,
+    OscillationFigures,
     Remedy,
-    Root,
     Sign,
     SignKind,
+    SourceLoop,
     Status,
-    Swing,
 )
 from analyzer.plantwide.groups import Group, groups_of
+from analyzer.plantwide.oscillation_lines import OscillationLines
 from analyzer.plantwide.source import Candidate, Lags, candidates_of
-from analyzer.plantwide.wave import Wave
 
 LAG_KNOWN = 0.5
 """Largest ratio of a lag's standard deviation to the lag for a report: the lag is then two deviations from
@@ -48,7 +48,7 @@ Loops = Mapping[str, Finding]
 
 
 def traced_night(
-    loops: Loops, waves: Sequence[Wave], limits: PlantLimits, first: int = 1
+    loops: Loops, waves: Sequence[OscillationLines], limits: PlantLimits, first: int = 1
 ) -> tuple[dict[str, Finding], list[dict[str, Any]]]:
     """Result of the plant-wide pass: the loops, with followers and their sources changed, and rows of groups.
 
@@ -71,7 +71,11 @@ def traced_night(
 
 
 def following(
-    own: Finding, root: Root, swing: Swing | None, seen: tuple[SignKind, Figures], limits: PlantLimits
+    own: Finding,
+    root: SourceLoop,
+    swing: OscillationFigures | None,
+    seen: tuple[SignKind, Figures],
+    limits: PlantLimits,
 ) -> Finding:
     """A loop that follows another one: an external disturbance moves it, and its own valve and settings are left
     unchanged.
@@ -94,20 +98,22 @@ def following(
     )
 
 
-def _follower(own: Finding, root: Root, wave: Wave, limits: PlantLimits) -> Finding:
+def _follower(own: Finding, root: SourceLoop, wave: OscillationLines, limits: PlantLimits) -> Finding:
     """A loop as a follower; unchanged if it does not oscillate, not even with its part of the common oscillation."""
     seen = SignKind.FOLLOWS, (root.loop, root.lag_s, root.coherence)
     told = following(own, root, swing_of(own, root, wave, limits), seen, limits)
     return told if told.oscillates else own
 
 
-def swing_of(own: Finding, root: Root, wave: Wave, limits: PlantLimits) -> Swing | None:
+def swing_of(
+    own: Finding, root: SourceLoop, wave: OscillationLines, limits: PlantLimits
+) -> OscillationFigures | None:
     """Oscillation of a follower: its part, if it has none of its own and the part is a fair share of the error."""
     if own.oscillates or wave.share < limits.weak_share:
         return own.swing
     share, amplitude = wave.oscillating_pct, wave.amplitude_pct
     hours = own.number("usable_h") * share / 100.0
-    return Swing(amplitude * root.coherence * hours, share, wave.period_s, amplitude)
+    return OscillationFigures(amplitude * root.coherence * hours, share, wave.period_s, amplitude)
 
 
 def likely(found: Traced, limits: PlantLimits) -> list[str]:
@@ -121,7 +127,7 @@ def likely(found: Traced, limits: PlantLimits) -> list[str]:
     return out
 
 
-def _role(loop: str, found: Traced, followers: Mapping[str, Root], limits: PlantLimits) -> GroupRole:
+def _role(loop: str, found: Traced, followers: Mapping[str, SourceLoop], limits: PlantLimits) -> GroupRole:
     if loop in found.followers and loop in followers:
         return GroupRole.FOLLOWER
     if loop == found.source and found.candidates[0].confidence_pct >= limits.source_pct:
@@ -130,11 +136,11 @@ def _role(loop: str, found: Traced, followers: Mapping[str, Root], limits: Plant
 
 
 def group_rows(
-    number: int, found: Traced, followers: Mapping[str, Root], loops: Loops, limits: PlantLimits
+    number: int, found: Traced, followers: Mapping[str, SourceLoop], loops: Loops, limits: PlantLimits
 ) -> list[dict[str, Any]]:
     """A row for each loop of a reported group, the source first, then by amplitude."""
     known = {c.loop: c for c in found.candidates}
-    itself = Root("", 1.0, 0.0, 0.0)
+    itself = SourceLoop("", 1.0, 0.0, 0.0)
     out = []
     for loop, wave in found.group.waves.items():
         if loop not in loops:
@@ -182,7 +188,7 @@ class Traced:
 
     group: Group
     candidates: tuple[Candidate, ...]
-    links: Mapping[str, Root]
+    links: Mapping[str, SourceLoop]
     parents: Mapping[str, str]
     followers: frozenset[str]
 
@@ -220,14 +226,14 @@ def _traced(group: Group, peers: Loops, limits: PlantLimits) -> Traced | None:
     return Traced(group, candidates, links, _parents(best.loop, lags, limits), followers)
 
 
-def _links_to_source(group: Group, best: Candidate, lags: Lags, limits: PlantLimits) -> dict[str, Root]:
+def _links_to_source(group: Group, best: Candidate, lags: Lags, limits: PlantLimits) -> dict[str, SourceLoop]:
     """Relations of the other loops of a group to its most likely source."""
     out = {}
     for loop, coherence in group.coherence.items():
         if loop != best.loop:
             lag = lags.between(best.loop, loop)
             known = lag.lag_s if lag.deviation_s < LAG_KNOWN * abs(lag.lag_s) else None
-            out[loop] = Root(best.loop, max(lag.coherence, coherence), known, best.confidence_pct)
+            out[loop] = SourceLoop(best.loop, max(lag.coherence, coherence), known, best.confidence_pct)
     return out
 
 
@@ -251,18 +257,18 @@ def _parents(source: str, lags: Lags, limits: PlantLimits) -> dict[str, str]:
     return out
 
 
-def trace(waves: Sequence[Wave], peers: Loops, limits: PlantLimits) -> list[Traced]:
+def trace(waves: Sequence[OscillationLines], peers: Loops, limits: PlantLimits) -> list[Traced]:
     """The groups of a night, traced to their sources, those of more loops first."""
     found = (_traced(g, peers, limits) for g in groups_of(waves, limits))
     return [t for t in found if t is not None]
 
 
-def followers_of(found: Sequence[Traced]) -> dict[str, tuple[Root, Wave]]:
+def followers_of(found: Sequence[Traced]) -> dict[str, tuple[SourceLoop, OscillationLines]]:
     """The source of each follower, in its larger oscillation if it follows in two groups.
 
     A loop that leads one group does not follow in another where its oscillation is smaller.
     """
-    out: dict[str, tuple[Root, Wave]] = {}
+    out: dict[str, tuple[SourceLoop, OscillationLines]] = {}
     leads = {t.source: t.group.waves[t.source].amplitude_pct for t in found if t.followers}
     for t in found:
         waves = t.group.waves
@@ -273,12 +279,12 @@ def followers_of(found: Sequence[Traced]) -> dict[str, tuple[Root, Wave]]:
     return {loop: (_rooted(loop, out), wave) for loop, (_, wave) in out.items()}
 
 
-def _rooted(loop: str, found: Mapping[str, tuple[Root, Wave]]) -> Root:
+def _rooted(loop: str, found: Mapping[str, tuple[SourceLoop, OscillationLines]]) -> SourceLoop:
     """The source at the end of the chain: a follower of a follower follows the loop that leads both."""
     at, seen = found[loop][0], {loop}
     while at.loop in found and at.loop not in seen:
         seen.add(at.loop)
         further = found[at.loop][0]
         level = min(at.coherence, further.coherence)
-        at = Root(further.loop, level, None, min(at.confidence_pct, further.confidence_pct))
+        at = SourceLoop(further.loop, level, None, min(at.confidence_pct, further.confidence_pct))
     return at

@@ -17,7 +17,7 @@ import numpy as np
 
 from analyzer.config import PlantLimits
 from analyzer.loop.decisions import Cause, Finding
-from analyzer.plantwide.wave import Wave, in_steps
+from analyzer.plantwide.oscillation_lines import OscillationLines, in_steps
 from identification.record import Floats
 from identification.signals.cross_spectrum import Delay, band, granger_f, lag, tapered
 
@@ -47,10 +47,12 @@ class Candidate:
     confidence_pct: float
 
 
-def _first_guess(waves: Sequence[Wave], peers: Mapping[str, Finding], most: int) -> list[Wave]:
+def _first_guess(
+    waves: Sequence[OscillationLines], peers: Mapping[str, Finding], most: int
+) -> list[OscillationLines]:
     """The oscillations of the most likely candidates, up to a number."""
 
-    def rank(w: Wave) -> tuple[float, float]:
+    def rank(w: OscillationLines) -> tuple[float, float]:
         own = peers[w.loop]
         valve = own.cause is Cause.VALVE
         return -(own.number("evidence") if valve else _tuning_share(own)), -w.prominence
@@ -104,7 +106,7 @@ def candidates_of(lags: Lags, peers: Mapping[str, Finding], limits: PlantLimits)
 
 
 def _signs_by_name(
-    waves: Sequence[Wave], peers: Sequence[Finding], lags: Lags, limits: PlantLimits
+    waves: Sequence[OscillationLines], peers: Sequence[Finding], lags: Lags, limits: PlantLimits
 ) -> list[dict[str, float]]:
     """The criteria of each candidate by name."""
     first, shared = _leads([w.loop for w in waves], lags, limits)
@@ -116,7 +118,7 @@ def _signs_by_name(
         "tuning": [(p.cause is Cause.TUNING) * _tuning_share(p) for p in peers],
         "oscillates": [w.own and w.harmonic == 1 for w in waves],
         "first": first,
-        "foresees": foresees(waves),
+        "foresees": prediction_balance(waves),
         "central": _relative(shared),
         "clear": _relative(np.log(np.maximum([w.prominence for w in waves], 1.0))),
         "share": [min(w.share, 1.0) for w in waves],
@@ -128,7 +130,7 @@ def _signs_by_name(
 class Lags:
     """Lags between pairs of loops; each is computed once."""
 
-    def __init__(self, waves: Mapping[str, Wave]) -> None:
+    def __init__(self, waves: Mapping[str, OscillationLines]) -> None:
         self.waves = waves
         self._known: dict[tuple[str, str], Delay] = {}
 
@@ -140,7 +142,7 @@ class Lags:
         return self._known[pair]
 
 
-def _lag(one: Wave, other: Wave) -> Delay:
+def _lag(one: OscillationLines, other: OscillationLines) -> Delay:
     low, high, _ = band(one.line)
     low = max(low, one.first + 1, other.first + 1)
     high = min(high, one.first + one.lines.size - 1, other.first + other.lines.size - 1)
@@ -150,7 +152,7 @@ def _lag(one: Wave, other: Wave) -> Delay:
     return lag(x, y, one.duration_s, max(LAG_PERIODS * one.period_s, LAG_LEAST_S))
 
 
-def _foreseeing(waves: Sequence[Wave], asked: int | None = None) -> tuple[list[int], Floats]:
+def _foreseeing(waves: Sequence[OscillationLines], asked: int | None = None) -> tuple[list[int], Floats]:
     """Oscillations whose trends have common steps, and Granger's F of each on each, or of the pairs of the first
     `asked` with the later ones, shape (k, k); none if fewer than two have them, or over too few steps."""
     step = max((w.step_s for w in waves if w.trend.size), default=0.0)
@@ -169,7 +171,7 @@ def _foreseeing(waves: Sequence[Wave], asked: int | None = None) -> tuple[list[i
     return known, granger_f(trends, FORESEEN, asked and sum(i < asked for i in known))
 
 
-def foresees(waves: Sequence[Wave]) -> Floats:
+def prediction_balance(waves: Sequence[OscillationLines]) -> Floats:
     """Mean over the others of how much better each predicts them than they predict it (-1 to 1), by Granger's F."""
     out = np.zeros(len(waves))
     known, f = _foreseeing(waves)
@@ -181,7 +183,7 @@ def foresees(waves: Sequence[Wave]) -> Floats:
     return out
 
 
-def foresight(ones: Sequence[Wave], others: Sequence[Wave]) -> Floats:
+def median_granger_f(ones: Sequence[OscillationLines], others: Sequence[OscillationLines]) -> Floats:
     """Median F with which each oscillation's past predicts others, shape (k,); 0 if theirs predicts it as well or
     better."""
     out = np.zeros(len(ones))

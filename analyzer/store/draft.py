@@ -13,7 +13,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from analyzer.places import is_remote
+from analyzer.locations import is_remote
 from analyzer.store.store import Store
 from analyzer.store.table import KEPT, write_table
 

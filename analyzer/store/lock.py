@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analyzer.history.parquet import forget_halves, holds_copies
-from analyzer.places import answering, content, is_remote
+from analyzer.locations import content, is_remote, refusals_as_errors
 from analyzer.store.notes import user
 from identification.errors import InputError
 
@@ -59,7 +59,7 @@ def scratch(store: Path, resume: bool = False) -> Iterator[Path]:
     any other removes it. Raises OSError where the store cannot be made or written.
     """
     if is_remote(store):
-        with answering(store):
+        with refusals_as_errors(store):
             (store / TRIED).write_text("")
             (store / TRIED).unlink()
         with tempfile.TemporaryDirectory(prefix="triage-copies-", ignore_cleanup_errors=True) as made:
@@ -147,7 +147,7 @@ def locked(store: Path) -> Iterator[None]:
 def _sign_alone(store: Path, mine: Signature) -> None:
     """Sign a store on shared storage that has no owner. The storage creates the object only if there is none, so that
     of two runs starting at the same time one is rejected. Raises InputError where another run has it."""
-    with answering(store):
+    with refusals_as_errors(store):
         dead = _require_unsigned(store)
         if dead:
             (store / OWNER).unlink(missing_ok=True)

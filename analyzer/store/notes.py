@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from analyzer.history.plant_clock import stamp
-from analyzer.places import is_remote
+from analyzer.locations import is_remote
 from identification.errors import InputError
 from reports.texts import visible
 

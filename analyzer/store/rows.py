@@ -22,13 +22,13 @@ from analyzer.loop.decisions import (
     Finding,
     Lane,
     MissingData,
+    OscillationFigures,
     Remedy,
     Requirement,
     RequirementKind,
     Sign,
     SignKind,
     Status,
-    Swing,
 )
 from analyzer.words.reason import as_stored, reason
 
@@ -87,7 +87,7 @@ def finding_of(row: Row) -> Finding:
     """The finding of a loop from a worker's piece."""
     swing, action = None, _or_none(Action, row["action"])
     if row["oscillating_pct"] is not None:
-        swing = Swing(**{name: row[c] for c, name in SWING.items()})
+        swing = OscillationFigures(**{name: row[c] for c, name in SWING.items()})
     return Finding(
         row["loop"],
         row["night"],

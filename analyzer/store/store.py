@@ -25,17 +25,26 @@ from typing import Any
 
 import pyarrow as pa
 
-from analyzer.columns import BELIEVED, NIGHTS, RESTING
-from analyzer.places import afresh, answering, content, each, is_passing, is_remote, not_now, remove_tree
+from analyzer.columns import BELIEVED, NIGHTS, REPLACED_BY_BELIEF
+from analyzer.locations import (
+    afresh,
+    content,
+    each,
+    is_passing,
+    is_remote,
+    not_now,
+    refusals_as_errors,
+    remove_tree,
+)
 from analyzer.store.table import (
     KEPT,
     DamagedError,
+    further_tables,
     read_stored,
     rows_of_loops,
     rows_table,
     stored_names,
     stored_parts,
-    tables_beside,
     write_table,
 )
 from identification.errors import InputError
@@ -148,7 +157,7 @@ class Store:
     ) -> list[dict[str, Any]]:
         """Rows of one night, of some loops or of all, as reported: in the table of nights the columns based on all
         nights come from beliefs, for loops that have some. Unknown columns are None."""
-        resting = [c.name for c in (*RESTING, *BELIEVED) if c.name in columns]
+        resting = [c.name for c in (*REPLACED_BY_BELIEF, *BELIEVED) if c.name in columns]
         if table != "nights" or not resting or not self.file("beliefs", night).exists():
             return self.own_rows(table, night, columns, loops)
         wanted = ["loop", "cause", *(c for c in resting if c != "cause")]
@@ -255,7 +264,7 @@ class Store:
     def _require_unwritten(self, night: str, table: str, key: str) -> None:
         """Raise DamagedError if a piece written by a chunk is missing."""
         try:
-            written = table in tables_beside(self.part(night, "nights", key))
+            written = table in further_tables(self.part(night, "nights", key))
         except FileNotFoundError:
             written = True
         if written:
@@ -276,7 +285,7 @@ class Store:
         NotNowError if it cannot be read now."""
         path = self.path / VERSION_FILE
         try:
-            with answering(self.path) if is_remote(self.path) else nullcontext():
+            with refusals_as_errors(self.path) if is_remote(self.path) else nullcontext():
                 return _stated_schema(path)
         except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
             if is_passing(error):

@@ -15,8 +15,8 @@ import pyarrow.parquet as pq
 
 from analyzer import columns as declared
 from analyzer.columns import Column, Kind, row_of
+from analyzer.locations import content, is_passing, is_remote, is_whole, not_now
 from analyzer.loop.decisions import Action
-from analyzer.places import content, is_passing, is_remote, is_whole, not_now
 from analyzer.words.units import SECONDS
 from identification.errors import InputError
 from reports.whole_file import whole_file
@@ -127,7 +127,7 @@ def marked(table: pa.Table, key: bytes, text: str) -> pa.Table:
     return table.replace_schema_metadata({key: text.encode()})
 
 
-def tables_beside(path: Path) -> list[str]:
+def further_tables(path: Path) -> list[str]:
     """The tables of which a chunk has written further pieces; errors as of `read_stored`."""
     return mark_of(path, BESIDE).split()
 

@@ -12,7 +12,7 @@ from analyzer.words.reason import joined
 from analyzer.words.units import Row, duration, number
 
 if TYPE_CHECKING:
-    from analyzer.belief.belief import Belief, Calm
+    from analyzer.belief.belief import Belief, NightFigures
     from analyzer.belief.wear import Growth, PhaseKnown
 
 REPAIRED = re.compile(
@@ -133,7 +133,7 @@ def _calmed(now: Belief) -> str:
     )
 
 
-def _sizes(seen: Calm | None) -> str:
+def _sizes(seen: NightFigures | None) -> str:
     """Size of a cycle and of the error."""
     if seen is None:
         return "an amplitude that is not known"

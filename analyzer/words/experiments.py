@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from analyzer.history.plant_clock import stamp
-from analyzer.loop.experiments.found import Learned
+from analyzer.loop.experiments.found import ExperimentResults
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import sentences
@@ -42,7 +42,7 @@ def name_of(x: Experiment) -> str:
     return f"{x.course} of OP{f', {x.moves} moves' if many else ''} over {number(x.size)} %"
 
 
-def found_lines(of: Learned, zone: str) -> Iterator[str]:
+def found_lines(of: ExperimentResults, zone: str) -> Iterator[str]:
     """A line for each experiment: time and kind."""
     start_s, dt_s = of.prepared.record.start_s, of.prepared.record.dt_s
     for x in of.found:
@@ -76,7 +76,7 @@ def model_text(model: Pooled) -> str:
     return ", ".join(said)
 
 
-def in_a_clause(of: Learned) -> str:
+def in_a_clause(of: ExperimentResults) -> str:
     """Text on the experiments in a row; '' if they give no model."""
     if of.model is None:
         return ""
@@ -91,7 +91,7 @@ def settings_text(pid: Pid, spec: LoopSpec, pv_span: float) -> str:
     return f"kp {number(kp)}, ti {number(ti)} {spec.ti_unit} ({spec.gain_unit}, {spec.form})"
 
 
-def settings_lines(of: Learned, spec: LoopSpec, present: Pid | None) -> Iterator[str]:
+def settings_lines(of: ExperimentResults, spec: LoopSpec, present: Pid | None) -> Iterator[str]:
     """Settings from the model: ours, and SIMC's for comparison, each with its maximum sensitivity."""
     if of.settings is None:
         return
@@ -102,10 +102,10 @@ def settings_lines(of: Learned, spec: LoopSpec, present: Pid | None) -> Iterator
         yield f"  present: {settings_text(present, spec, span)}"
 
 
-def lines(of: Learned, spec: LoopSpec, present: Pid | None, zone: str) -> Iterator[str]:
+def lines(of: ExperimentResults, spec: LoopSpec, present: Pid | None, zone: str) -> Iterator[str]:
     """All results of a loop's experiments."""
     yield from found_lines(of, zone)
-    for x, why in of.untold:
+    for x, why in of.without_model:
         yield f"  gives no model ({name_of(x)}): {why}"
     yield from lone_lines(of, zone)
     if of.model is None:
@@ -127,7 +127,7 @@ def lines(of: Learned, spec: LoopSpec, present: Pid | None, zone: str) -> Iterat
         yield f"  not identified by the experiment: {text}"
 
 
-def controller_lines(of: Learned) -> Iterator[str]:
+def controller_lines(of: ExperimentResults) -> Iterator[str]:
     """Results of an experiment in automatic on its controller."""
     seen = of.controlled
     if seen is None:
@@ -141,7 +141,7 @@ def controller_lines(of: Learned) -> Iterator[str]:
         yield f"PV goes {number(seen.overshoot_pct)} % of span beyond SP"
 
 
-def lone_lines(of: Learned, zone: str) -> Iterator[str]:
+def lone_lines(of: ExperimentResults, zone: str) -> Iterator[str]:
     """Excluded single values, each with its time."""
     start_s = of.prepared.record.start_s
     for m in of.models:
@@ -150,13 +150,13 @@ def lone_lines(of: Learned, zone: str) -> Iterator[str]:
                 yield f"excluded: one isolated {name} sample at {stamp(start_s + at, zone)}"
 
 
-def left_open(of: Learned) -> tuple[str, ...]:
+def left_open(of: ExperimentResults) -> tuple[str, ...]:
     """Properties not identified by the experiments, and so not in the settings."""
     model = of.model
     if model is None:
         return ()
     out = []
-    if not any(m.tells_play for m in model.used):
+    if not any(m.backlash_identifiable for m in model.used):
         out.append(SAID["play"])
     if any(m.experiment.course.closed for m in model.used):
         out.append(SAID["closed"])

@@ -112,7 +112,7 @@ def intervals_of(pid: Pid, law: FreeLaw | None, spec: LoopSpec, pv_span: float) 
     return f" (90 % intervals: {', '.join(said)})" if said else ""
 
 
-def beside_settings(stated: Pid, shown: Pid, spec: LoopSpec, pv_span: float) -> str:
+def corrected_columns(stated: Pid, shown: Pid, spec: LoopSpec, pv_span: float) -> str:
     """The columns of loops.csv, and their new values, with which a stated controller equals the one in the record."""
     pv, op = pv_span / 100.0, (spec.op_hi - spec.op_lo) / 100.0
     columns = (

@@ -148,7 +148,7 @@ def typical(residual: Floats, length: int) -> float:
     return float(np.median(np.sqrt((residual.reshape(-1, length) ** 2).mean(axis=1))))
 
 
-def obeys(x: Trends, said: StatedSettings, found: ControlLaw) -> bool:
+def is_reproduced(x: Trends, said: StatedSettings, found: ControlLaw) -> bool:
     """Whether the stated law reproduces OP nearly as well as the identified one, overall and in the median span; on a
     thinned recording, whether it reproduces most of OP."""
     n, length, limits = found.residual.size, found.length, x.limits
@@ -189,7 +189,7 @@ def judge(x: Trends, said: StatedSettings) -> tuple[Finding | None, ControlLaw |
         return None, None
     found = recovered_law(x, said.ti, said.kp, late=not thinned)
     e = x.sp - first_order(x.pv, found.smoothed) + found.offset
-    wrong = None if said.confirmed or obeys(x, said, found) else settings(found, said, limits)
+    wrong = None if said.confirmed or is_reproduced(x, said, found) else settings(found, said, limits)
     if thinned:
         return wrong, found
     if found.late >= limits.late and found.explained > limits.law_explains:

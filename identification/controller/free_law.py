@@ -16,13 +16,13 @@ import numpy as np
 
 from identification.controller.gain_pieces import APART
 from identification.controller.law_comparison import AS_WELL, ROUNDING, WORTH, settings_of
-from identification.controller.law_ways import (
+from identification.controller.law_variants import (
     STRAIGHT,
-    Look,
+    PreparedRecord,
     Seen,
     bent_shapes,
     gains_of,
-    look,
+    prepared_record,
     terms_of,
     usual_ways,
     with_best_filter,
@@ -80,7 +80,7 @@ def free_law(record: LoopRecord, scale_s: float) -> FreeLaw | None:
     if first is None or first.kp == 0.0:
         return None
     start = Pid(first.kp, first.ti_s, scan_s=min(record.dt_s, USUAL_SCAN))
-    x = look(record, scale_s, start)
+    x = prepared_record(record, scale_s, start)
     seen = _clearest(x, start)
     if seen is None:
         return None
@@ -100,7 +100,7 @@ def _is_integral(seen: Seen, dt_s: float) -> bool:
     return -dt_s * abs(ki) <= kp * math.copysign(1.0, ki) < 0.0
 
 
-def _law(x: Look, seen: Seen, along: Floats, pid: Pid) -> FreeLaw:
+def _law(x: PreparedRecord, seen: Seen, along: Floats, pid: Pid) -> FreeLaw:
     """A law with its intervals."""
     explained = 1.0 - seen.left_over_all(gains_of(pid))
     kp, ti_s = (
@@ -109,7 +109,7 @@ def _law(x: Look, seen: Seen, along: Floats, pid: Pid) -> FreeLaw:
     return FreeLaw(terms_of(x, pid, seen), explained, kp, replace(ti_s, unit="s"), _several(x, seen, along))
 
 
-def _clearest(x: Look, start: Pid) -> Seen | None:
+def _clearest(x: PreparedRecord, start: Pid) -> Seen | None:
     """The simplest variant of the law; no other one reproduces OP clearly better."""
     best: Seen | None = None
     for seen in _variants(x, start):
@@ -124,12 +124,12 @@ def _clearest(x: Look, start: Pid) -> Seen | None:
     return near if near is not None and near.poorness(near.free) < best.poorness(best.free) else best
 
 
-def _variants(x: Look, start: Pid) -> Iterator[Seen]:
+def _variants(x: PreparedRecord, start: Pid) -> Iterator[Seen]:
     bent = (usual_ways(x, shape, smoothing=False) for shape in bent_shapes(x, None))
     return chain(usual_ways(x, STRAIGHT, start), *bent)
 
 
-def _widths(x: Look, seen: Seen, along: Floats, explained: float) -> tuple[float, float]:
+def _widths(x: PreparedRecord, seen: Seen, along: Floats, explained: float) -> tuple[float, float]:
     """Half-widths of the 90 % intervals of the logs of gain and integral time."""
     edges = np.linspace(0, len(x.record), PARTS + 1).astype(int)
     k = np.arange(len(x.record))
@@ -148,13 +148,13 @@ def _logs(gains: Floats) -> tuple[float, float]:
     return math.log(kp) if kp else 0.0, math.log((kp or 1.0) / ki) if ki else 0.0
 
 
-def _gains_without(x: Look, seen: Seen, along: Floats, out: Mask) -> Floats | None:
+def _gains_without(x: PreparedRecord, seen: Seen, along: Floats, out: Mask) -> Floats | None:
     """The gains of a variant without some samples, bool, shape (n,); None where the others show no law."""
     rest = replace(x, out=x.out | out).seen(seen.rows, seen.way)
     return None if rest is None else best_gains(rest.moves.values(), rest.weight, along, np.zeros(3))
 
 
-def _several(x: Look, seen: Seen, along: Floats) -> bool:
+def _several(x: PreparedRecord, seen: Seen, along: Floats) -> bool:
     """Whether the gains in the lower and the upper half of OP, PV or SP differ by more than the usual resolution."""
     if x.out.all():
         return False

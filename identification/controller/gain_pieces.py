@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.controller.law_ways import GIVES, gains_of, no_law, shape_of, shaped
+from identification.controller.law_variants import GIVES, gains_of, no_law, shape_of, shaped
 from identification.models import Pid
 from identification.record import Floats, LoopRecord
 from identification.simulation.lag import first_order

@@ -10,17 +10,17 @@ from itertools import chain
 import numpy as np
 
 from identification.controller.gain_pieces import ScheduledGain
-from identification.controller.law_ways import (
+from identification.controller.law_variants import (
     GIVES,
     PLAINLY_BETTER,
     SEEN_FILTER,
     STRAIGHT,
-    Look,
+    LawVariant,
+    PreparedRecord,
     Seen,
-    Way,
     bent_shapes,
     gains_of,
-    look,
+    prepared_record,
     recognized,
     rough_ways,
     shape_of,
@@ -65,7 +65,7 @@ class LawsCompared:
         return (1.0 - self.explained_stated) / max(1.0 - self.explained, 1e-9)
 
 
-def _ways(x: Look, stated: Pid) -> Iterator[Seen]:
+def _ways(x: PreparedRecord, stated: Pid) -> Iterator[Seen]:
     """All variants of the law, first with the stated error shape, then with unlisted properties."""
     own, gains = shape_of(stated), gains_of(stated)
     yield from usual_ways(x, own, stated)
@@ -84,10 +84,10 @@ def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompar
     period_s : period, or other time scale on which the loop moves [s]. None where the record does not show a law; the
     stated law, completed by what the record shows, where it agrees.
     """
-    gains, x = gains_of(stated), look(record, period_s, stated)
+    gains, x = gains_of(stated), prepared_record(record, period_s, stated)
     best, given = None, None
     for seen in _ways(x, stated):
-        if seen.does(gains):
+        if seen.reproduces_op(gains):
             return LawsCompared(recognized(x, stated, seen, _way_needed(seen, given, stated)), 1.0, 1.0, True)
         if not seen.is_law(gains):
             continue
@@ -101,13 +101,13 @@ def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompar
         return None
     if given.way.pv_filter >= SEEN_FILTER:
         near = with_best_filter(x, given.way, gains)
-        if near is not None and near.does(gains):
+        if near is not None and near.reproduces_op(gains):
             return LawsCompared(recognized(x, stated, near, near.way), 1.0, 1.0, True)
     found = _simplest(best, gains, record.duration_s, with_shape(stated, best.way.shape))
     return None if found is None else _most_apart(best, given, gains, *found)
 
 
-def _way_needed(seen: Seen, before: Seen | None, stated: Pid) -> Way:
+def _way_needed(seen: Seen, before: Seen | None, stated: Pid) -> LawVariant:
     """The variant in which the stated law reproduces OP; with the stated error shape if that is about as good."""
     own, gains = shape_of(stated), gains_of(stated)
     if seen.way.shape == own or before is None:
@@ -122,7 +122,7 @@ def scheduled_over(record: LoopRecord, period_s: float, stated: Pid) -> Schedule
 
     A part counts if the integral is visible in it, on increments of half an integral time.
     """
-    gains, whole = gains_of(stated), look(record, period_s, stated)
+    gains, whole = gains_of(stated), prepared_record(record, period_s, stated)
     for name in ("op", "pv", "sp"):
         x = getattr(record, name)
         for low, high in PARTS:
@@ -131,7 +131,7 @@ def scheduled_over(record: LoopRecord, period_s: float, stated: Pid) -> Schedule
             seen = within.plainly(shape_of(stated)) if b > a else None
             if seen is None or (stated.ki and max(seen.moves) * record.dt_s < 0.5 * stated.ti_s):
                 continue
-            if seen.does(gains):
+            if seen.reproduces_op(gains):
                 return ScheduledGain(name)
     return None
 
@@ -143,7 +143,7 @@ def best_of(record: LoopRecord, period_s: float, laws: Sequence[Pid]) -> Pid:
     every scan recorded.
     """
     poor = np.full(len(laws), np.inf)
-    for seen in usual_ways(look(record, period_s, laws[0]), STRAIGHT, *laws, smoothing=False):
+    for seen in usual_ways(prepared_record(record, period_s, laws[0]), STRAIGHT, *laws, smoothing=False):
         left = np.stack([seen.left(gains_of(law)) for law in laws])
         poor = np.minimum(poor, np.log(np.maximum(left, ROUNDING)).mean(axis=1))
     best = int(np.argmin(poor))

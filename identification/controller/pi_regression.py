@@ -175,7 +175,7 @@ def unstated_law(x: Trends) -> ControlLaw | None:
     return found if found.kp * found.ki > 0.0 and believed else None
 
 
-def fed_back(op: Floats, pv: Floats) -> float:
+def feedback_share(op: Floats, pv: Floats) -> float:
     """Share [-] of OP's moves, unexplained by OP's own past, that PV's value and its last moves explain, 0 to 1.
 
     Both of shape (n,). 0 for a record of fewer samples than twenty times the constants.

@@ -20,7 +20,7 @@ from identification.estimation.search import (
     WhitePv,
     behind,
     faded_products,
-    learnt_noise,
+    initial_noise,
     level_of,
     search,
     settled,
@@ -88,24 +88,24 @@ REFINED_WORTH = 5.0
 (cause.evidence_jump)."""
 
 
-def fit_linear(window: Problem, period_s: float) -> Fitted:
+def fit_linear(problem: Problem, period_s: float) -> Fitted:
     """Fit the process behind an ideal valve.
 
     period_s : period of the oscillation, or another time scale of the loop [s], about which the search begins.
     """
-    noises, begins = (learnt_noise(window), generic_noise()), starts(window, period_s)
-    fits = [descend(_ranked(window, ar, [IDEAL], begins, 3)[0]) for ar in noises]
+    noises, begins = (initial_noise(problem), generic_noise()), starts(problem, period_s)
+    fits = [descend(_ranked(problem, ar, [IDEAL], begins, 3)[0]) for ar in noises]
     return max(fits, key=lambda fit: fit.log_likelihood)
 
 
 def _ranked(
-    window: Problem, ar: Floats, valves: list[StemLaw], begins: list[Dynamics], halvings: int = 2
+    problem: Problem, ar: Floats, valves: list[StemLaw], begins: list[Dynamics], halvings: int = 2
 ) -> list[Fitted]:
     """Starts for the descent: each valve with its best dynamics under one noise model, best first."""
-    trials, pv = [], white_pv(window, ar)
+    trials, pv = [], white_pv(problem, ar)
     for valve in valves:
         (t, dead), sigma2, count, beta = search(behind(pv, valve), begins, halvings)
-        fit = start_at(window, float(beta[0]), (t, dead), valve, ar)
+        fit = start_at(problem, float(beta[0]), (t, dead), valve, ar)
         slow = np.array([beta[1], beta[2], 0.0, 0.0])
         trials.append(replace(fit, loss=sigma2, count=count, slow=slow))
     return sorted(trials, key=lambda fit: fit.loss)
@@ -124,21 +124,21 @@ def _likeliest(fits: list[Fitted]) -> Fitted:
     return max(ends, key=lambda fit: fit.log_likelihood)
 
 
-def fit_play(linear: Fitted, period_s: float, hopeful: float | None = None) -> Fitted:
+def fit_backlash(linear: Fitted, period_s: float, hopeful: float | None = None) -> Fitted:
     """The best backlash followed by a lag: a screening, then the full search if the screening finds anything.
 
     linear : the best fit behind an ideal valve; period_s : time scale of the search [s]; hopeful : gain in log
     likelihood [nat] of a quick screening above which the full search follows; None: the screening is thorough and the
     limit is SCREENED.
     """
-    window = linear.p
-    reach = window.reach
+    problem = linear.p
+    reach = problem.reach
     screened = [sticking(share * reach, 0.0) for share in SCREEN_SHARES]
     followed = len(screened) if hopeful is None else 1
     best = _likeliest(_chosen(linear, screened, period_s, followed))
     if best.log_likelihood - linear.log_likelihood < (SCREENED if hopeful is None else hopeful):
         return best
-    followed = FOLLOWED_SHORT if window.y.size < SHORT else 1
+    followed = FOLLOWED_SHORT if problem.y.size < SHORT else 1
     begun = []
     for part in (SMALL, MIDDLE, LARGE, (best.valve.stickband / reach,)):
         valves = [sticking(share * reach, 0.0) for share in part]
@@ -167,7 +167,7 @@ def fit_stick_slip(play: Fitted, period_s: float) -> Fitted:
     short = play.p.y.size < SHORT
     begun = _chosen(play, _coarse(play), period_s, FOLLOWED_SHORT if short else FOLLOWED)
     narrow, laws = _grid(NARROW_WIDTHS, FINE_JUMPS), (RESTS, HALTS, SLIDES)
-    fits = [_likeliest(begun), *pits(play, laws), *pits(play, laws, narrow)]
+    fits = [_likeliest(begun), *local_minima(play, laws), *local_minima(play, laws, narrow)]
     return refined(max(fits, key=lambda fit: fit.log_likelihood))
 
 
@@ -178,7 +178,7 @@ def refined(fit: Fitted) -> Fitted:
         share = fit.valve.slip_jump / max(fit.valve.stickband, 1e-9)
         first, end, step = NEAR_JUMPS
         about = _grid(NEAR_WIDTHS, (max(share + first, step), min(share + end, 1.0 + 1e-9), step))
-        found = pits(fit, (fit.valve.tolerance,), about, NEAR_DEAD)
+        found = local_minima(fit, (fit.valve.tolerance,), about, NEAR_DEAD)
         best = max((fit, *found), key=lambda fit: fit.log_likelihood)
         gained, fit = best.log_likelihood - fit.log_likelihood, best
         if gained < REFINED_WORTH:
@@ -205,7 +205,7 @@ def _coarse(play: Fitted) -> list[StemLaw]:
     ]
 
 
-def pits(
+def local_minima(
     play: Fitted, tolerances: tuple[float, ...], grid: Floats | None = None, later: tuple[float, ...] = LATER
 ) -> list[Fitted]:
     """The most likely stick-slips near a backlash or another stick-slip: local minima of the best few of each
@@ -215,14 +215,14 @@ def pits(
     grid : shape (m, 2), stickbands as multiples of the backlash width and slip jumps as shares of the stickband;
     later : dead times added to that of the backlash fit [blocks].
     """
-    window = play.p
+    problem = play.p
     pairs = np.array([play.valve.stickband, 1.0]) * (_grid(FINE_WIDTHS, FINE_JUMPS) if grid is None else grid)
-    t, deads = play.time_constant_s, np.maximum(play.dead_time_s + np.array(later) * window.dt_s, 0.0)
-    out, pv, begins = [], white_pv(window, generic_noise()), [(t, float(dead)) for dead in deads]
+    t, deads = play.time_constant_s, np.maximum(play.dead_time_s + np.array(later) * problem.dt_s, 0.0)
+    out, pv, begins = [], white_pv(problem, generic_noise()), [(t, float(dead)) for dead in deads]
     for tolerance in tolerances:
         left = _scan(pv, pairs, tolerance, t, deads)
         best = [sticking(pairs[i, 0], pairs[i, 1], tolerance) for i in np.argsort(left)[:FINALISTS]]
-        fits = _ranked(window, generic_noise(), best, begins)
+        fits = _ranked(problem, generic_noise(), best, begins)
         out += [_bottom(descend(fit)) for fit in fits]
     likeliest = sorted(out, key=lambda fit: -fit.log_likelihood)[:FOLLOWED]
     return [_bottom(fit) for fit in likeliest]
@@ -294,11 +294,11 @@ def width_profile(linear: Fitted, play: Fitted) -> Floats:
     one. The best backlash lies between two widths: it counts for both, less a nat for a whole step of them, so that
     two records of one valve always agree on one width.
 
-    linear, play : the fits to one window behind an ideal valve and behind the best backlash.
+    linear, play : the fits to one problem behind an ideal valve and behind the best backlash.
     """
-    window = linear.p
-    blocks = window.with_blocks(position=None)
-    out, reach = np.zeros(WIDTHS.size), float(np.ptp(window.blocks.op))
+    problem = linear.p
+    blocks = problem.with_blocks(position=None)
+    out, reach = np.zeros(WIDTHS.size), float(np.ptp(problem.blocks.op))
     asked = np.flatnonzero((WIDTH_SEEN * reach < WIDTHS) & (WIDTH_WHOLE * reach > WIDTHS))
     if asked.size == 0:
         return out
@@ -316,10 +316,10 @@ def width_profile(linear: Fitted, play: Fitted) -> Floats:
     return out
 
 
-def _ideal(window: Problem, linear: Fitted, play: Fitted, ar: Floats) -> float:
+def _ideal(problem: Problem, linear: Fitted, play: Fitted, ar: Floats) -> float:
     """Innovations variance behind an ideal valve under one noise model."""
     begins = [_dynamics(linear), _dynamics(play)]
-    return search(behind(white_pv(window, ar), IDEAL), begins, PROFILE_HALVINGS)[1]
+    return search(behind(white_pv(problem, ar), IDEAL), begins, PROFILE_HALVINGS)[1]
 
 
 def _dynamics(fit: Fitted) -> Dynamics:

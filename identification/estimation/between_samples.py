@@ -45,7 +45,7 @@ class Rows(NamedTuple):
 
 
 class Scans(NamedTuple):
-    """What between-row simulation needs: the rows of a window, the control law, and the scans per row."""
+    """What between-row simulation needs: the rows of a problem, the control law, and the scans per row."""
 
     rows: Rows
     law: Pid
@@ -78,9 +78,9 @@ def settled(fit: Fitted, scans: Scans) -> Fitted:
 
 
 def with_scans(fit: Fitted, scans: Scans, count: int = PATHS) -> Fitted:
-    """A fit whose window has `count` paths of OP at the controller's scan, simulated by its model."""
-    window, paths = fit.p, op_at_scans(fit, scans, count)
-    turn = window.blocks.turn // window.blocks.steps * scans.per_row
+    """A fit whose problem has `count` paths of OP at the controller's scan, simulated by its model."""
+    problem, paths = fit.p, op_at_scans(fit, scans, count)
+    turn = problem.blocks.turn // problem.blocks.steps * scans.per_row
     return fit.within(op=paths[0], paths=paths, steps=scans.per_row, turn=turn)
 
 

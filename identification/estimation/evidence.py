@@ -13,8 +13,8 @@ from identification.estimation.model import Fitted
 from identification.estimation.noise import judged
 from identification.estimation.problem import stem_of
 from identification.record import Floats, Mask
+from identification.signals.reversals import op_reversals
 from identification.signals.robust import clipped_gain
-from identification.signals.turns import turns_of
 
 STEP_PENALTY = 6.0
 """Gain in log likelihood that one step of the load at any time costs [nat]. Source: log of the blocks,
@@ -70,14 +70,14 @@ def with_second_lag(fit: Fitted) -> Fitted:
     27 worn valves (seed 662) backlash gains 73 to 1,600 nat, and a second lag at most 50 nat with one
     exception.
     """
-    window, step_s = fit.p, fit.p.step_s
-    longest_s = max(window.dt_s, fit.dead_time_s)
-    paths = window.blocks.op[None] if window.blocks.paths is None else window.blocks.paths
+    problem, step_s = fit.p, fit.p.step_s
+    longest_s = max(problem.dt_s, fit.dead_time_s)
+    paths = problem.blocks.op[None] if problem.blocks.paths is None else problem.blocks.paths
     best = fit
     for share in SECOND_LAGS:
         kept = math.exp(-step_s / (share * longest_s))
         late = lfilter([1.0 - kept], [1.0, -kept], paths, zi=kept * paths[:, :1])[0]
-        paths_behind = None if window.blocks.paths is None else late
+        paths_behind = None if problem.blocks.paths is None else late
         trial = descend(fit.within(op=late[0], paths=paths_behind))
         best = max(best, trial, key=lambda x: x.log_likelihood)
     return best if best.log_likelihood - fit.log_likelihood > STEP_PENALTY else fit
@@ -109,8 +109,8 @@ def gains(ours: Fitted, theirs: Fitted) -> Floats:
 
 def trials(ours: Fitted, theirs: Fitted, period_s: float) -> Trials | None:
     """Agreement of the stretches between OP reversals that one fit explains PV better; None with fewer than four."""
-    window = ours.p
-    at = turns_of(window.inputs.op, period_s / window.dt_s)
+    problem = ours.p
+    at = op_reversals(problem.inputs.op, period_s / problem.dt_s)
     if at.size < 5:
         return None
     return agreement_of(np.add.reduceat(gains(ours, theirs), at)[:-1])

@@ -72,7 +72,7 @@ def _dead(b: _Bench, theta: Floats) -> float:
 
 @njit(cache=True)
 def _decays(b: _Bench, theta: Floats) -> tuple[float, float]:
-    """Start value of a decay and its factor per block; no decay if the time constant exceeds half the window."""
+    """Start value of a decay and its factor per block; no decay if the time constant exceeds half the stretch."""
     t_s = math.exp(theta[0])
     return 0.0 if t_s > 0.5 * b.y.size * b.dt_s else 1.0, math.exp(-b.dt_s / t_s)
 
@@ -186,12 +186,12 @@ def _descend(b: _Bench, theta: Floats, valve: StemLaw, rule: Descent) -> _Point:
 
 def _at(fit: Fitted, free_width: bool = False) -> tuple[_Bench, Floats, StemLaw]:
     """State of a fit in the kernels' types: the data that its descent shares, its constants and its valve."""
-    window, (most_t, most_dead), valve = fit.p, fit.p.bounds, fit.valve
-    factor, least_dead = (window.blocks.factor, -window.half_block_s) if window.blocks.fine else (1, 0.0)
-    ranges = math.log(0.05 * window.dt_s), math.log(most_t), least_dead, most_dead
-    at = np.flatnonzero(judged(window.usable, fit.ar.size))
-    y, extra = window.centred, window.extra
-    bench = _Bench(y, window.stems, extra, at, free_width, window.dt_s, factor, ranges)
+    problem, (most_t, most_dead), valve = fit.p, fit.p.bounds, fit.valve
+    factor, least_dead = (problem.blocks.factor, -problem.half_block_s) if problem.blocks.fine else (1, 0.0)
+    ranges = math.log(0.05 * problem.dt_s), math.log(most_t), least_dead, most_dead
+    at = np.flatnonzero(judged(problem.usable, fit.ar.size))
+    y, extra = problem.centred, problem.extra
+    bench = _Bench(y, problem.stems, extra, at, free_width, problem.dt_s, factor, ranges)
     head = [math.log(fit.time_constant_s), fit.dead_time_s, valve.stickband, fit.gain]
     return bench, np.concatenate((head, fit.slow, fit.ar)), StemLaw(*(float(x) for x in valve))
 
@@ -209,7 +209,7 @@ def disturbance(fit: Fitted) -> Floats:
 def residual(fit: Fitted) -> Floats:
     """PV less the response to the stem [% PV], shape (n,): load and noise, including the model's slow terms.
 
-    In a fine window the response is computed at the record's own interval and then averaged over blocks, as PV was.
+    In a fine problem the response is computed at the record's own interval and then averaged over blocks, as PV was.
     """
     return np.asarray(fit.p.centred - fit.gain * _point(*_at(fit)).x)
 

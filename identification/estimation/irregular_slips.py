@@ -60,7 +60,7 @@ Gains = dict[tuple[float, float], float]
 
 
 class SlipPath(NamedTuple):
-    """The fit behind a decoded stem, held in its window like a recorded one, and its slips' log probability."""
+    """The fit behind a decoded stem, held in its problem like a recorded one, and its slips' log probability."""
 
     fit: Fitted
     chance: float
@@ -96,11 +96,11 @@ def _decoded(
 
     mean : of the stem [% OP]; law, rest : friction and its longest rest [samples]; most : number of parallel paths.
     """
-    window = fit.p
-    lag = unit_lag(fit.time_constant_s, fit.process.dead_time_s, window.step_s)
+    problem = fit.p
+    lag = unit_lag(fit.time_constant_s, fit.process.dead_time_s, problem.step_s)
     r = Response(lag, fit.gain, slow_terms(fit) - fit.gain * mean)
-    f, counts = SlipDistances(law.breakaway, law.sliding, rest), judged(window.usable, noise.ar.size)
-    return decoded(window.blocks.op, window.centred, counts, r, noise, f, most, least)
+    f, counts = SlipDistances(law.breakaway, law.sliding, rest), judged(problem.usable, noise.ar.size)
+    return decoded(problem.blocks.op, problem.centred, counts, r, noise, f, most, least)
 
 
 def _slips(stem: Floats) -> int:
@@ -123,15 +123,15 @@ def _gain(play: Fitted, band: float, share: float, half: int) -> float:
 def _screened(play: Fitted, noise: Floats, rest: int, gains: Gains) -> list[_Trial]:
     """Promising frictions and dead times near a backlash fit, each with its decoded stem, best first, under a
     separate noise model."""
-    window = play.p
+    problem = play.p
     e = whitened(disturbance(play), noise, every_lag(noise.size))[noise.size :]
-    sigma2 = float(np.mean(e[window.usable[noise.size :]] ** 2))
-    mean, out = float(play_stem(window.blocks.op, play.valve.stickband).mean()), list[_Trial]()
+    sigma2 = float(np.mean(e[problem.usable[noise.size :]] ** 2))
+    mean, out = float(play_stem(problem.blocks.op, play.valve.stickband).mean()), list[_Trial]()
     for later in LATER:
         for (width, share), gain in gains.items():
             if gain:
                 band = width * play.valve.stickband
-                fit = play.moved(dead_time_s=play.dead_time_s + later * window.dt_s, gain=gain)
+                fit = play.moved(dead_time_s=play.dead_time_s + later * problem.dt_s, gain=gain)
                 law, least = sticking(band, share), _bound(out, band, share)
                 path, score = _decoded(fit, mean, law, rest, Noise(noise, sigma2), SCREENED, least)
                 out = _chosen([*out, _Trial(score, _slips(path), band, share, later, gain, path)])
@@ -198,15 +198,15 @@ def _settled(best: SlipPath) -> SlipPath:
 
 def _moved(_: None, best: SlipPath, move: tuple[int, int, int], step: float) -> tuple[SlipPath, float]:
     """The path with another stickband, jump and dead time; an infinite loss where no path has slips."""
-    window = best.fit.p
+    problem = best.fit.p
     v, (wider, jumpier, later) = best.fit.valve, (step * m for m in move)
     band, share = v.stickband * (1.0 + wider), v.slip_jump / v.stickband + 2.0 * jumpier
-    dead_s = best.fit.dead_time_s + later * DEAD_STEPS * window.dt_s
+    dead_s = best.fit.dead_time_s + later * DEAD_STEPS * problem.dt_s
     if not 0.0 < share <= 1.0 or dead_s < 0.0:
         return best, math.inf
     gain = best.fit.gain * v.slip_jump / (band * share)  # a slip moves PV by gain times jump
     fit, law = best.fit.moved(dead_time_s=dead_s, gain=gain), sticking(band, share)
-    stem = _decoded_anew(best, fit, law, window.blocks.op.size, 1.0)
+    stem = _decoded_anew(best, fit, law, problem.blocks.op.size, 1.0)
     if _slips(stem) < FEWEST:
         return best, math.inf
     path = _path(fit, law, stem)
@@ -223,9 +223,9 @@ def fit_irregular(play: Fitted, noise: Floats, period_s: float, any_gain: bool =
     """
     if play.gain == 0.0:
         return None
-    window = play.p
-    rest = max(int(RESTS * period_s / window.step_s), 1)
-    bands, half = play.valve.stickband, rest // (window.blocks.factor * window.blocks.steps) // 2
+    problem = play.p
+    rest = max(int(RESTS * period_s / problem.step_s), 1)
+    bands, half = play.valve.stickband, rest // (problem.blocks.factor * problem.blocks.steps) // 2
     usual: Gains = {(w, s): play.gain for w in WIDTHS for s in JUMPS}
     best = _likeliest(play, noise, rest, usual)
     if best is None and any_gain:
@@ -235,7 +235,7 @@ def fit_irregular(play: Fitted, noise: Floats, period_s: float, any_gain: bool =
 
 
 def near_path(play: Fitted, path: SlipPath) -> Fitted:
-    """A fit to the backlash fit's window with a path's process and mean friction: a start for regular slips."""
+    """A fit to the backlash fit's problem with a path's process and mean friction: a start for regular slips."""
     found = path.fit
     t, dead, gain = found.time_constant_s, found.dead_time_s, found.gain
     share = min(found.valve.slip_jump / max(found.valve.stickband, 1e-9), 1.0)
@@ -252,5 +252,5 @@ def _likeliest(play: Fitted, noise: Floats, rest: int, gains: Gains) -> SlipPath
 
 
 def path_evidence(path: SlipPath, rival: Fitted) -> float:
-    """Log likelihood [nat] of a path and its slips over a fit of the same window without it."""
+    """Log likelihood [nat] of a path and its slips over a fit of the same problem without it."""
     return evidence(path.fit, rival) + path.chance

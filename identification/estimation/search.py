@@ -99,7 +99,7 @@ Faded = tuple[float, float, float, float, float]
 
 @njit(cache=True)
 def faded_products(x: Floats, rows: Floats, pole: float, outlasts: bool) -> Faded:
-    """Products of the decay of a response; zero where its time constant exceeds half the window."""
+    """Products of the decay of a response; zero where its time constant exceeds half the stretch."""
     fv, fx, f1, ft, ff = 0.0, 0.0, 0.0, 0.0, 0.0
     free, k = 0.0 if outlasts else 1.0, 0
     while k < x.size and free > FADED:
@@ -131,9 +131,9 @@ Dynamics = tuple[float, float]
 
 
 class WhitePv(NamedTuple):
-    """PV of a window under one noise model, whitened once for many valves.
+    """PV of a problem under one noise model, whitened once for many valves.
 
-    stems : stems of the window, in blocks; rows, shape (3, n), and sums, shape (6,): see `_known`; ar : the noise
+    stems : stems of the problem, in blocks; rows, shape (3, n), and sums, shape (6,): see `_known`; ar : the noise
     model, shape (p,); dt_s : interval of blocks [s]; most : largest time constant and dead time searched [s].
     """
 
@@ -183,10 +183,10 @@ def whitened_stem(x: Floats, ar: Floats) -> Floats:
     return white
 
 
-def white_pv(window: Problem, ar: Floats) -> WhitePv:
+def white_pv(problem: Problem, ar: Floats) -> WhitePv:
     """Whiten PV with one noise model."""
-    rows, sums = _known(whitened_stem(window.centred, ar), judged(window.usable, ar.size), ar.size)
-    return WhitePv(window.stems_in_blocks, rows, sums, ar, window.dt_s, window.bounds)
+    rows, sums = _known(whitened_stem(problem.centred, ar), judged(problem.usable, ar.size), ar.size)
+    return WhitePv(problem.stems_in_blocks, rows, sums, ar, problem.dt_s, problem.bounds)
 
 
 @register_jitable  # type: ignore[untyped-decorator]
@@ -238,11 +238,11 @@ def settled(pv: WhitePv, valve: StemLaw, least: float, dynamics: Dynamics) -> St
     return compass((pv, dynamics), valve, least, _valve_tried, PIT_MOVES, PIT_STEPS, 1e-7)[0]  # type: ignore[no-any-return]
 
 
-def starts(window: Problem, period_s: float) -> list[Dynamics]:
+def starts(problem: Problem, period_s: float) -> list[Dynamics]:
     """Starts of the search: time constants and dead times distributed over the period [s]."""
     times = [period_s * s for s in (0.03, 0.12, 0.5, 2.5)]
     deads = [period_s * s for s in (0.0, 0.06, 0.15, 0.33)]
-    most_t, most_dead = window.bounds
+    most_t, most_dead = problem.bounds
     return sorted({(min(t, 0.7 * most_t), min(d, most_dead)) for t in times for d in deads})
 
 
@@ -254,10 +254,10 @@ def record_starts(samples: int, dt_s: float) -> list[Dynamics]:
     return [(t * dt_s, d * dt_s) for t, d in sorted(pairs)]
 
 
-def _plain(window: Problem, ar: Floats) -> Fopdt:
-    """The best process behind an ideal valve in a window under one noise model."""
-    prepared = behind(white_pv(window, np.ascontiguousarray(ar)), IDEAL)
-    dynamics, _, _, beta = search(prepared, record_starts(window.y.size, window.dt_s), 2)
+def _plain(problem: Problem, ar: Floats) -> Fopdt:
+    """The best process behind an ideal valve in a problem under one noise model."""
+    prepared = behind(white_pv(problem, np.ascontiguousarray(ar)), IDEAL)
+    dynamics, _, _, beta = search(prepared, record_starts(problem.y.size, problem.dt_s), 2)
     return Fopdt(float(beta[0]), *dynamics)
 
 
@@ -266,13 +266,13 @@ def simulated_best(p: Problem) -> Fopdt:
     return _plain(p, NO_WHITENING)
 
 
-def learnt_noise(window: Problem) -> Floats:
-    """An initial noise model of a window, shape (AR_ORDER,), learnt without a process."""
-    stem = window.stems_in_blocks.ideal
-    return arx_noise(window.centred, stem, window.usable, AR_ORDER, INPUT_LAGS)
+def initial_noise(problem: Problem) -> Floats:
+    """An initial noise model of a problem, shape (AR_ORDER,), learnt without a process."""
+    stem = problem.stems_in_blocks.ideal
+    return arx_noise(problem.centred, stem, problem.usable, AR_ORDER, INPUT_LAGS)
 
 
 def plain_processes(p: Problem) -> list[Fopdt]:
     """The best baseline models of PV from OP: one step ahead under each of two initial noise models, and simulated.
     Starts for a descent, one for each; the last is the simulated one."""
-    return [_plain(p, ar) for ar in (learnt_noise(p), generic_noise(), NO_WHITENING)]
+    return [_plain(p, ar) for ar in (initial_noise(p), generic_noise(), NO_WHITENING)]

@@ -228,19 +228,19 @@ def _judged(usable: Mask) -> NDArray[np.int64]:
     return np.flatnonzero(~out)
 
 
-def _case(window: Problem, law: StemLaw, period_s: float, count: int) -> _Case:
+def _case(problem: Problem, law: StemLaw, period_s: float, count: int) -> _Case:
     """The data of a model with so many constants."""
-    stem = stem_of(window.stems_in_blocks, law)
-    (most_t, most_dead), dt_s = window.bounds, window.dt_s
-    periods = window.duration_s / period_s
+    stem = stem_of(problem.stems_in_blocks, law)
+    (most_t, most_dead), dt_s = problem.bounds, problem.dt_s
+    periods = problem.duration_s / period_s
     low = [math.log(0.1 * dt_s), 0.0, math.log(0.5 * dt_s), -1.5, -1.5]
-    high = [math.log(most_t), most_dead / dt_s, math.log(1e3 * window.duration_s), 3.0, 3.0]
+    high = [math.log(most_t), most_dead / dt_s, math.log(1e3 * problem.duration_s), 3.0, 3.0]
     if count > LOAD:
         away, heights = math.log(LINE_AWAY), count - LINE + 1
         low += [-away, math.log(LINE_KEPT), *heights * [-1.0]]
         high += [away, math.log(10.0 * periods), *heights * [8.0]]
     ranges = np.array([low, high])
-    return _Case(window.centred, stem, _judged(window.usable), dt_s, ranges, period_s)
+    return _Case(problem.centred, stem, _judged(problem.usable), dt_s, ranges, period_s)
 
 
 def _descended(case: _Case, starts: Sequence[Floats]) -> _Point:
@@ -255,17 +255,17 @@ def _descended(case: _Case, starts: Sequence[Floats]) -> _Point:
     return min((went(p, SMOOTH_STEPS) for p in near[:FOLLOWED]), key=lambda p: p.loss)
 
 
-def _fit(window: Problem, law: StemLaw, case: _Case, p: _Point) -> SmoothFit:
+def _fit(problem: Problem, law: StemLaw, case: _Case, p: _Point) -> SmoothFit:
     line = None
     if p.theta.size > LOAD:
         line = Line(case.period_s / math.exp(p.theta[5]), math.exp(p.theta[6]))
-    dead_s = float(p.theta[1]) * case.dt_s + window.half_block_s
+    dead_s = float(p.theta[1]) * case.dt_s + problem.half_block_s
     process = Fopdt(p.gain, math.exp(p.theta[0]), dead_s)
     loss = max(p.loss, 1e-14)
     return SmoothFit(process, -nats(p.e.size, loss, 1.0), p.e.size, loss, p.theta, law, line)
 
 
-def resonant_starts(window: Problem, period_s: float, law_response: complex) -> list[tuple[Dynamics, float]]:
+def resonant_starts(problem: Problem, period_s: float, law_response: complex) -> list[tuple[Dynamics, float]]:
     """Time constant and dead time [s] of lags with which the controller would oscillate at a period [s], and their
     gains.
 
@@ -276,15 +276,15 @@ def resonant_starts(window: Problem, period_s: float, law_response: complex) -> 
     sign = 1.0 if law_response.real >= 0.0 else -1.0
     phase = float(np.angle(sign * law_response))
     for t in LAGS * np.array(period_s):
-        dead_s = (math.pi - math.atan(omega * t) + phase) / omega - window.half_block_s
-        if 0.0 <= dead_s <= window.bounds[1] and t <= window.bounds[0]:
+        dead_s = (math.pi - math.atan(omega * t) + phase) / omega - problem.half_block_s
+        if 0.0 <= dead_s <= problem.bounds[1] and t <= problem.bounds[0]:
             gain = sign * math.hypot(1.0, omega * t) / (abs(law_response) * MARGIN)
             found.append(((float(t), dead_s), gain))
     return found
 
 
 def fit_smooth(
-    window: Problem,
+    problem: Problem,
     period_s: float,
     starts: Sequence[tuple[Dynamics, float | None]],
     law: StemLaw = IDEAL,
@@ -295,7 +295,7 @@ def fit_smooth(
     starts : time constant and dead time [s] at which the search begins, with the gain if known; like : a fit whose
     load is also a start. Raises ValueError without a start.
     """
-    case = _case(window, law, period_s, LOAD)
+    case = _case(problem, law, period_s, LOAD)
     loads = [like.theta[2:LOAD]] if like is not None else []
     loads += _loads(period_s)
     firsts = []
@@ -304,11 +304,11 @@ def fit_smooth(
         firsts.append(
             min((_point(case, np.clip(h, *case.ranges), gain) for h in heads), key=lambda p: p.loss)
         )
-    return _fit(window, law, case, _descended(case, [p.theta for p in firsts]))
+    return _fit(problem, law, case, _descended(case, [p.theta for p in firsts]))
 
 
 def fit_line(
-    window: Problem,
+    problem: Problem,
     period_s: float,
     near: Sequence[SmoothFit],
     begins: Sequence[Dynamics] = (),
@@ -320,7 +320,7 @@ def fit_line(
     constants and dead times [s] at which it begins. If the load has a line, a fit under a smooth load can give a
     process far from the true one.
     """
-    case = _case(window, law, period_s, LINE)
+    case = _case(problem, law, period_s, LINE)
     lines = [np.array([0.0, math.log(kept), 2.0]) for kept in LINE_STARTS]
     starts = [fit.theta[:LINE] for fit in near if fit.line is not None]
     starts += [np.append(fit.theta[:LOAD], line) for fit in near for line in lines]
@@ -329,7 +329,7 @@ def fit_line(
         head = np.array([math.log(t), dead_s / case.dt_s])
         tried = (np.concatenate((head, load, line)) for load in loads for line in lines)
         starts.append(min(tried, key=lambda x: _point(case, np.clip(x, *case.ranges)).loss))
-    return _fit(window, law, case, _descended(case, starts))
+    return _fit(problem, law, case, _descended(case, starts))
 
 
 def _loads(period_s: float) -> list[Floats]:
@@ -337,25 +337,25 @@ def _loads(period_s: float) -> list[Floats]:
     return [np.array([math.log(c * period_s), *z]) for c in CORNERS for z in ZEROS]
 
 
-def with_harmonics(lined: SmoothFit, window: Problem, period_s: float) -> SmoothFit:
+def with_harmonics(lined: SmoothFit, problem: Problem, period_s: float) -> SmoothFit:
     """The fit under a load with a line found at a period [s], fitted again under a load whose line also
     has harmonics."""
     count = LINE + len(HARMONICS)
-    case = _case(window, lined.law, period_s, count)
+    case = _case(problem, lined.law, period_s, count)
     starts = [np.append(lined.theta, len(HARMONICS) * [height]) for height in (-1.0, 2.0)]
-    return _fit(window, lined.law, case, _descended(case, starts))
+    return _fit(problem, lined.law, case, _descended(case, starts))
 
 
-def innovations_of(found: SmoothFit, window: Problem, period_s: float) -> tuple[NDArray[np.int64], Floats]:
+def innovations_of(found: SmoothFit, problem: Problem, period_s: float) -> tuple[NDArray[np.int64], Floats]:
     """The blocks judged, shape (m,), and the innovations of a fit there [% of PV's span], found at a period [s]."""
-    case = _case(window, found.law, period_s, found.theta.size)
+    case = _case(problem, found.law, period_s, found.theta.size)
     return case.at, _point(case, found.theta).e
 
 
-def as_fit(found: SmoothFit, window: Problem) -> Fitted:
+def as_fit(found: SmoothFit, problem: Problem) -> Fitted:
     """The result as a fit of the batch run, whose noise model has single lags: as many as reproduce the load to
     CUT."""
-    dt_s, p = window.dt_s, found.process
+    dt_s, p = problem.dt_s, found.process
     pole, slow = math.exp(-dt_s / p.time_constant_s), math.exp(-dt_s / math.exp(found.theta[2]))
     z1, z2 = math.tanh(found.theta[3]), math.tanh(found.theta[4])
     longest = max(abs(z1), abs(z2), 1e-3)
@@ -365,6 +365,6 @@ def as_fit(found: SmoothFit, window: Problem) -> Fitted:
     for k in range(order + 1):
         before = (z1 + z2) * (memory[k - 1] if k else 0.0) - z1 * z2 * (memory[k - 2] if k > 1 else 0.0)
         memory[k] = given[k] + before
-    dead_s = p.dead_time_s - window.half_block_s
-    fit = start_at(window, p.gain, (p.time_constant_s, dead_s), found.law, -memory[1:])
+    dead_s = p.dead_time_s - problem.half_block_s
+    fit = start_at(problem, p.gain, (p.time_constant_s, dead_s), found.law, -memory[1:])
     return replace(fit, loss=found.sigma2, count=found.count)

@@ -303,7 +303,7 @@ def _with_more(found: list[Fitted]) -> list[Fitted]:
     bases = [best, *(f for f in alike.values() if f is not best)]
     if not best.shape.is_ramp:
         more += [best_of(f.trial, replace(f.shape, start=True), [f.times], f.wander) for f in bases]
-    if tells_play(best.trial.op):
+    if backlash_identifiable(best.trial.op):
         travel = float(np.ptp(best.trial.op))
         for base in {id(f): f for f in (*bases, *found[:WITH_PLAY])}.values():
             shape = replace(base.shape, play=True)
@@ -320,7 +320,7 @@ def _with_more(found: list[Fitted]) -> list[Fitted]:
     return more
 
 
-def tells_play(op: Floats) -> bool:
+def backlash_identifiable(op: Floats) -> bool:
     """Whether OP moves in both directions and at least three times: gain and backlash alone need two moves."""
     moves = np.diff(op)
     return bool((moves > 0).any() and (moves < 0).any() and np.count_nonzero(moves) >= 3)

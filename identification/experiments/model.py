@@ -13,11 +13,11 @@ from identification.estimation.descent import NINETY
 from identification.experiments.closed import closed_candidates, shown_sign
 from identification.experiments.columns import Kind, trial_of
 from identification.experiments.find import LEAST_PART, SAMPLES, Course, Experiment
-from identification.experiments.fit import Fitted, candidates, tells_play
+from identification.experiments.fit import Fitted, backlash_identifiable, candidates
 from identification.experiments.intervals import Averaged, averaged, estimates_of
 from identification.models import Estimate, Fopdt, Integrator, Process
 from identification.record import Floats, LoopRecord, Mask
-from identification.signals.lone import lone_values, without_lone
+from identification.signals.isolated_values import isolated_values, without_lone
 
 BLOCKS = 1500
 """Blocks in which an experiment is fitted at first [blocks]: each of some hundred columns passes the filter
@@ -48,7 +48,7 @@ class Modelled:
     experiment; kind of response; estimates, by name with 90 % intervals; mean, the constants averaged over all
     candidates; nat, gain in log likelihood from OP [nat]; explained, share of PV's motion [-]; time_s, pv, simulated
     [% PV] and op [% OP] in blocks, shape (n,), from the record's start; lone_pv, lone_op, times of single values left
-    out [s]; tells_play, whether the OP moves make backlash identifiable.
+    out [s]; backlash_identifiable, whether the OP moves make backlash identifiable.
     """
 
     experiment: Experiment
@@ -63,7 +63,7 @@ class Modelled:
     op: Floats = field(repr=False)
     lone_pv: tuple[float, ...] = ()
     lone_op: tuple[float, ...] = ()
-    tells_play: bool = False
+    backlash_identifiable: bool = False
 
     @property
     def process(self) -> Process:
@@ -85,8 +85,8 @@ def process_of(kind: Kind, e: Mapping[str, Estimate]) -> Process:
 def lone_in(record: LoopRecord) -> tuple[Mask, Mask]:
     """Isolated single values of PV, and of an OP that is otherwise constant before and after; shape (n,) each."""
     factor, stands = LONE, STANDS
-    pv = lone_values(record.pv, record.at_work, factor, LONE_SHARE)
-    op = lone_values(record.op, record.at_work, factor, LEAST_PART)
+    pv = isolated_values(record.pv, record.at_work, factor, LONE_SHARE)
+    op = isolated_values(record.op, record.at_work, factor, LEAST_PART)
     for k in np.flatnonzero(op):
         around = np.r_[record.op[max(k - stands, 0) : k], record.op[k + 1 : k + 1 + stands]]
         op[k] = float(np.ptp(around)) == 0.0
@@ -121,7 +121,7 @@ def modelled(record: LoopRecord, x: Experiment, beside: Sequence[Floats] = ()) -
         blocks,
         tuple(start_s + record.dt_s * np.flatnonzero(lone_pv)),
         tuple(start_s + record.dt_s * np.flatnonzero(lone_op)),
-        tells_play(part.op),
+        backlash_identifiable(part.op),
     )
 
 

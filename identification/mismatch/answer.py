@@ -124,7 +124,7 @@ def is_by_fit(found: Explanation) -> bool:
     return found.recorder is None and found.controller is None and not by_cycles(found)
 
 
-def brings(p: Problem, fit: Fitted) -> float:
+def gain_by_op(p: Problem, fit: Fitted) -> float:
     """Log likelihood [nat] that OP adds to a fit, over the same with zero gain, its mean and start as recorded."""
     c = fit.model.c.copy()
     c[Slot.K], c[Slot.BIAS], c[Slot.START] = 0.0, float(np.mean(p.y)), float(p.y[0])
@@ -138,7 +138,7 @@ def unanswered(found: Explanation) -> str:
     """
     found = found.by_innovations or found
     loaded = any(row.block == Block.LOAD for row in found.best.model.added)  # counted relative to the gain
-    moves = brings(found.p, found.plain if loaded else found.best)
+    moves = gain_by_op(found.p, found.plain if loaded else found.best)
     return "" if moves >= ANSWERS else words.TOLD["insensitive"]
 
 

@@ -20,6 +20,7 @@ from identification.controller.pi_regression import ControlLaw, Trends, shifted,
 from identification.estimation.model import gain
 from identification.estimation.prediction_error import FULL_STEPS, descended
 from identification.mismatch.answer import holds_zero
+from identification.mismatch.baseline import Clip, inputs_of, prepared, without_spikes
 from identification.mismatch.candidate_proof import passes
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS, RECORDER_FAULTS, fault
 from identification.mismatch.effect import TIE, Ends, Friction
@@ -33,8 +34,7 @@ from identification.mismatch.explanation import (
     ends,
 )
 from identification.mismatch.friction import from_cycles, is_friction
-from identification.mismatch.outside import OUTSIDE, RIVALS, about
-from identification.mismatch.plain_loop import Clip, inputs_of, prepared, without_spikes
+from identification.mismatch.outside import COMPETING_EFFECTS, OUTSIDE, about
 from identification.mismatch.recording import Recording, SeenInCycles, is_experiment, straightened, unlogged
 from identification.mismatch.reference import Prediction, best_prediction
 from identification.mismatch.selection import (
@@ -70,10 +70,10 @@ of the gain of a load that recorded PV switches."""
 PROVEN = 3  # Candidates that are put to the proof, best first, until one passes: bounds the time
 
 
-def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None) -> Explanation:
+def explain(s: Recording, tell: Progress = silent, user_model: Floats | None = None) -> Explanation:
     """Explain the difference between a baseline model and a recording.
 
-    tell : called with each step, to show progress; brought : constants of the user's own model, shape (SIZE,), an
+    tell : called with each step, to show progress; user_model : constants of the user's own model, shape (SIZE,), an
     additional start for the baseline fit.
     """
     held = unlogged(s.stamp_s, s.pv.size, s.dt_s, s.limits.recorder)
@@ -84,7 +84,7 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
     pv = shifted(s.pv, late) if late else s.pv
     inputs, usable = inputs_of(replace(s, pv=pv)), without_spikes(s.pv, s.usable, s.limits.recorder)
     clip = transmitter_end(recorder, pv)
-    plain_loop = partial(prepared, inputs, pv - inputs.level, usable, brought, clip, s.limits)
+    plain_loop = partial(prepared, inputs, pv - inputs.level, usable, user_model, clip, s.limits)
     tell("baseline model")
     p, plain = plain_loop()
     found = Explanation(
@@ -154,7 +154,7 @@ def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
     found, last = one_by_one(replace(found, p=p, plain=best, best=best), tell, s)
     if len(found.accepted) > 1:
         found = as_a_set(found, tell, s)
-    left = left_over(found, last) if s.every_scan or is_experiment(s) else Prediction()
+    left = unnamed_residual(found, last) if s.every_scan or is_experiment(s) else Prediction()
     return replace(found, left=left.gain, left_by=left.way)
 
 
@@ -171,7 +171,7 @@ def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explan
     has_rivals = s.cycles is None and not s.free_valve and not is_experiment(s) and s.every_scan
     for _ in range(ROUNDS if s.cycles is None or s.every_scan else 1):
         x = round_of(found.p, found.best, s)
-        candidates = compete(x, (*CANDIDATES, *RIVALS) if has_rivals else CANDIDATES, tell)
+        candidates = compete(x, (*CANDIDATES, *COMPETING_EFFECTS) if has_rivals else CANDIDATES, tell)
         if s.cycles is not None and not found.accepted:
             candidates = with_cycles(x, s.cycles, candidates)
         if not found.first:
@@ -245,7 +245,7 @@ def as_a_set(found: Explanation, tell: Progress, s: Recording) -> Explanation:
     if not told:
         tell("other sets of effects")
         found = replacement_step(found, tell, s)
-    return without_the_idle(found, int(told))
+    return without_redundant(found, int(told))
 
 
 def replacement_step(found: Explanation, tell: Progress, s: Recording) -> Explanation:
@@ -274,7 +274,7 @@ def replacement_step(found: Explanation, tell: Progress, s: Recording) -> Explan
     return found
 
 
-def without_the_idle(found: Explanation, kept: int) -> Explanation:
+def without_redundant(found: Explanation, kept: int) -> Explanation:
     """Remove effects that the others have made redundant, except the first `kept`.
 
     An effect may have been accepted instead of one that was added later.
@@ -286,7 +286,7 @@ def without_the_idle(found: Explanation, kept: int) -> Explanation:
     return found
 
 
-def left_over(found: Explanation, candidates: list[Candidate]) -> Prediction:
+def unnamed_residual(found: Explanation, candidates: list[Candidate]) -> Prediction:
     """The part of the residual that is predictable but has no name among the effects; zero if there is none.
 
     The residual is what an unnamed reference predicts of the innovations. If time-bound effects gain hardly more on

@@ -209,14 +209,14 @@ def agreed(told: Explanation, by_misfit: Explanation) -> Explanation:
     p = replace(by_misfit.p, inputs=replace(by_misfit.p.inputs, step_at=told.p.inputs.step_at))
     anew = descended(p, told.best.model, FULL_STEPS)
     other = replace(told, p=p, plain=by_misfit.plain, best=anew, left=left, by_innovations=told)
-    other = carried_over(most_telling_first(other))
+    other = carried_over(by_importance(other))
     inputs = replace(told.p.inputs, step_at=by_misfit.p.inputs.step_at)
     seen = descended(replace(told.p, inputs=inputs), by_misfit.best.model, FULL_STEPS)
     is_seconded = gain(seen, told.plain) > ONE_CONSTANT
     return nearer(other, replace(by_misfit, left=left, by_innovations=told)) if is_seconded else other
 
 
-def most_telling_first(found: Explanation) -> Explanation:
+def by_importance(found: Explanation) -> Explanation:
     """Sort the effects by the increase of the simulation misfit without each."""
     if len(found.accepted) < 2:
         return found

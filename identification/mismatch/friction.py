@@ -16,7 +16,7 @@ from itertools import product
 import numpy as np
 from numba import njit
 
-from identification.estimation.backlash_stiction import pits
+from identification.estimation.backlash_stiction import local_minima
 from identification.estimation.descent import compass
 from identification.estimation.model import Fitted, Model
 from identification.estimation.noise import generic_noise
@@ -86,7 +86,7 @@ def _as_a_night(p: Problem, play: Fitted, model: Model) -> list[Model]:
         valve=sticking(float(c[Slot.STICKBAND]), 0.0),
     )
     out = []
-    for found in pits(near, (friction_of(c).tolerance,)):
+    for found in local_minima(near, (friction_of(c).tolerance,)):
         c = c.copy()
         c[Slot.STICKBAND], c[Slot.JUMP] = found.valve.stickband, found.valve.slip_jump
         c[Slot.L] = found.dead_time_s
@@ -167,11 +167,11 @@ def simulated_anew(p: Problem, c: Floats, window: int) -> Floats:
     inputs = p.inputs
     if friction_of(c).breakaway <= 0.0:
         return simulate(inputs, c)
-    flow = behind_stem(stem_anew(p, c, window), c, inputs.dt_s, inputs.middle)
+    flow = behind_stem(stem_reestimated(p, c, window), c, inputs.dt_s, inputs.middle)
     return from_flow(inputs, c, acted(Signal.FLOW, flow, c, inputs.dt_s))
 
 
-def stem_anew(p: Problem, c: Floats, window: int) -> Floats:
+def stem_reestimated(p: Problem, c: Floats, window: int) -> Floats:
     """The stem [% OP], shape (n,), behind the friction of constants, re-estimated every `window` samples."""
     inputs = p.inputs
     op = before_stem(np.ascontiguousarray(acted(Signal.OP, inputs.op, c, inputs.dt_s)), c, inputs.dt_s)
@@ -184,7 +184,7 @@ def stem_anew(p: Problem, c: Floats, window: int) -> Floats:
 def behind_placed(p: Problem, c: Floats, window: int) -> tuple[Problem, Floats]:
     """The problem with the stem, re-estimated every `window` samples, in place of OP, and the constants without
     friction: a process can be fitted to it as behind an ideal valve."""
-    stem = stem_anew(p, c, window)
+    stem = stem_reestimated(p, c, window)
     return replace(p, inputs=replace(p.inputs, op=stem)), with_friction(c, IDEAL)
 
 

@@ -30,7 +30,7 @@ PLACES, BANDS = tuple(0.05 * i for i in range(2, 19)), (0.5, 3.0)
 twentieth of the span away."""
 
 
-def hurried(flow: Floats, c: Floats, dt_s: float) -> Floats:
+def with_fast_moves(flow: Floats, c: Floats, dt_s: float) -> Floats:
     """Flow, shape (n,) [% OP], with the signed square of its difference to its own lag added."""
     ahead = flow - lagged(flow, float(c[HURRY_T]), dt_s)
     return flow + c[HURRY] * np.abs(ahead) * ahead / 10.0  # type: ignore[no-any-return]
@@ -41,7 +41,7 @@ def flow_after_step(d: Drawing) -> Picture:
     fine = HURRY_DRAWN * float(d.best[HURRY_T]) / pictures.POINTS
     time, op = pictures.drawn_step(pictures.step_size(d), pictures.POINTS, fine)
     axes = pictures.TIME, pictures.FLOW
-    return pictures.beside_plain(d, "response", axes, time, lambda c: hurried(op, c, fine), op)
+    return pictures.with_baseline(d, "response", axes, time, lambda c: with_fast_moves(op, c, fine), op)
 
 
 HISTORY = Effect(
@@ -66,7 +66,7 @@ RATE = Effect(
     block=Block.VALVE,
     sentence="fast moves have more effect: a sudden move of 10 % adds {hurry} times its size for {hurry_s}",
     check="Look for a booster, a relief port or a feed that overshoots, and compare fast and slow moves of OP.",
-    acts=(Act(HURRY, 0.0, Signal.FLOW, hurried),),
+    acts=(Act(HURRY, 0.0, Signal.FLOW, with_fast_moves),),
     curve=flow_after_step,
     variants=(
         Variant(
@@ -117,7 +117,7 @@ SWITCH = Effect(
 OUTSIDE: Mapping[str, Effect] = {e.name: e for e in (HISTORY, RATE, RECYCLE, SWITCH)}
 """All of it by its internal name."""
 bring(tuple(act for e in OUTSIDE.values() for act in e.acts))
-RIVALS: tuple[Variant, ...] = tuple(v for e in OUTSIDE.values() for v in e.candidates)
+COMPETING_EFFECTS: tuple[Variant, ...] = tuple(v for e in OUTSIDE.values() for v in e.candidates)
 """Candidates that compete with the catalogue and give no name."""
 
 

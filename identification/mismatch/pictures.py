@@ -121,7 +121,7 @@ def banded(read: Read, d: Drawing) -> tuple[Floats, Floats, Floats]:
     return here, here - np.sqrt(below), here + np.sqrt(above)
 
 
-def beside_plain(
+def with_baseline(
     d: Drawing,
     kind: str,
     axes: tuple[Axis, Axis],
@@ -173,7 +173,7 @@ def flow_over_op(d: Drawing) -> Picture:
     def read(c: Floats) -> Floats:
         return flow(op, alone(c, AT_REST), 1.0, d.inputs.middle)
 
-    return beside_plain(d, "curve", (OP, FLOW), op, read, op, places)
+    return with_baseline(d, "curve", (OP, FLOW), op, read, op, places)
 
 
 def step_size(d: Drawing) -> float:
@@ -186,7 +186,7 @@ def stem_response(d: Drawing, length_s: float, keep: tuple[int, ...]) -> Picture
     fine = max(length_s * STEM_LENGTH, FEWEST_SAMPLES * d.inputs.dt_s) / POINTS
     time, op = drawn_step(step_size(d), POINTS, fine)
     middle = d.inputs.middle
-    return beside_plain(
+    return with_baseline(
         d, "response", (TIME, STEM), time, lambda c: flow(op, alone(c, keep), fine, middle), op
     )
 
@@ -214,7 +214,7 @@ def pv_response(d: Drawing, faster: int | None = None, back: bool = False) -> Pi
     def read(c: Floats) -> Floats:
         return simulate(drawn, alone(c, DYNAMICS))  # without valve, load, clip and the record's start
 
-    return beside_plain(d, "response", (TIME, Axis("PV", "% PV")), time, read, read(d.plain))
+    return with_baseline(d, "response", (TIME, Axis("PV", "% PV")), time, read, read(d.plain))
 
 
 def gain_over_pv(d: Drawing) -> Picture:
@@ -230,7 +230,7 @@ def gain_over_pv(d: Drawing) -> Picture:
         scheduled = np.maximum(1.0 + k[Slot.GAIN_SLOPE] * x / 50.0, 0.05)
         return np.asarray(k[Slot.K] * root * bent * scheduled)
 
-    return beside_plain(d, "curve", (PV, GAIN), pv, read, float(d.plain[Slot.K]))
+    return with_baseline(d, "curve", (PV, GAIN), pv, read, float(d.plain[Slot.K]))
 
 
 def course_picture(
@@ -245,7 +245,7 @@ def course_picture(
     baseline model; up to the sample `last`, with some times [s] marked."""
     at = np.unique(np.linspace(0, min(last, d.inputs.op.size - 1), COURSE_POINTS).astype(int))
     time = at * d.inputs.dt_s
-    return beside_plain(d, "course", (TIME, axis), time, lambda c: values(d.inputs, c)[at], rest, places)
+    return with_baseline(d, "course", (TIME, axis), time, lambda c: values(d.inputs, c)[at], rest, places)
 
 
 def gain_course(d: Drawing, change: Callable[[ModelInputs, Floats], Floats]) -> Picture:

@@ -135,7 +135,7 @@ class HeldOut:
 
     overall : misfit over the whole record of the models fitted to all of it, as drawn on pages, and drawn : their
     constants, shape (SIZE,) each; window : samples after which the simulations restart, 0 for one run over all;
-    placed : whether the stem of a valve with friction is then re-estimated (friction.py); least_plain : least
+    placed : whether the stem of a valve with friction is then re-estimated (friction.py); least_baseline : least
     held-out misfit of a baseline model by either criterion [% PV]; in_band : the same in the loop's band, None where
     no band is known; every_scan : whether each scan of the controller is a row.
     """
@@ -147,7 +147,7 @@ class HeldOut:
     drawn: tuple[Floats, Floats] = field(repr=False)
     window: int = 0
     placed: bool = False
-    least_plain: float = np.inf
+    least_baseline: float = np.inf
     in_band: InBand | None = None
     every_scan: bool = True
 
@@ -171,14 +171,14 @@ class HeldOut:
     def carries(self) -> bool:
         """Whether the misfit falls, over the whole and on held-out data against any baseline model, below PV's own
         motion. With clear one-step-ahead evidence the simulation need only be nearly as good as any."""
-        before, after = min(self.held[0].rmse, self.least_plain), self.held[1].rmse
+        before, after = min(self.held[0].rmse, self.least_baseline), self.held[1].rmse
         return self.follows and ((after < before and self.falls) or self.seen_ahead)
 
     @property
     def seen_ahead(self) -> bool:
         """Whether innovations of held-out data show the effect, and no baseline model simulates far better."""
         most, (plain, better) = ASTRAY, self.overall
-        near = self.held[1].rmse <= most * min(self.held[0].rmse, self.least_plain)
+        near = self.held[1].rmse <= most * min(self.held[0].rmse, self.least_baseline)
         least = SEEN_AHEAD if self.every_scan else IN_SLOW_ROWS
         return self.gain > least and near and better.rmse <= most * plain.rmse
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from identification.controller.check import StatedSettings
-from identification.controller.pi_regression import fed_back
+from identification.controller.pi_regression import feedback_share
 from identification.estimation.problem import in_blocks
 from identification.estimation.search import plain_processes
 from identification.limits import LIMITS, ExplainLimits, RecorderLimits
@@ -159,7 +159,7 @@ def is_experiment(s: Recording) -> bool:
 
     In a cycling loop, in which OP and PV predict each other, OP must be constant nearly always.
     """
-    if s.sp is not None or s.stated is not None or fed_back(s.op, s.pv) >= s.limits.controller.feedback:
+    if s.sp is not None or s.stated is not None or feedback_share(s.op, s.pv) >= s.limits.controller.feedback:
         return False
     cycles = s.cycles is not None or s.free_valve
     return not cycles or float(np.mean(np.diff(s.op) != 0.0)) < s.limits.controller.by_hand

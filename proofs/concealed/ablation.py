@@ -27,9 +27,9 @@ from analyzer.config import Config
 from analyzer.explain.case import Case, case
 from analyzer.loops.spec import spec_of
 from identification.controller.pi_regression import Trends, recovered_law
+from identification.mismatch.baseline import inputs_of, prepared, without_spikes
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.model_file import carried, to_data
-from identification.mismatch.plain_loop import inputs_of, prepared, without_spikes
 from identification.mismatch.selection import Candidate, compete, integrating_or_first_order
 from identification.mismatch.starts import round_of
 from proofs.concealed.proof import interval, place_section, table
@@ -74,7 +74,7 @@ def later_misfit(candidate: Candidate, p: object, later: Case) -> float:
 def compared(cases: pathlib.Path, truths: dict, tag: str) -> dict:
     """Right and best wrong effect of one case: gains and later misfits."""
     truth, fit, later = truths[tag], loaded(cases, tag, "fit"), loaded(cases, tag, "later")
-    s = fit.subject
+    s = fit.recording
     inputs = inputs_of(s)
     p, plain = integrating_or_first_order(
         *prepared(inputs, s.pv - inputs.level, without_spikes(s.pv, s.usable)), s

@@ -24,8 +24,8 @@ from analyzer.explain.case import case
 from analyzer.loops.spec import spec_of
 from identification.estimation.prediction_error import FULL_STEPS, descended
 from identification.mismatch.answer import parameters_of
+from identification.mismatch.baseline import inputs_of, prepared, without_spikes
 from identification.mismatch.catalogue import CANDIDATES
-from identification.mismatch.plain_loop import inputs_of, prepared, without_spikes
 from identification.mismatch.selection import compete, integrating_or_first_order
 from identification.mismatch.starts import round_of
 from proofs.concealed.effects import NAMES
@@ -48,7 +48,9 @@ def fitted(cases: pathlib.Path, tag: str, effect: str):
     plant = read(cases / f"{tag}-fit.parquet", cases / "loops.csv")
     source, specs = plant.export, plant.specs
     spec = spec_of(specs, tag)
-    s = case(spec, specs, source.read(list(spec.tags) + [t for o in specs for t in o.tags]), Config()).subject
+    s = case(
+        spec, specs, source.read(list(spec.tags) + [t for o in specs for t in o.tags]), Config()
+    ).recording
     inputs = inputs_of(s)
     begun = prepared(inputs, s.pv - inputs.level, without_spikes(s.pv, s.usable))
     p, plain = integrating_or_first_order(*begun, s)

@@ -10,7 +10,7 @@ import pytest
 
 from analyzer.config import Config
 from analyzer.history.series import Series
-from analyzer.loop.advice.advise import advise, sought_for, withheld
+from analyzer.loop.advice.advise import advise, tuning_model, withheld
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.decisions import SignKind
 from analyzer.loop.identification.agreement import agreement
@@ -76,7 +76,7 @@ def test_a_simulated_present_loop_is_accepted_only_where_it_agrees() -> None:
     found, pid = assessed(BACKLASH_LOOP)
     limits = Config().advice
     assert (found.verdict.cause, found.verdict.fault) == ("valve", "backlash")
-    loop, fit, _ = sought_for(found.verdict, pid, limits)
+    loop, fit, _ = tuning_model(found.verdict, pid, limits)
     load = load_of(fit, pid)
     assert agreement(loop, fit, load).worst(limits) is None
     wrong = replace(loop, controller=replace(pid, td_s=20.0, td_filter=0.0))
@@ -100,7 +100,7 @@ def test_rounding_does_not_prevent_settings() -> None:
     digit, its simulated OP travel is the recorded one."""
     found, pid = assessed(BACKLASH_LOOP, "rounded")
     limits = Config().advice
-    loop, fit, _ = sought_for(found.verdict, pid, limits)
+    loop, fit, _ = tuning_model(found.verdict, pid, limits)
     made = agreement(loop, fit, load_of(fit, pid))
     assert made.worst(limits) is None
     assert made.op_travel == pytest.approx(1.0, abs=0.2)

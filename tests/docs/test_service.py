@@ -93,7 +93,7 @@ def test_kernels_need_no_writable_folder(tmp_path: Path, writable: list[str]) ->
     for folder in folders:
         folder.mkdir()
     more = {"TMPDIR": str(folders[0])} if folders else {}
-    command_line = [sys.executable, "-c", "import identification.signals.turns"]
+    command_line = [sys.executable, "-c", "import identification.signals.reversals"]
     done = in_read_only_tree(folders, command_line, **more)
     assert done.returncode == 0, done.stderr[-400:]
     assert not [left for folder in folders for left in folder.iterdir()]

@@ -109,7 +109,7 @@ def test_a_stem_that_rests_has_no_choices():
     found = compared(loop, 0.01 * np.sin(np.arange(4000) / 300.0), None, 120.0, 100.0, LIMITS)
     assert found.tried[0].stem_travel == 0.0
     assert (found.curve, dict(found.everywhere), found.repaired) == ((), {}, None)
-    assert page.price(found, "%") is None
+    assert page.trade_off_plot(found, "%") is None
     assert page.choices(found, spec) == []
     assert page.settings_page("L", "2026-03-02", found, spec).sections
 

@@ -29,11 +29,11 @@ from analyzer.loop.identification.identified import (
 from analyzer.loop.identification.ringing import between_samples
 from analyzer.loop.oscillation.detection import counting
 from analyzer.loop.record.quality import Prepared
-from analyzer.loops.slips import slip
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
+from analyzer.loops.typing_errors import typing_error
 from analyzer.words import sentences
-from analyzer.words.units import beside_settings, intervals_of, number, of_controller, schedule_shown
+from analyzer.words.units import corrected_columns, intervals_of, number, of_controller, schedule_shown
 from identification.estimation.model import Fitted
 from identification.estimation.problem import LONGEST_DEAD_TIME
 from identification.models import Loop, Pid
@@ -175,7 +175,7 @@ def _calmer(verdict: Verdict, config: Config) -> tuple[Pid | None, str]:
     return (None, "") if step is None else (step.new, SAID["rings"].format(most))
 
 
-def with_controller_told(
+def with_controller_note(
     found: Assessment, spec: LoopSpec, stated: Pid | None, prepared: Prepared
 ) -> Assessment:
     """The assessment with a note on properties of the controller in the record that loops.csv does not state."""
@@ -193,7 +193,7 @@ def with_controller_told(
             of_controller(found.shown, spec, span) + intervals_of(found.shown, found.law, spec, span)
         )
     else:
-        said = SAID["beside"].format(beside_settings(stated, found.shown, spec, span))
+        said = SAID["beside"].format(corrected_columns(stated, found.shown, spec, span))
     return replace(found, notes=(*found.notes, said))
 
 
@@ -258,7 +258,7 @@ def withheld(
 
 def _slip(found: Assessment, spec: LoopSpec, pv_span: float) -> str:
     """Unit or form in which the stated figures equal the recorded ones, '' if there is none."""
-    changed = {} if found.settings is None else slip(spec, found.settings, pv_span)
+    changed = {} if found.settings is None else typing_error(spec, found.settings, pv_span)
     written = " and ".join(f"{column} {value}" for column, value in changed.items())
     return SAID["slip"].format(written) if changed else ""
 
@@ -285,12 +285,14 @@ def _too_thin(found: Assessment, controller: Pid | None, config: Config) -> Advi
     """Required sampling if the controller acts several times between two samples, unrecorded."""
     m = found.verdict.measured
     thin = (
-        None if m is None or found.verdict.told_between_rows else too_thin(m.window.row_s, controller, config)
+        None
+        if m is None or found.verdict.identified_between_rows
+        else too_thin(m.problem.row_s, controller, config)
     )
     return None if thin is None else _or_repair(found.verdict, _lacking(thin))
 
 
-def sought_for(
+def tuning_model(
     verdict: Verdict, controller: Pid, limits: AdviceLimits
 ) -> tuple[Loop, Fitted, tuple[Loop, ...]]:
     """The loop for the search of settings, its fit, and other possible loops: with the identified fault, also if a
@@ -370,7 +372,7 @@ def _for_valve(
     told_nat, least_nat = verdict.require_measured.evidence, config.advice.valve_nat
     if told_nat < least_nat:
         return Proposed(Proposal(Action.UNDECIDED, SAID["hardly_told"].format(told_nat, least_nat)))
-    sought, fit, others = sought_for(verdict, loop.controller, config.advice)
+    sought, fit, others = tuning_model(verdict, loop.controller, config.advice)
     rests = confirm(sought).cycle is None
     if rests and period_s is None:
         return Proposed(Proposal(Action.REPAIR_VALVE, SAID["calm"]))

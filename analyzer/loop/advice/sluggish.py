@@ -19,8 +19,8 @@ from itertools import combinations, product
 import numpy as np
 
 from analyzer.config import Config
-from analyzer.lanes.standing import AVERAGING
-from analyzer.loop.identification.fit_data import window_of
+from analyzer.lanes.figures import AVERAGING
+from analyzer.loop.identification.fit_data import problem_of
 from analyzer.loop.identification.identified import error_of_night, load_of, load_of_night, tuned
 from analyzer.loop.identification.intervals import intervals
 from analyzer.loop.identification.measure import time_scale
@@ -142,11 +142,11 @@ def _fits(record: LoopRecord, controller: Pid | None, kind: str, config: Config)
     scale_s = time_scale(record, None, controller)
     for finer in CLOCKS:
         try:
-            window = window_of(record, scale_s / finer, config.cause, kind, calm=True)
-            fit = fit_linear(window, scale_s / finer)
+            problem = problem_of(record, scale_s / finer, config.cause, kind, calm=True)
+            fit = fit_linear(problem, scale_s / finer)
         except (NotAssessedError, ArithmeticError, ValueError):
             continue
-        if window.blocks.sp is not None and fit.slope * controller.kp > 0.0:
+        if problem.blocks.sp is not None and fit.slope * controller.kp > 0.0:
             found.append((fit, intervals(fit, False, config.advice)))
     slopes = [known["slope_pct_per_s"] for _, known in found]
     agree = all(a.low <= b.high and b.low <= a.high for a, b in combinations(slopes, 2))

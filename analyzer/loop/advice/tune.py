@@ -11,7 +11,7 @@ import numpy as np
 from analyzer.columns import Row
 from analyzer.config import AdviceLimits, Config
 from analyzer.loop.action import AGAINST
-from analyzer.loop.advice.advise import Advice, propose, sought_for, withheld
+from analyzer.loop.advice.advise import Advice, propose, tuning_model, withheld
 from analyzer.loop.advice.settings_side_by_side import compared
 from analyzer.loop.advice.sluggish import faster_settings, rejecting_settings
 from analyzer.loop.advice.tune_pictures import pictures
@@ -19,7 +19,7 @@ from analyzer.loop.advice.tuned import Tuning
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.cause.fitness import at_limits, unfit_for_cause
 from analyzer.loop.decisions import Action, Cause, Requirement, RequirementKind, Status
-from analyzer.loop.experiments.found import Learned, learned
+from analyzer.loop.experiments.found import ExperimentResults, experiment_results
 from analyzer.loop.identification.identified import (
     error_of_night,
     indistinguishable,
@@ -95,7 +95,7 @@ def tune(
     verdict, controller = found.verdict, found.shown or controller
     first = found.oscillations.first
     period = first.period_s if first else None
-    model, fit, others = sought_for(verdict, controller, config.advice)
+    model, fit, others = tuning_model(verdict, controller, config.advice)
     if kept is not None and kept.reason and kept.action is not None:
         proposal = Proposal(kept.action, kept.reason)
     else:
@@ -235,7 +235,7 @@ def proposal(one: PlantLoop, decision: Decided, drawn: bool) -> TuningReport:
     """The report on one loop over a night that decided `decision`, with pictures if wanted. Raises InputError if its
     settings are not known, NotAssessedError if its trends give no model and the night decided nothing."""
     spec, stated = one.spec, one.controller
-    taught = taught_by(one)
+    taught = results_with_neighbours(one)
     shown = [] if taught is None else list(experiments.lines(taught, spec, stated, one.plant.zone))
     known = taught is not None and taught.model is not None
     row = decision.row
@@ -250,11 +250,11 @@ def proposal(one: PlantLoop, decision: Decided, drawn: bool) -> TuningReport:
     return replace(told, lines=[*head, *shown, *told.lines])
 
 
-def taught_by(one: PlantLoop) -> Learned | None:
+def results_with_neighbours(one: PlantLoop) -> ExperimentResults | None:
     """Results of a loop's experiments, with its neighbours' OPs."""
     spec, plant, record = one.spec, one.plant, one.prepared.record
     series = plant.trends(spec.tags, one.night)
-    return learned(spec, series, one.prepared, plant.config, beside=_neighbours(one, record))
+    return experiment_results(spec, series, one.prepared, plant.config, beside=_neighbours(one, record))
 
 
 def _neighbours(one: PlantLoop, record: LoopRecord) -> tuple[Floats, ...]:

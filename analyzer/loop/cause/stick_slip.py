@@ -23,23 +23,23 @@ from identification.simulation.valve import HALTS, RESTS
 def refine_stick_slip(verdict: Verdict, period_s: float, config: Config) -> Verdict:
     """The verdict on a loop that cycles, its valve's fault replaced if slips at variable distances explain PV better.
 
-    The cause is unchanged: the test is for the kind of fault of a valve already identified by PV and OP. If the stem
-    is identified slip by slip, the window contains it as if recorded. Settings are searched with one friction for all
-    slips: that of the likeliest fit with regular slips, or the mean one of the slips, with a stem that rests after
-    each slip or follows OP until it stops. The simulation at the present settings that is closest to the record
-    decides. The cycle has a period of period_s [s].
+    The cause is unchanged: the test is for the kind of fault of a valve already identified by PV and OP. If the
+    stem is identified slip by slip, the problem contains it as if recorded. Settings are searched with one
+    friction for all slips: that of the likeliest fit with regular slips, or the mean one of the slips, with a stem
+    that rests after each slip or follows OP until it stops. The simulation at the present settings that is closest
+    to the record decides. The cycle has a period of period_s [s].
     """
     m, limits = verdict.measured, config.cause
     if (
         verdict.cause is not Cause.VALVE
         or m is None
-        or m.window.blocks.position is not None
-        or m.window.y.size < SHORT
+        or m.problem.blocks.position is not None
+        or m.problem.y.size < SHORT
     ):
         return verdict
-    window = m.play.p
-    blocks = replace(m.play, p=window.of_rows.with_blocks(fine=False))
-    play = descend(blocks, free_width=True) if window.blocks.fine or window.blocks.steps > 1 else m.play
+    problem = m.play.p
+    blocks = replace(m.play, p=problem.of_rows.with_blocks(fine=False))
+    play = descend(blocks, free_width=True) if problem.blocks.fine or problem.blocks.steps > 1 else m.play
     path = fit_irregular(play, generic_noise(), period_s, verdict.fault is not Fault.STICTION)
     if path is None:
         return verdict
@@ -64,7 +64,7 @@ def refine_stick_slip(verdict: Verdict, period_s: float, config: Config) -> Verd
 
 def _finely(fit: Fitted, m: Measured) -> Fitted:
     """A fit in blocks, refined at the resolution of the measures."""
-    return descend(fit.within(fine=True)) if m.window.blocks.fine else fit
+    return descend(fit.within(fine=True)) if m.problem.blocks.fine else fit
 
 
 def _with_path(m: Measured, path: SlipPath, jump: float, more: float) -> Measured:

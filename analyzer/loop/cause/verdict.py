@@ -88,7 +88,7 @@ class Verdict:
         return m.stick_slip if self.fault is Fault.STICTION and m.stick_slip is not None else m.play
 
     @property
-    def told_between_rows(self) -> bool:
+    def identified_between_rows(self) -> bool:
         """Whether the loop is identified at any sampling: its ringing causes the cycle, or the valve does, fitted
         with OP between the rows from control law and scan."""
         if self.cause is Cause.VALVE and self.measured is not None:
@@ -124,12 +124,12 @@ def _crossed(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
     a cycle; over its usual range in a calm loop, whose tails are kicks of its set point. OP of a valve that rarely
     slips stays within its stickband, so the whole range counts there too."""
     whole = oscillating or fault_of(m, limits) is Fault.STICTION
-    return m.play.valve.stickband <= limits.widest * float(np.ptp(m.window.blocks.op)) and (
+    return m.play.valve.stickband <= limits.widest * float(np.ptp(m.problem.blocks.op)) and (
         whole or m.size <= 1.0
     )
 
 
-def speaks(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
+def shows_fault(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
     """Whether PV shows a valve fault: enough evidence, a process gain of the controller's sign, and a width that OP
     has crossed."""
     wrong_way = m.controller is not None and m.controller.sign * m.play.gain < 0
@@ -153,7 +153,7 @@ def quiet_signs(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
         return ()
     few = m.moves < limits.few_moves and not m.excited
     least = needed(m, limits, False) * (limits.quiet_factor if few else 1.0)
-    if not speaks(m, limits, False) or m.evidence < least or (m.moves < limits.moves and not m.excited):
+    if not shows_fault(m, limits, False) or m.evidence < least or (m.moves < limits.moves and not m.excited):
         return ()
     sure = 0.5 + 0.5 * _ramp(m.evidence, least, 4 * least)
     signs = [Sign(Cause.VALVE, sure, SignKind.CALM_EVIDENCE, (m.evidence,))]
@@ -247,7 +247,7 @@ def _rings(m: Measured, ringing: Ringing, limits: CauseLimits) -> Verdict:
         Sign(Cause.TUNING, pct / 100.0, SignKind.RINGING, (ringing.ms, ringing.period_s)),
         Sign(Cause.TUNING, max(clear, WEAK), SignKind.SMOOTH_LOAD, (ringing.line_nat,)),
     )
-    told = replace(m, linear=as_fit(ringing.smooth, m.window))
+    told = replace(m, linear=as_fit(ringing.smooth, m.problem))
     return Verdict(Cause.TUNING, confidence, Fault.NONE, signs, measured=told)
 
 
@@ -257,7 +257,7 @@ def _may_be_cause(m: Measured, ringing: Ringing, limits: CauseLimits, beside: Wo
     than half of the half-cycles must show it: a few may follow set point moves. Unless nearly all of them do, two
     faults must be shown by the whole record: backlash under a periodic load, whose harmonics it explains too, and one
     that is narrow for OP's travel, which must also explain far more than a line."""
-    if m.evidence < ringing.penalty or not speaks(m, limits, True) or imbalance(m) > limits.imbalance:
+    if m.evidence < ringing.penalty or not shows_fault(m, limits, True) or imbalance(m) > limits.imbalance:
         return False
     if m.trials is not None and m.trials.signs < SIGN_TEST:
         return False
@@ -276,9 +276,9 @@ def imbalance(m: Measured) -> float:
     where the loop attenuates a load at the period, the factor by which it does; 0 without settings."""
     if m.controller is None:
         return 0.0
-    loop = Loop(between_samples(m.play.process, m.window, m.controller), m.controller)
+    loop = Loop(between_samples(m.play.process, m.problem, m.controller), m.controller)
     response = complex(loop_response(loop, np.array([2.0 * math.pi / m.scale_s]))[0])
-    return abs(1.0 + response * describe(Backlash(m.play.valve.stickband), 0.5 * m.window.cycle_range))
+    return abs(1.0 + response * describe(Backlash(m.play.valve.stickband), 0.5 * m.problem.cycle_range))
 
 
 def _quiet(m: Measured, limits: CauseLimits, beside: WornValve | None) -> Verdict:
@@ -286,7 +286,7 @@ def _quiet(m: Measured, limits: CauseLimits, beside: WornValve | None) -> Verdic
     signs = quiet_signs(m, limits)
     pct = combined(signs)
     is_valve = len(signs) >= limits.signs and pct >= limits.named_pct
-    is_valve = is_valve and (beside is None or (beside.is_likelier and not beside.is_held))
+    is_valve = is_valve and (beside is None or (beside.is_likelier and not beside.is_recorded_by_exception))
     if not is_valve:
         pct = min(pct, 0.5 * limits.named_pct)
     confidence = {Cause.VALVE: pct, Cause.TUNING: 0.0, Cause.LOAD: 0.0}
@@ -297,10 +297,10 @@ def _quiet(m: Measured, limits: CauseLimits, beside: WornValve | None) -> Verdic
 def hidden_by_grid(m: Measured, pv_step: float, oscillates: bool, limits: CauseLimits) -> bool:
     """Whether the valve's stickband moves PV by so few steps of its grid, pv_step [% of span], or PV of a calm loop
     covers so few, that the grid itself keeps PV constant as the valve would."""
-    if m.window.blocks.position is not None and not m.window.blocks.decoded:
+    if m.problem.blocks.position is not None and not m.problem.blocks.decoded:
         return False
     best = m.stick_slip if m.stick_slip is not None and m.jump > limits.evidence_jump else m.play
-    covered = float(np.ptp(m.window.y[m.window.usable]))
+    covered = float(np.ptp(m.problem.y[m.problem.usable]))
     rough = not oscillates and covered < limits.grid_covered * pv_step
     return rough or abs(best.gain) * best.valve.stickband < limits.grid_steps * pv_step
 

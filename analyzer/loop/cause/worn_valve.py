@@ -14,9 +14,9 @@ from functools import cached_property
 from analyzer.config import CauseLimits
 from analyzer.loop.decisions import Fault
 from analyzer.loop.identification.candidates import SEARCHED, judged_count
-from analyzer.loop.identification.fit_data import scans_of, whole_window
+from analyzer.loop.identification.fit_data import scans_of, whole_problem
 from analyzer.loop.identification.measure import Measured
-from identification.estimation.beside_line import BesideLine, beside_line, in_window
+from identification.estimation.backlash_under_line import BacklashUnderLine, beside_line, in_window
 from identification.estimation.between_samples import with_scans
 from identification.estimation.model import Fitted
 from identification.estimation.problem import Problem
@@ -45,11 +45,11 @@ class WornValve:
     limits: CauseLimits
 
     @cached_property
-    def found(self) -> BesideLine:
+    def found(self) -> BacklashUnderLine:
         """The joint model of process, backlash, load and line."""
         m = self.measured
         valves = [fit.valve for fit in (m.play, m.stick_slip) if fit is not None]
-        return beside_line(self._window, self._starts(), valves, self.period_s)
+        return beside_line(self._problem, self._starts(), valves, self.period_s)
 
     @property
     def is_seen(self) -> bool:
@@ -72,7 +72,7 @@ class WornValve:
         """Whether the whole record is likelier with the fault than with an ideal valve, under a load with real poles:
         a free noise model of one stretch can take over the process at a single move of the set point. True if the
         whole record cannot answer."""
-        return self.measured.window.blocks.position is not None or self._is_thin or self.found.evidence > 0.0
+        return self.measured.problem.blocks.position is not None or self._is_thin or self.found.evidence > 0.0
 
     @property
     def shown(self) -> tuple[Fault, Measured]:
@@ -87,28 +87,28 @@ class WornValve:
         """Process alone and behind the faulty valve. If the cycle of OP crosses the backlash it is fitted in the
         stretch of the measures, whose blocks are shorter: longer ones give a width that is too small."""
         m, found = self.measured, self.found
-        if found.play.valve.stickband > self.limits.widest * m.window.reach:
-            return as_fit(found.sound, found.play.p), found.play
-        return m.linear, as_fit(in_window(found, m.window, self.period_s), m.window)
+        if found.play.valve.stickband > self.limits.widest * m.problem.reach:
+            return as_fit(found.ideal, found.play.p), found.play
+        return m.linear, as_fit(in_window(found, m.problem, self.period_s), m.problem)
 
     @property
     def _is_hidden(self) -> bool:
         """Whether the record cannot answer: its stem is recorded, the load was not compared, OP swings from limit to
         limit, few blocks are good, or the loop rings with few samples a cycle."""
         m, limits = self.measured, self.limits
-        if m.ringing is None or m.window.blocks.position is not None or m.window.cycle_range >= WHOLE_PCT:
+        if m.ringing is None or m.problem.blocks.position is not None or m.problem.cycle_range >= WHOLE_PCT:
             return True
-        if self._is_thin or self.is_held:
+        if self._is_thin or self.is_recorded_by_exception:
             return True
         return self.period_s < limits.samples_told * self.record.dt_s and m.ringing.rings(limits)
 
     @property
     def _is_thin(self) -> bool:
         """Whether too few blocks of the whole record follow good ones: those of the stretch are shorter."""
-        return judged_count(self._window) < self.limits.judged
+        return judged_count(self._problem) < self.limits.judged
 
     @cached_property
-    def is_held(self) -> bool:
+    def is_recorded_by_exception(self) -> bool:
         """Whether a historian recorded only changes of PV of some size: what it keeps lags behind PV in either
         direction, as a stem does behind OP."""
         return held_move(self.record.pv[~self.record.bad]) > 0.0
@@ -121,17 +121,17 @@ class WornValve:
         right_way = m.controller is None or m.controller.sign * play.gain > 0.0
         width = play.valve.stickband
         crossed = width <= self.limits.widest * play.p.op_range
-        return right_way and crossed and width >= self.limits.beside_size * m.window.reach
+        return right_way and crossed and width >= self.limits.beside_size * m.problem.reach
 
     @cached_property
-    def _window(self) -> Problem:
+    def _problem(self) -> Problem:
         """The whole record, with OP at the controller's scan if the measures have it there."""
         m = self.measured
-        window = whole_window(self.record, m.window, BLOCKS, self.period_s)
-        scans = None if m.window.blocks.steps == 1 else scans_of(self.record, window, m.controller)
+        problem = whole_problem(self.record, m.problem, BLOCKS, self.period_s)
+        scans = None if m.problem.blocks.steps == 1 else scans_of(self.record, problem, m.controller)
         if scans is None:
-            return window
-        return with_scans(replace(m.play, p=window), scans, SEARCHED).p
+            return problem
+        return with_scans(replace(m.play, p=problem), scans, SEARCHED).p
 
     def _starts(self) -> list[Dynamics]:
         """Time constants and dead times [s] at which the search begins."""

@@ -8,7 +8,7 @@ from dataclasses import replace
 from analyzer.loop.action import OPEN
 from analyzer.loop.conclusion import stated
 from analyzer.loop.decisions import Action, Cause, Cell, Fault, Finding, Remedy, Requirement, Status
-from analyzer.loop.experiments.found import Learned, as_rows, chosen, model_row, with_constants
+from analyzer.loop.experiments.found import ExperimentResults, as_rows, chosen, model_row, with_constants
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import sentences
@@ -19,7 +19,7 @@ from tuning.search import rounded
 SAID = sentences("experiments")
 
 
-def remedy_of(of: Learned, spec: LoopSpec, present: Pid | None) -> Remedy:
+def remedy_of(of: ExperimentResults, spec: LoopSpec, present: Pid | None) -> Remedy:
     """Remedy from the model of an experiment."""
     if of.settings is None:
         return Remedy(Action.NONE)
@@ -34,20 +34,20 @@ def remedy_of(of: Learned, spec: LoopSpec, present: Pid | None) -> Remedy:
     return Remedy(Action.RETUNE, SAID["from_model"].format(s.robust_ms, simc), rounded(kp), rounded(ti))
 
 
-def _known(of: Learned) -> dict[str, Cell]:
+def _known(of: ExperimentResults) -> dict[str, Cell]:
     """Columns of experiments, and of their model if there is one."""
     out: dict[str, Cell] = {"experiments": as_rows(of), "experiment": in_a_clause(of) or None}
     return out if of.model is None else out | model_row(of.model)
 
 
-def _witnessed(of: Learned, witness: Cell) -> dict[str, Cell]:
+def _witnessed(of: ExperimentResults, witness: Cell) -> dict[str, Cell]:
     """The night's evidence, with the constants of the model."""
     kept = witness if isinstance(witness, str) else None
     return {} if of.model is None else {"witness": with_constants(kept, of.model)}
 
 
 def by_experiment(
-    of: Learned,
+    of: ExperimentResults,
     spec: LoopSpec,
     night: str,
     lacking: Requirement,
@@ -71,7 +71,7 @@ def by_experiment(
     )
 
 
-def with_experiment(found: Finding, of: Learned, spec: LoopSpec, present: Pid | None) -> Finding:
+def with_experiment(found: Finding, of: ExperimentResults, spec: LoopSpec, present: Pid | None) -> Finding:
     """A finding with the experiments added; their model replaces that of the routine, and their settings are used if
     there are no others."""
     witness = found.known.get("witness")

@@ -50,12 +50,13 @@ class Controlled:
 
 
 @dataclass(frozen=True, slots=True)
-class Learned:
+class ExperimentResults:
     """Results of a record's experiments.
 
-    found, all of them; prepared, the record that contains them; models, of those that determine a process; model, all
-    of these combined, None if there are none; settings from it, None if it gives none; untold, experiments without a
-    model, each with the reason; controlled, the controller in the model's own experiment in automatic.
+    found, all of them; prepared, the record that contains them; models, of those that determine a process; model,
+    all of these combined, None if there are none; settings from it, None if it gives none; without_model,
+    experiments without a model, each with the reason; controlled, the controller in the model's own experiment in
+    automatic.
     """
 
     found: tuple[Experiment, ...]
@@ -63,7 +64,7 @@ class Learned:
     models: tuple[Modelled, ...] = ()
     model: Pooled | None = None
     settings: FromTest | None = None
-    untold: tuple[tuple[Experiment, str], ...] = ()
+    without_model: tuple[tuple[Experiment, str], ...] = ()
     controlled: Controlled | None = None
 
 
@@ -101,14 +102,14 @@ def found_in(
     return (*by_hand(prepared.record, manual), *(() if manual.all() else in_automatic(prepared.record)))
 
 
-def learned(
+def experiment_results(
     spec: LoopSpec,
     series: Mapping[str, Series],
     prepared: Prepared,
     config: Config,
     closed: bool = True,
     beside: Sequence[Floats] = (),
-) -> Learned | None:
+) -> ExperimentResults | None:
     """Results of a loop's experiments; None if there are none.
 
     closed : whether those in automatic are modelled too, which a night leaves to its routine; beside : OPs of
@@ -120,26 +121,28 @@ def learned(
     even = prepared if beside else on_even_clock(spec, series, prepared, config)
     if even is not prepared:
         found = found_in(spec, even, series, config)
-    models, untold, stated = [], [], controller_of(spec, even)
+    models, without_model, stated = [], [], controller_of(spec, even)
     wanted = [x for x in sorted(found, key=lambda x: -x.size) if closed or not x.course.closed]
     for x in wanted[: MOST if closed else MOST_A_NIGHT]:
         try:
-            models.append(_the_right_way(modelled(even.record, x, beside), stated))
+            models.append(_checked_sign(modelled(even.record, x, beside), stated))
         except NotAssessedError as error:
-            untold.append((x, str(error)))
+            without_model.append((x, str(error)))
         except (ArithmeticError, ValueError) as error:  # a fit that diverges costs nothing else of the loop
-            untold.append((x, f"no fit: {error}"))
+            without_model.append((x, f"no fit: {error}"))
     models.sort(key=lambda m: m.experiment.first)
     if not models:
-        return Learned(found, even, untold=tuple(untold))
+        return ExperimentResults(found, even, without_model=tuple(without_model))
     open_ones = [m for m in models if not m.experiment.course.closed]
     whole = pooled(open_ones or models)
     first = whole.used[0].experiment
     seen = controlled(even.record.span(first.first, first.last)) if first.course.closed else None
-    return Learned(found, even, tuple(models), whole, _settings(whole, spec, even), tuple(untold), seen)
+    return ExperimentResults(
+        found, even, tuple(models), whole, _settings(whole, spec, even), tuple(without_model), seen
+    )
 
 
-def _the_right_way(model: Modelled, stated: Pid | None) -> Modelled:
+def _checked_sign(model: Modelled, stated: Pid | None) -> Modelled:
     """The model; NotAssessedError for one of an experiment in automatic whose gain has the wrong sign for the stated
     controller: such a loop would be unstable, so a load has moved PV."""
     closed = model.experiment.course.closed
@@ -220,12 +223,12 @@ def model_row(model: Pooled) -> dict[str, Cell]:
     return out | ({"backlash_pct": value["backlash_pct"]} if "backlash_pct" in e else {})
 
 
-def as_rows(of: Learned) -> str:
+def as_rows(of: ExperimentResults) -> str:
     """The experiments as the store keeps them (JSON): span [s since 1970-01-01 UTC], course, moves, results of each,
     and its response in a few hundred points, PV in % of span."""
     record = of.prepared.record
     told = {m.experiment: m for m in of.models}
-    why = dict(of.untold)
+    why = dict(of.without_model)
     return json.dumps([_as_row(record, x, told.get(x), why.get(x)) for x in of.found], separators=(",", ":"))
 
 
@@ -250,7 +253,7 @@ def _as_row(record: LoopRecord, x: Experiment, m: Modelled | None, why: str | No
     return row | {"kind": str(m.kind), "constants": known, "time_s": times, **short, **lone}
 
 
-def chosen(of: Learned, present: Pid | None) -> Pid | None:
+def chosen(of: ExperimentResults, present: Pid | None) -> Pid | None:
     """New settings in place of the present ones; None if these are as good, or there are none."""
     if of.settings is None or present is None:
         return None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from analyzer.loop.advice.tune import identified
 from analyzer.loop.assess import assess
-from analyzer.loop.experiments.found import learned
+from analyzer.loop.experiments.found import experiment_results
 from analyzer.words import sentences
 from analyzer.words.experiments import model_text
 from analyzer.words.units import duration, number
@@ -97,7 +97,7 @@ def known_of(one: PlantLoop, store: Path | None) -> Known:
     from analyzer.store.store import Store
 
     series = one.plant.trends(one.spec.tags, one.night)
-    taught = learned(one.spec, series, one.prepared, one.plant.config)
+    taught = experiment_results(one.spec, series, one.prepared, one.plant.config)
     if taught is not None and taught.model is not None:
         return of_experiments(taught.model)
     if store is not None:

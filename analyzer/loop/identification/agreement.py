@@ -74,20 +74,22 @@ def agreement(loop: Loop, fit: Fitted, load: Floats) -> Agreement:
     Stem and OP are compared by their samples at the longer of both intervals, OP rounded as recorded and without
     moves within a digit: at a coarse digit OP's noise is not in the record.
     """
-    sim, window = settled(run(loop_in_digits(loop), in_digits(load))), fit.p
-    dt_s, scan_s = window.step_s, scan_step(loop)
-    last = min(window.blocks.op.size, math.ceil(len(sim) * scan_s / dt_s))
-    own = window.blocks.op[None]
-    modelled = stem_of(Stems(own, own, own, window.blocks.op, np.empty(0), 1), fit.valve)
-    stem = modelled if window.blocks.position is None else window.blocks.position
+    sim, problem = settled(run(loop_in_digits(loop), in_digits(load))), fit.p
+    dt_s, scan_s = problem.step_s, scan_step(loop)
+    last = min(problem.blocks.op.size, math.ceil(len(sim) * scan_s / dt_s))
+    own = problem.blocks.op[None]
+    modelled = stem_of(Stems(own, own, own, problem.blocks.op, np.empty(0), 1), fit.valve)
+    stem = modelled if problem.blocks.position is None else problem.blocks.position
     every = max(round(dt_s / scan_s), 1)
-    digit = op_step(window.blocks.op)
-    recorded = [_travel(x[-last:], dt_s) for x in (play(window.blocks.op, digit), stem)]
+    digit = op_step(problem.blocks.op)
+    recorded = [_travel(x[-last:], dt_s) for x in (play(problem.blocks.op, digit), stem)]
     rounded = digit * np.round(sim.op[::every] / digit) if digit > 0.0 else sim.op[::every]
     simulated = [_travel(x, every * scan_s) for x in (play(rounded, digit), sim.stem[::every])]
     op, moved = (s / max(r, 1e-9) for s, r in zip(simulated, recorded, strict=True))
-    error = recorded_error(fit, loop.controller, math.ceil(len(sim) * scan_s / window.dt_s))
-    moved_on = stem if window.blocks.decoded else modelled  # a recorded stem has the noise of its transmitter
+    error = recorded_error(fit, loop.controller, math.ceil(len(sim) * scan_s / problem.dt_s))
+    moved_on = (
+        stem if problem.blocks.decoded else modelled
+    )  # a recorded stem has the noise of its transmitter
     counted = reversals(moved_on[-last:]), reversals(sim.stem[::every])
     rate = counted[1] / max(counted[0], LEAST) * last * dt_s / (len(sim) * scan_s)
     ratio = float(np.mean(np.abs(sim.error))) / max(error, 1e-9) if math.isfinite(error) else 0.0

@@ -1,4 +1,4 @@
-"""The candidate models of one window: a process behind an ideal valve, with backlash, and with stick-slip."""
+"""The candidate models of one problem: a process behind an ideal valve, with backlash, and with stick-slip."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import (
     SHORT,
     better_linear,
+    fit_backlash,
     fit_linear,
-    fit_play,
     fit_stick_slip,
 )
 from identification.estimation.between_samples import Scans, settled, with_scans
@@ -34,9 +34,10 @@ SEARCHED = 2
 """Paths of OP during the search of valves: ours, for time; the valves found are evaluated on all paths."""
 
 
-class Question(NamedTuple):
-    """Inputs of the fits of a window: the period or another time scale of the loop [s], where a set point response of
-    PV is expected, the controller's scans within its rows (None: unknown), and whether the loop is calm."""
+class FitInputs(NamedTuple):
+    """Inputs of the fits of a problem: the period or another time scale of the loop [s], where a set point
+    response of PV is expected, the controller's scans within its rows (None: unknown), and whether the loop is
+    calm."""
 
     scale_s: float
     due: Mask
@@ -45,26 +46,26 @@ class Question(NamedTuple):
     limits: CauseLimits
 
 
-def fits_of(window: Problem, q: Question) -> Fits:
+def fits_of(problem: Problem, q: FitInputs) -> Fits:
     """The candidates' fits, by a recorded stem if it shows a fault; with OP at the controller's scan if its scans
     within a row are known."""
-    shown = None if window.blocks.position is None else seen(window.blocks.op, window.blocks.position)
+    shown = None if problem.blocks.position is None else seen(problem.blocks.op, problem.blocks.position)
     if shown is not None:
-        return _stem_shown(window, shown, q)
-    window = window.with_blocks(position=None)
-    found = None if q.scans is None or q.calm else _at_scans(window, q, q.scans)
-    found = found or _candidates(window, q)
+        return _stem_shown(problem, shown, q)
+    problem = problem.with_blocks(position=None)
+    found = None if q.scans is None or q.calm else _at_scans(problem, q, q.scans)
+    found = found or _candidates(problem, q)
     return *found, *_compared(found, q)
 
 
-def judged_count(window: Problem) -> int:
+def judged_count(problem: Problem) -> int:
     """Number of blocks that follow as many good ones as the noise model's order."""
-    return int(judged(window.usable, AR_ORDER).sum())
+    return int(judged(problem.usable, AR_ORDER).sum())
 
 
-def check_judged(window: Problem, limits: CauseLimits) -> None:
+def check_judged(problem: Problem, limits: CauseLimits) -> None:
     """Raise NotAssessedError if too few blocks follow as many good ones as the noise model's order."""
-    count = judged_count(window)
+    count = judged_count(problem)
     if count < limits.judged:
         raise NotAssessedError(
             f"needs {limits.judged} stretches of {AR_ORDER + 1} good samples in a row, has {count}"
@@ -84,12 +85,12 @@ def refined(fits: Candidates, best: Fitted, hopeless: bool) -> Candidates:
     return descend(linear), play, stick
 
 
-def hopeful(window: Problem, q: Question) -> float:
+def hopeful(problem: Problem, q: FitInputs) -> float:
     """Evidence [nat] from which a search for a valve fault is worthwhile in a loop that does not oscillate."""
-    return q.limits.hopeless * q.limits.needed(judged_count(window), bool(q.due.any()), False)
+    return q.limits.hopeless * q.limits.needed(judged_count(problem), bool(q.due.any()), False)
 
 
-def _is_searched(linear: Fitted, play: Fitted, q: Question) -> bool:
+def _is_searched(linear: Fitted, play: Fitted, q: FitInputs) -> bool:
     """Whether the complete search for a valve fault is worthwhile: in a loop that oscillates always, because a stem
     that jumps by nearly its stickband resembles no backlash; in a calm one if backlash explains enough."""
     if not q.calm or play.p.y.size < SHORT:
@@ -97,24 +98,24 @@ def _is_searched(linear: Fitted, play: Fitted, q: Question) -> bool:
     return play.log_likelihood - linear.log_likelihood >= hopeful(play.p, q)
 
 
-def _candidates(window: Problem, q: Question) -> Candidates:
-    """The fits of one window."""
-    linear = fit_linear(window, q.scale_s)
-    short = q.calm and window.y.size < SHORT
-    play = fit_play(linear, q.scale_s, hopeful(window, q) if q.calm and not short else None)
+def _candidates(problem: Problem, q: FitInputs) -> Candidates:
+    """The fits of one problem."""
+    linear = fit_linear(problem, q.scale_s)
+    short = q.calm and problem.y.size < SHORT
+    play = fit_backlash(linear, q.scale_s, hopeful(problem, q) if q.calm and not short else None)
     if not _is_searched(linear, play, q):
         return linear, play, None
     gained = play.log_likelihood - linear.log_likelihood
-    wide = play.valve.stickband > 0.25 * window.reach
+    wide = play.valve.stickband > 0.25 * problem.reach
     sticks = short or not q.calm or (wide and gained >= q.limits.evidence)
     return better_linear(linear, play), play, fit_stick_slip(play, q.scale_s) if sticks else None
 
 
-def _at_scans(window: Problem, q: Question, scans: Scans) -> Candidates | None:
+def _at_scans(problem: Problem, q: FitInputs, scans: Scans) -> Candidates | None:
     """The fits with OP at the controller's scan, each computed by its own model; None if those with OP at the rows
     are clearly more likely: a controller with no faster scan holds OP between rows."""
-    linear = fit_linear(window, q.scale_s)
-    rows = _likeliest((linear, fit_play(linear, q.scale_s), None))
+    linear = fit_linear(problem, q.scale_s)
+    rows = _likeliest((linear, fit_backlash(linear, q.scale_s), None))
     within = with_scans(settled(rows, scans), scans, SEARCHED).p
     linear, play, stick = _candidates(within, q)
     stick = None if stick is None else settled(stick, scans)
@@ -127,7 +128,7 @@ def _likeliest(fits: Candidates) -> Fitted:
     return max((f for f in fits if f is not None), key=lambda f: f.log_likelihood)
 
 
-def _compared(found: Candidates, q: Question) -> tuple[Fitted, float, float]:
+def _compared(found: Candidates, q: FitInputs) -> tuple[Fitted, float, float]:
     """The better valve, its evidence over an ideal one, and that of the jump over backlash [nat]."""
     linear, play, stick = found
     if stick is None and not _is_searched(linear, play, q):
@@ -142,11 +143,11 @@ def _compared(found: Candidates, q: Question) -> tuple[Fitted, float, float]:
     return best, gained - (q.limits.evidence_jump if best is stick else 0.0), jump
 
 
-def _stem_shown(window: Problem, shown: Seen, q: Question) -> Fits:
+def _stem_shown(problem: Problem, shown: Seen, q: FitInputs) -> Fits:
     """The same with a recorded stem: its fault is visible, and PV responds to the stem itself."""
-    linear = fit_linear(window, q.scale_s)
-    behind = window if window.blocks.position is None else window.with_blocks(op=window.blocks.position)
-    play = descend(replace(fit_linear(behind, q.scale_s), p=window).moved(valve=shown.play))
+    linear = fit_linear(problem, q.scale_s)
+    behind = problem if problem.blocks.position is None else problem.with_blocks(op=problem.blocks.position)
+    play = descend(replace(fit_linear(behind, q.scale_s), p=problem).moved(valve=shown.play))
     stick = None if shown.jumping is None else play.moved(valve=shown.jumping)
     best = play if stick is None else stick
     gained = evidence(best, with_load_step(linear, q.due, best.ar))

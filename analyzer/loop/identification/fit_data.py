@@ -76,7 +76,7 @@ def across(x: Floats, hole: Mask) -> Floats:
     return np.where(hole, np.interp(np.arange(x.size), at, x[at]), x)
 
 
-def window_of(
+def problem_of(
     record: LoopRecord, scale_s: float, limits: CauseLimits, kind: str = "", calm: bool = False
 ) -> Problem:
     """The stretch that is fitted, in blocks of a fraction of the period."""
@@ -98,7 +98,7 @@ def _cut(
     most: tuple[float, float],
     turn: int,
 ) -> Problem:
-    """The window of n samples that begins at `first`."""
+    """The problem of n samples that begins at `first`."""
     part = record.span(first, first + n)
     whole = bridged(part.usable, scale_s / record.dt_s)
     usable = block_means(whole.astype(np.float64), factor) > 0.99
@@ -118,39 +118,39 @@ def _cut(
     )
 
 
-def whole_window(record: LoopRecord, window: Problem, most: int, scale_s: float) -> Problem:
-    """The whole record in at most so many blocks, none shorter than those of a window of it; its cycles, of a period
+def whole_problem(record: LoopRecord, problem: Problem, most: int, scale_s: float) -> Problem:
+    """The whole record in at most so many blocks, none shorter than those of a problem of it; its cycles, of a period
     [s], are not distinguished from slower moves of OP."""
-    factor = max(math.ceil(len(record) / most), window.blocks.factor)
-    longest = window.blocks.most_time_constant_s, window.blocks.most_dead_time_s
+    factor = max(math.ceil(len(record) / most), problem.blocks.factor)
+    longest = problem.blocks.most_time_constant_s, problem.blocks.most_dead_time_s
     return _cut(record, 0, len(record) // factor * factor, factor, scale_s, longest, 0)
 
 
-def scans_of(record: LoopRecord, window: Problem, law: Pid | None) -> Scans | None:
-    """The controller's scans within the rows of a window; None if they are no faster than the rows, or the signal
+def scans_of(record: LoopRecord, problem: Problem, law: Pid | None) -> Scans | None:
+    """The controller's scans within the rows of a problem; None if they are no faster than the rows, or the signal
     that it acts on is not known."""
     count = scans_per_row(law, record.dt_s)
     if law is None or count == 1 or record.sp_estimated:
         return None
-    part = record.span(window.blocks.first, window.blocks.first + window.y.size * window.blocks.factor)
+    part = record.span(problem.blocks.first, problem.blocks.first + problem.y.size * problem.blocks.factor)
     pv, sp, op = across(part.pv, ~part.usable), np.ascontiguousarray(part.sp), np.ascontiguousarray(part.op)
     return Scans(Rows(pv, sp, op), law, count)
 
 
-def due_to_answer(record: LoopRecord, window: Problem, scale_s: float) -> Mask:
-    """True while a response of PV to a set point move is expected, shape of the window.
+def due_to_answer(record: LoopRecord, problem: Problem, scale_s: float) -> Mask:
+    """True while a response of PV to a set point move is expected, shape of the problem.
 
     From a move for scale_s [s], and on until PV has reached the set point, regardless of the valve's delay.
     """
-    sp = record.sp[window.blocks.first :: window.blocks.factor][: window.y.size]
+    sp = record.sp[problem.blocks.first :: problem.blocks.factor][: problem.y.size]
     moves = np.flatnonzero(np.abs(np.diff(sp)) > 1e-6) + 1
-    out = np.zeros(window.y.size, dtype=bool)
-    if record.sp_estimated or not 0 < moves.size <= window.y.size / 10:
+    out = np.zeros(problem.y.size, dtype=bool)
+    if record.sp_estimated or not 0 < moves.size <= problem.y.size / 10:
         return out
-    reach = max(round(scale_s / window.dt_s), 1)
-    error = np.abs(sp - window.pv)
-    near = error <= 3 * noise_band(window.y)
-    for at, end in zip(moves, [*moves[1:], window.y.size], strict=True):
+    reach = max(round(scale_s / problem.dt_s), 1)
+    error = np.abs(sp - problem.pv)
+    near = error <= 3 * noise_band(problem.y)
+    for at, end in zip(moves, [*moves[1:], problem.y.size], strict=True):
         there = np.flatnonzero(near[at + 1 : end])
         out[at : max(at + reach, at + 2 + int(there[0]) if there.size else end)] = True
     return out

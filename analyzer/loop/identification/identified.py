@@ -11,7 +11,7 @@ from scipy.special import binom
 
 from analyzer.config import AdviceLimits
 from analyzer.loop.identification.candidates import SEARCHED
-from analyzer.loop.identification.fit_data import across, scans_of, whole_window
+from analyzer.loop.identification.fit_data import across, scans_of, whole_problem
 from analyzer.loop.identification.intervals import lag_factor
 from analyzer.loop.identification.measure import Measured
 from identification.controller.check import op_step
@@ -94,26 +94,26 @@ def load_of_night(
 ) -> Floats:
     """As `load_of`, of the whole record [% PV] instead of the stretch that is fitted, shape (m,); its unusable parts
     are left out. moved, whether moves of the set point are in it."""
-    window = whole_window(record, fit.p, NIGHT_BLOCKS, period_s)
-    dead_s = max(fit.process.dead_time_s - window.half_block_s, 0.0)
-    whole = replace(fit, p=window).moved(dead_time_s=dead_s)
-    scans = None if fit.p.blocks.steps == 1 else scans_of(record, window, controller)
+    problem = whole_problem(record, fit.p, NIGHT_BLOCKS, period_s)
+    dead_s = max(fit.process.dead_time_s - problem.half_block_s, 0.0)
+    whole = replace(fit, p=problem).moved(dead_time_s=dead_s)
+    scans = None if fit.p.blocks.steps == 1 else scans_of(record, problem, controller)
     if scans is not None:
         whole = with_scans(whole, scans, SEARCHED)
-    window = whole.p if moved else whole.p.with_blocks(sp=None)
-    clock, load = _on_scans(across(_load_left(whole), ~window.usable), window, controller)
-    usable = window.usable[np.minimum((clock / window.dt_s).astype(int), window.y.size - 1)]
-    return _with_noise(joined(load, usable)[-NIGHT_SCANS:], window, controller)
+    problem = whole.p if moved else whole.p.with_blocks(sp=None)
+    clock, load = _on_scans(across(_load_left(whole), ~problem.usable), problem, controller)
+    usable = problem.usable[np.minimum((clock / problem.dt_s).astype(int), problem.y.size - 1)]
+    return _with_noise(joined(load, usable)[-NIGHT_SCANS:], problem, controller)
 
 
 def _load_left(fit: Fitted) -> Floats:
     """PV less the response to the stem [% PV], shape (n,), less offset, drift and the decay of the model's start on
     the usable blocks: a working loop has compensated them. With a noise model that is nearly an integrator the fit
     does not determine its own offset, which can be far beyond what OP can compensate."""
-    window = fit.p
-    t = np.linspace(-1.0, 1.0, window.y.size)
-    faded = np.exp(-0.5 * (1.0 + t) * window.duration_s / fit.time_constant_s)
-    return regressed(residual(fit), np.column_stack([np.ones(t.size), t, faded]), window.usable)
+    problem = fit.p
+    t = np.linspace(-1.0, 1.0, problem.y.size)
+    faded = np.exp(-0.5 * (1.0 + t) * problem.duration_s / fit.time_constant_s)
+    return regressed(residual(fit), np.column_stack([np.ones(t.size), t, faded]), problem.usable)
 
 
 def joined(load: Floats, usable: Mask) -> Floats:
@@ -129,37 +129,37 @@ def regressed(y: Floats, terms: Floats, usable: Mask) -> Floats:
     return np.asarray(y - terms @ slope)
 
 
-def _on_scans(left: Floats, window: Problem, controller: Pid) -> tuple[Floats, Floats]:
+def _on_scans(left: Floats, problem: Problem, controller: Pid) -> tuple[Floats, Floats]:
     """Clock of the controller's scans [s] and the smooth part of a load on it [% PV], the set point subtracted."""
-    scan_s = controller.scan_s or window.dt_s
-    if window.blocks.factor == 1 and _loses_noise(window, controller):
+    scan_s = controller.scan_s or problem.dt_s
+    if problem.blocks.factor == 1 and _loses_noise(problem, controller):
         left = without_noise(left)
-    if window.blocks.sp is not None:
-        left = left - (window.blocks.sp - window.blocks.sp.mean())
-    clock: Floats = scan_s * np.arange(int(window.duration_s / scan_s), dtype=np.float64)
-    return clock, np.asarray(np.interp(clock, np.arange(left.size) * window.dt_s, left), dtype=np.float64)
+    if problem.blocks.sp is not None:
+        left = left - (problem.blocks.sp - problem.blocks.sp.mean())
+    clock: Floats = scan_s * np.arange(int(problem.duration_s / scan_s), dtype=np.float64)
+    return clock, np.asarray(np.interp(clock, np.arange(left.size) * problem.dt_s, left), dtype=np.float64)
 
 
-def _loses_noise(window: Problem, controller: Pid) -> bool:
+def _loses_noise(problem: Problem, controller: Pid) -> bool:
     """Whether blocks, or rows of several scans, hide the noise from scan to scan."""
-    return window.blocks.factor > 1 or scans_per_row(controller, window.row_s) > 1
+    return problem.blocks.factor > 1 or scans_per_row(controller, problem.row_s) > 1
 
 
-def _with_noise(load: Floats, window: Problem, controller: Pid) -> Floats:
-    """A load with the noise that its window does not contain [% PV], shape (m,)."""
-    if _loses_noise(window, controller):
-        load = load + scan_noise(window, controller) * np.random.default_rng(SEED).normal(size=load.size)
+def _with_noise(load: Floats, problem: Problem, controller: Pid) -> Floats:
+    """A load with the noise that its problem does not contain [% PV], shape (m,)."""
+    if _loses_noise(problem, controller):
+        load = load + scan_noise(problem, controller) * np.random.default_rng(SEED).normal(size=load.size)
     return np.asarray(load, dtype=np.float64)
 
 
 def recorded_error(fit: Fitted, controller: Pid, last: int = 0) -> float:
     """Average absolute error of the data of a fit [% PV], of its last samples if a number is given; about PV's mean
     if the set point is constant. The noise missing in blocks is added as in `load_of`."""
-    window = fit.p
-    sp = 0.0 if window.blocks.sp is None else window.blocks.sp - window.inputs.level
-    error, usable = (window.centred - sp)[-last:], window.usable[-last:]
+    problem = fit.p
+    sp = 0.0 if problem.blocks.sp is None else problem.blocks.sp - problem.inputs.level
+    error, usable = (problem.centred - sp)[-last:], problem.usable[-last:]
     slow = float(np.mean(np.abs(error[usable]))) if usable.any() else math.nan
-    fast = scan_noise(window, controller) if window.blocks.factor > 1 else 0.0
+    fast = scan_noise(problem, controller) if problem.blocks.factor > 1 else 0.0
     return math.hypot(slow, math.sqrt(2.0 / math.pi) * fast)
 
 
@@ -172,11 +172,11 @@ def error_of_night(record: LoopRecord, controller: Pid) -> float:
     return float(np.mean(np.abs(error - bias)))
 
 
-def scan_noise(window: Problem, controller: Pid) -> float:
+def scan_noise(problem: Problem, controller: Pid) -> float:
     """Standard deviation of PV's noise from sample to sample [% PV], from OP's differences where OP is free: the
     smaller of second and fourth ones, because a fast cycle adds to both, to the fourth ones far less."""
     found = []
-    for one in (window, window.of_rows):  # simulated between the rows, and recorded alone
+    for one in (problem, problem.of_rows):  # simulated between the rows, and recorded alone
         held = max(round(controller.scan_s / one.step_s), 1)  # OP is constant between two scans
         op, scan_s = one.blocks.op[::held], controller.scan_s or one.step_s
         shared = from_noise(controller, scan_s, HIGHEST + 1, max(round(one.step_s / scan_s), 1))

@@ -70,7 +70,7 @@ DECODED = 0.05
 
 
 def is_known(fit: Fitted, limits: AdviceLimits) -> bool:
-    """Whether the time constant is well inside the window, so that it differs from an integrator's."""
+    """Whether the time constant is well inside the stretch, so that it differs from an integrator's."""
     return fit.time_constant_s < limits.longest_share * fit.p.duration_s
 
 
@@ -90,7 +90,7 @@ def intervals(fit: Fitted, valve: bool, limits: AdviceLimits, law: Pid | None = 
     intervals. proofs/coverage.md gives the coverage of the intervals, proofs/sampling.md that in slow rows.
     """
     whole = covariance(fit, free_width=valve)
-    t, window, unseen = fit.time_constant_s, fit.p, _between_rows(fit, valve, law)
+    t, problem, unseen = fit.time_constant_s, fit.p, _between_rows(fit, valve, law)
     factor = lag_factor(fit, valve, limits)
     wider = SLOPE_ALONE if valve and factor is None else 1.0
     spread = wider * np.sqrt(np.maximum(np.diag(whole), 0.0))
@@ -105,16 +105,16 @@ def intervals(fit: Fitted, valve: bool, limits: AdviceLimits, law: Pid | None = 
         out["gain"] = _around(fit.gain, half_width(gain, LEAST_SHARE * abs(fit.gain)), "%/%")
         out["time_constant_s"] = Estimate(t, t / wide, t * wide, "s")
     unseen_pct = unseen.width * fit.valve.stickband
-    late = math.hypot(spread[1], _time_of(unseen_pct, window))
-    late = half_width(late, LEAST_BLOCK * window.dt_s)
+    late = math.hypot(spread[1], _time_of(unseen_pct, problem))
+    late = half_width(late, LEAST_BLOCK * problem.dt_s)
     out["dead_time_s"] = _around(fit.process.dead_time_s, late, "s", least=0.0)
     if valve:
-        known = DECODED * fit.valve.stickband if window.blocks.decoded else spread[2]
+        known = DECODED * fit.valve.stickband if problem.blocks.decoded else spread[2]
         name = "backlash_pct" if fit.valve.slip_jump == 0 else "stickband_pct"
         half = half_width(math.hypot(known, unseen_pct))
         out[name] = _around(fit.valve.stickband, half, "% of OP", least=0.0)
         if fit.valve.slip_jump > 0:
-            out |= _jumping(window, fit.valve, out)
+            out |= _jumping(problem, fit.valve, out)
     return out
 
 
@@ -127,10 +127,10 @@ def _between_rows(fit: Fitted, valve: bool, law: Pid | None) -> BetweenRows:
     return DRAWN if fit.p.blocks.steps > 1 else ALONE
 
 
-def _time_of(width: float, window: Problem) -> float:
+def _time_of(width: float, problem: Problem) -> float:
     """Time in which OP travels a width [% of OP]: a wider backlash responds later by it [s]."""
-    travel = float(np.abs(np.diff(window.inputs.op)).sum())
-    return width * window.duration_s / max(travel, 1e-9)
+    travel = float(np.abs(np.diff(problem.inputs.op)).sum())
+    return width * problem.duration_s / max(travel, 1e-9)
 
 
 def _lag_wider(fit: Fitted, valve: bool) -> float:
@@ -140,7 +140,7 @@ def _lag_wider(fit: Fitted, valve: bool) -> float:
     return INTERVALS_WIDER * JUMPING if fit.valve.slip_jump > 0 else 1.0
 
 
-def _jumping(window: Problem, valve: StemLaw, found: dict[str, Estimate]) -> dict[str, Estimate]:
+def _jumping(problem: Problem, valve: StemLaw, found: dict[str, Estimate]) -> dict[str, Estimate]:
     """Intervals of a valve that jumps, from the uncertainty that PV leaves.
 
     Slip jump from half of the found one to the whole stickband, slope and gain from their product with the jump; a
@@ -154,7 +154,7 @@ def _jumping(window: Problem, valve: StemLaw, found: dict[str, Estimate]) -> dic
             value = found[name].value
             out[name] = reaching(found[name], value * jump / band, value * LEAST_JUMP)
     out["stickband_pct"] = reaching(found["stickband_pct"], band / LEAST_BAND)
-    later_s = _time_of(0.5 * band * (1.0 - 1.0 / LEAST_BAND), window)
+    later_s = _time_of(0.5 * band * (1.0 - 1.0 / LEAST_BAND), problem)
     dead = found["dead_time_s"]
     sooner_s = SOONER * (dead.value - dead.low)
     low, high = max(dead.value - sooner_s, 0.0), dead.value + LATER * later_s

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.config import CauseLimits
-from analyzer.loop.identification.candidates import Question, check_judged, fits_of, hopeful, refined
-from analyzer.loop.identification.fit_data import due_to_answer, scans_of, window_of
+from analyzer.loop.identification.candidates import FitInputs, check_judged, fits_of, hopeful, refined
+from analyzer.loop.identification.fit_data import due_to_answer, problem_of, scans_of
 from analyzer.loop.identification.ringing import Ringing, calm_resonance, ringing_of
 from analyzer.loop.oscillation.detection import Oscillation, error_spectrum
 from analyzer.loop.oscillation.figures import at_limits_share
@@ -70,7 +70,7 @@ class Measured:
     scale_s: float = 60.0
 
     @property
-    def window(self) -> Problem:
+    def problem(self) -> Problem:
         """The data of all the fits."""
         return self.linear.p
 
@@ -92,14 +92,14 @@ def measure(
     """Fit the candidates and compute the measures for the signs; see Measured. Raises NotAssessedError if good
     samples are too scattered for an autoregressive model."""
     scale, calm = time_scale(record, oscillation, controller), oscillation is None
-    window = window_of(record, scale, limits, kind, calm)
-    check_judged(window, limits)
+    problem = problem_of(record, scale, limits, kind, calm)
+    check_judged(problem, limits)
     law = controller or recovered(record, scale, limits.law_known)
     controller = controller or recovered(record, scale)
-    due = due_to_answer(record, window, scale)
-    question = Question(scale, due, scans_of(record, window, law), calm, limits)
-    linear, play, stick, best, gained, jump = fits_of(window, question)
-    hopeless = calm and gained < hopeful(window, question)
+    due = due_to_answer(record, problem, scale)
+    question = FitInputs(scale, due, scans_of(record, problem, law), calm, limits)
+    linear, play, stick, best, gained, jump = fits_of(problem, question)
+    hopeless = calm and gained < hopeful(problem, question)
     amplification, stable = _amplification(linear.process, controller, scale)
     fine_linear, fine_play, fine_stick = refined((linear, play, stick), best, hopeless)
     seen_alone = Measured(
@@ -107,7 +107,7 @@ def measure(
         play=fine_play,
         stick_slip=fine_stick,
         evidence=gained,
-        size=best.valve.stickband / max(window.cycle_range, 1e-9),
+        size=best.valve.stickband / max(problem.cycle_range, 1e-9),
         jump=jump,
         amplification=amplification,
         stable=stable,
@@ -118,7 +118,7 @@ def measure(
         scale_s=scale,
     )
     if oscillation is None:
-        if window.blocks.position is not None:
+        if problem.blocks.position is not None:
             return replace(seen_alone, steady=math.inf)
         alone = not record.mask("idle").any()  # else another loop moves PV too
         return _without_a_cycle(seen_alone, best, linear, due if alone else None)

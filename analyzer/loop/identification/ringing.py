@@ -167,10 +167,10 @@ def same_period(predicted_s: float, seen_s: float, row_s: float, limits: CauseLi
     return abs(math.log(predicted_s / seen_s)) <= math.log(limits.ringing_period) + row_s / seen_s
 
 
-def between_samples(process: Process, window: Problem, controller: Pid) -> Process:
+def between_samples(process: Process, problem: Problem, controller: Pid) -> Process:
     """The process as the controller acts on it. The fit holds OP from one sample of the record to the next, while the
     controller moves it between them: half an interval of that hold belongs to the dead time."""
-    hold_s = max(window.step_s - controller.scan_s, 0.0)
+    hold_s = max(problem.step_s - controller.scan_s, 0.0)
     return replace(process, dead_time_s=process.dead_time_s + 0.5 * hold_s)
 
 
@@ -179,10 +179,10 @@ def calm_resonance(linear: Fitted, controller: Pid | None, scale_s: float) -> tu
     without settings, or if they act the wrong way."""
     if controller is None:
         return 1.0, scale_s
-    window, dead_s = linear.p, max(linear.dead_time_s, 0.0)
+    problem, dead_s = linear.p, max(linear.dead_time_s, 0.0)
     begins = [(linear.time_constant_s, dead_s), *((f * scale_s, 0.05 * scale_s) for f in (0.05, 0.5, 3.0))]
-    smooth = fit_smooth(window, scale_s, [(b, None) for b in begins])
-    return _peak(smooth, window, controller, scale_s)
+    smooth = fit_smooth(problem, scale_s, [(b, None) for b in begins])
+    return _peak(smooth, problem, controller, scale_s)
 
 
 def ringing_of(
@@ -192,34 +192,34 @@ def ringing_of(
 
     linear, the night's fit with an ideal valve; valves, those with faulty ones that explain PV better.
     """
-    window = linear.p
+    problem = linear.p
     law = controller
     begins = [(x.time_constant_s, max(x.dead_time_s, 0.0)) for x in (linear, *valves)]
     begins += [(share * period_s, 0.05 * period_s) for share in (0.3, 2.0)]
     plain = [(begin, None) for begin in begins]
-    smooth = fit_smooth(window, period_s, [*_resonant(window, period_s, law), *plain])
-    away = fit_smooth(window, period_s, plain)
-    lined = fit_line(window, period_s, (smooth, away), begins)
-    faulty = [fit_smooth(window, period_s, plain, x.valve, smooth) for x in valves]
-    both = [fit_line(window, period_s, (f, lined), (), f.law) for f in faulty]
+    smooth = fit_smooth(problem, period_s, [*_resonant(problem, period_s, law), *plain])
+    away = fit_smooth(problem, period_s, plain)
+    lined = fit_line(problem, period_s, (smooth, away), begins)
+    faulty = [fit_smooth(problem, period_s, plain, x.valve, smooth) for x in valves]
+    both = [fit_line(problem, period_s, (f, lined), (), f.law) for f in faulty]
     most = [max((f.log_likelihood for f in x), default=-math.inf) for x in ([lined], faulty, both)]
-    ms, rings_s = _peak(smooth, window, law, period_s)
+    ms, rings_s = _peak(smooth, problem, law, period_s)
     line_nat, valve_nat, both_nat = (x - smooth.log_likelihood for x in most)
-    return Ringing(smooth, lined, ms, rings_s, period_s, line_nat, valve_nat, both_nat, window.row_s)
+    return Ringing(smooth, lined, ms, rings_s, period_s, line_nat, valve_nat, both_nat, problem.row_s)
 
 
-def _resonant(window: Problem, period_s: float, law: Pid | None) -> list[tuple[Dynamics, float]]:
+def _resonant(problem: Problem, period_s: float, law: Pid | None) -> list[tuple[Dynamics, float]]:
     """Starts at which a loop under a known law rings at the period."""
     if law is None:
         return []
     omega = np.array([2.0 * math.pi / period_s])
-    return resonant_starts(window, period_s, complex(controller_response(law, omega)[0]))
+    return resonant_starts(problem, period_s, complex(controller_response(law, omega)[0]))
 
 
-def _peak(smooth: SmoothFit, window: Problem, law: Pid | None, scale_s: float) -> tuple[float, float]:
+def _peak(smooth: SmoothFit, problem: Problem, law: Pid | None, scale_s: float) -> tuple[float, float]:
     """Maximum sensitivity [-] of the loop of a fit, and the period [s] of its poorly damped peak nearest to the
     expected one, or of its largest; 1 without a law, or if it acts the wrong way."""
     if law is None or law.sign * smooth.process.gain <= 0.0:
         return 1.0, scale_s
-    loop = Loop(between_samples(smooth.process, window, law), law)
+    loop = Loop(between_samples(smooth.process, problem, law), law)
     return maximum_sensitivity(loop), resonance_s(loop, scale_s, POORLY_DAMPED)

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from analyzer.config import OscillationLimits
 from analyzer.loop.decisions import counts
-from analyzer.loop.oscillation.detection import Oscillation, Oscillations, detect, peaks, where_loud
+from analyzer.loop.oscillation.detection import Oscillation, Oscillations, active_samples, detect, peaks
 from identification.controller.check import runs
 from identification.record import LoopRecord, Mask
 from identification.signals.spectrum import envelope
@@ -39,7 +39,7 @@ def detect_where_it_cycles(record: LoopRecord, limits: OscillationLimits) -> tup
         period_s = s.duration_s / line
         level, dt_s = envelope(s, line)
         usable = record.at_work[len(record) - s.n :]
-        active, _, smooth = where_loud(level, dt_s, s.dt_s, period_s, usable, limits)
+        active, _, smooth = active_samples(level, dt_s, s.dt_s, period_s, usable, limits)
         span = _longest(active, dt_s, period_s, record)
         inside = None if span is None else _inside(record, span, period_s, limits)
         if inside is not None and counts(share := 100.0 * float(active.mean())):

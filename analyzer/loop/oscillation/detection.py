@@ -79,7 +79,7 @@ class Oscillations:
         return self.found[0] if self.found else None
 
 
-def begun_up(error: Floats) -> int:
+def start_up_end(error: Floats) -> int:
     """Sample at which the error first reaches zero, of a record that begins far from its set point; else 0.
 
     A vessel that heats up, or a loop just switched on, approaches its set point; this excursion hides every cycle.
@@ -97,7 +97,7 @@ def error_spectrum(record: LoopRecord, whole: bool = False) -> Spectrum:
     error, good = record.error, np.flatnonzero(record.at_work)
     if good.size < error.size:
         error = np.interp(np.arange(error.size), good, error[good])
-    first = 0 if record.sp_estimated else begun_up(error)
+    first = 0 if record.sp_estimated else start_up_end(error)
     found = spectrum(error[first:], record.dt_s)
     if whole or record.sp_estimated or float(np.ptp(record.sp[first:])) == 0.0:
         return found
@@ -179,7 +179,7 @@ def subthreshold_period(found: Oscillations, limits: OscillationLimits) -> float
     return seen[0] if seen else None
 
 
-def where_loud(
+def active_samples(
     level: Floats, dt_s: float, own_s: float, period_s: float, usable: Mask, limits: OscillationLimits
 ) -> tuple[Mask, Mask, Floats]:
     """Where a band is loud and where it may be used, shape (m,) each, and its level over two periods [% of span],
@@ -199,7 +199,7 @@ def _sized_by_envelope(
 ) -> tuple[Oscillation, Mask, Floats, float]:
     """Amplitude, share of time and significance from the envelope of the band."""
     level, dt = envelope(s, o.cycles)
-    active, good, smooth = where_loud(level, dt, s.dt_s, o.period_s, usable, limits)
+    active, good, smooth = active_samples(level, dt, s.dt_s, o.period_s, usable, limits)
     if not good.any():
         return o, good, smooth, dt
     amplitude = math.sqrt(float(np.mean(level[active] ** 2))) if active.any() else 0.0

@@ -29,7 +29,7 @@ from analyzer.loop.record.shared_valve import Shared, half, selected
 from analyzer.loops.gain_schedule import in_force
 from analyzer.loops.spec import STATED, LoopSpec
 from identification.controller.check import runs
-from identification.controller.pi_regression import fed_back
+from identification.controller.pi_regression import feedback_share
 from identification.experiments.find import by_hand
 from identification.limits import LIMITS
 from identification.record import Floats, LoopRecord, Mask
@@ -277,7 +277,7 @@ def moved_by_script(record: LoopRecord) -> bool:
     stands = record.sp_estimated and float(np.mean(np.diff(op) != 0.0)) < MOVING
     if not stands or not by_hand(record, np.ones(op.size, dtype=bool)):
         return False
-    return fed_back(op, record.pv) < LIMITS.controller.feedback
+    return feedback_share(op, record.pv) < LIMITS.controller.feedback
 
 
 def _manual(mode: Series | None, clock: Floats, record: LoopRecord, q: QualityLimits) -> Mask:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from identification.mismatch.effect import Block, Effect, Floats, Param, Slot, Variant, each
-from identification.mismatch.pictures import Axis, Drawing, Picture, beside_plain, op_range
+from identification.mismatch.pictures import Axis, Drawing, Picture, op_range, with_baseline
 
 SHARE = Param(Slot.PIPE, "flow_share", "", -0.5, 3.0, title="Share of delay in flow")
 
@@ -16,7 +16,7 @@ def delay_over_flow(d: Drawing) -> Picture:
         return np.asarray(c[Slot.L] / np.maximum(1.0 + c[Slot.PIPE] * (op / about - 1.0), 0.1))
 
     axes = Axis("OP (flow)", "%"), Axis("dead time", "s")
-    return beside_plain(d, "curve", axes, op, read, float(d.plain[Slot.L]))
+    return with_baseline(d, "curve", axes, op, read, float(d.plain[Slot.L]))
 
 
 EFFECT = Effect(

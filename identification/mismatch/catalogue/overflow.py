@@ -3,7 +3,7 @@
 import numpy as np
 
 from identification.mismatch.effect import Block, Effect, Floats, Param, Slot, Start, Variant, each
-from identification.mismatch.pictures import POINTS, Axis, Drawing, Picture, beside_plain
+from identification.mismatch.pictures import POINTS, Axis, Drawing, Picture, with_baseline
 from identification.simulation.open_loop import ModelInputs, outflow_head
 
 VESSEL = "Overflow of the vessel before at"
@@ -41,7 +41,7 @@ def pv_over_free(d: Drawing) -> Picture:
     low_pv, high_pv = d.inputs.pv_range
     free = np.linspace(low_pv, high_pv + MORE * (high_pv - low_pv), POINTS)
     axes = Axis("PV of a vessel without overflow", "%"), Axis("PV", "%")
-    return beside_plain(d, "curve", axes, free, lambda c: at_rest(free, d.inputs, c), free)
+    return with_baseline(d, "curve", axes, free, lambda c: at_rest(free, d.inputs, c), free)
 
 
 EFFECT = Effect(

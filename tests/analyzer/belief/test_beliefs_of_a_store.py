@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 
 from analyzer.belief.belief import step
-from analyzer.belief.nights import settle, settle_anew, unfounded
+from analyzer.belief.nights import inconsistent_beliefs, recompute_beliefs, update_beliefs
 from analyzer.columns import NIGHTS, row_of
 from analyzer.config import Config
 from analyzer.pages.rank import ranked
 from analyzer.store import notes
-from analyzer.store.care import pruned
+from analyzer.store.maintenance import pruned
 from analyzer.store.notes import Note
 from analyzer.store.store import Store
 from analyzer.store.table import rows_table
@@ -29,7 +29,7 @@ def keep(store: Store, night: dict[str, Any], *others: dict[str, Any]) -> None:
     """Store a night of the loop L and of other loops, and compute the beliefs after it."""
     rows = [row_of({k: v for k, v in r.items() if k != "extra"}, NIGHTS) for r in (night, *others)]
     store.write("nights", night["night"], rows_table(rows, NIGHTS))
-    settle(store, night["night"], CONFIG)
+    update_beliefs(store, night["night"], CONFIG)
 
 
 def believed(store: Store) -> dict[str, list[dict[str, Any]]]:
@@ -65,15 +65,15 @@ def test_one_command_computes_beliefs_again_and_check_names_the_differences(tmp_
     """
     store = store_of(tmp_path / "s", ten_nights())
     first = believed(store)
-    assert unfounded(store, CONFIG) == []
+    assert inconsistent_beliefs(store, CONFIG) == []
     store.file("beliefs", "2026-03-05").unlink()
     other = store.read("beliefs", "2026-03-08").slice(0, 0)
     store.write("beliefs", "2026-03-08", other)
-    assert [p.seen.rsplit("/", 1)[1] for p in unfounded(store, CONFIG)] == [
+    assert [p.seen.rsplit("/", 1)[1] for p in inconsistent_beliefs(store, CONFIG)] == [
         "2026-03-05.parquet: inconsistent with the nights",
         "2026-03-08.parquet: inconsistent with the nights",
     ]
-    settle_anew(store, CONFIG)
+    recompute_beliefs(store, CONFIG)
     assert believed(store) == first
 
 
@@ -88,14 +88,14 @@ def test_check_computes_one_night_of_beliefs_that_carry_their_inputs(tmp_path, m
         return step(before, row, *more)
 
     monkeypatch.setattr("analyzer.belief.nights.step", counting)
-    assert unfounded(store, CONFIG) == []
+    assert inconsistent_beliefs(store, CONFIG) == []
     assert counted == ["2026-03-11"]
     assert pruned(store, 4, None)
     notes.add(store.path, Note("L", ten_nights()[9]["start_s"] + 20 * 86400.0, "valve replaced"))
-    assert unfounded(store, CONFIG) == []
+    assert inconsistent_beliefs(store, CONFIG) == []
     assert counted == 2 * ["2026-03-11"]
     other = replace(CONFIG, belief=replace(CONFIG.belief, half_life=5.0))
-    assert unfounded(store, other)
+    assert inconsistent_beliefs(store, other)
     assert len(counted) > 3
 
 
@@ -106,7 +106,7 @@ def test_check_sees_a_night_that_was_written_again(k: int, tmp_path: Path) -> No
     store = store_of(tmp_path / "s", rows)
     again = row_of({**row(k, WORN, backlash_pct=2.0), "night": rows[k]["night"]}, NIGHTS)
     store.write("nights", rows[k]["night"], rows_table([again], NIGHTS))
-    named = [p.seen for p in unfounded(store, CONFIG)]
+    named = [p.seen for p in inconsistent_beliefs(store, CONFIG)]
     assert any(rows[k]["night"] in seen for seen in named)
 
 
@@ -175,7 +175,7 @@ def test_a_late_note_on_a_repair_counts_when_beliefs_are_computed_again(tmp_path
     rows = ten_nights()
     store = store_of(tmp_path / "s", rows)
     notes.add(store.path, Note("L", rows[5]["start_s"] - 600.0, "valve replaced"))
-    settle_anew(store, CONFIG)
+    recompute_beliefs(store, CONFIG)
     found = {n: store.rows("nights", n, ("worn_nights",))[0]["worn_nights"] for n in store.nights()}
     assert [found[f"2026-03-0{day}"] for day in (5, 6, 7, 8)] == [4.0, 0.0, 1.0, 2.0]
 
@@ -186,8 +186,8 @@ def test_beliefs_still_include_deleted_nights(tmp_path: Path) -> None:
     last = believed(store)["2026-03-11"]
     assert pruned(store, 4, None)
     assert len(store.nights()) == 5
-    assert unfounded(store, CONFIG) == []
-    settle_anew(store, CONFIG)
+    assert inconsistent_beliefs(store, CONFIG) == []
+    recompute_beliefs(store, CONFIG)
     assert believed(store)["2026-03-11"] == last
 
 
@@ -199,7 +199,7 @@ def test_a_belief_that_fails_concerns_its_loop_only(tmp_path: Path) -> None:
     broken = {**row(0, CALM, witness=json.dumps({"profile": "x"})), "loop": "B"}
     rows = [row_of(r, NIGHTS) for r in (row(0, CALM, witness=witness(0.8, 6.0)), broken)]
     store.write("nights", "2026-03-02", rows_table(rows, NIGHTS))
-    lost = settle(store, "2026-03-02", CONFIG)
+    lost = update_beliefs(store, "2026-03-02", CONFIG)
     assert len(lost) == 1
     assert lost[0].startswith("B: no belief of night 2026-03-02")
     assert [r["loop"] for r in believed(store)["2026-03-02"]] == ["L"]

@@ -14,8 +14,8 @@ from analyzer.cli import main
 from analyzer.config import Config, configured, limit_of, limits_document, read_config
 from analyzer.explain.case import asked_cases, whole
 from analyzer.loops.changes import TuningChange
-from analyzer.night.asked import Asked
 from analyzer.night.opened import guarded
+from analyzer.night.request import ExportRequest
 from analyzer.store.store import Store
 from proofs.plant import START_S, Sketch, simulate, write_export
 from tests.reports.small_store import small_store
@@ -198,7 +198,7 @@ def test_explain_and_simulate_work_on_the_span_with_its_settings(export: Path):
     )
     loops = export.with_name("loops.csv")
     loops.write_text("loop,type,pv_lo,pv_hi,kp,ti\nLIC1,level,0,100,0.9,40\n")
-    request = Asked((export,), loops, changes, hour, Config(), "UTC", {})
+    request = ExportRequest((export,), loops, changes, hour, Config(), "UTC", {})
     case, pv = whole(request, "LIC1")
     explained, held_out = asked_cases(request, guarded(request), "LIC1", ())
     assert not held_out

@@ -242,7 +242,7 @@ def test_a_repair_is_found_if_the_cycle_ended(cycles: bool, repaired: bool) -> N
     If an external disturbance continues the oscillation and hides the backlash, a repair is not proven.
     """
     before, after = (night(True, True),) * 7, (night(False, cycles),) * 7
-    assert Weeks(before, after, Pid(1.0, 60.0), Pid(1.0, 60.0)).cured is repaired
+    assert Weeks(before, after, Pid(1.0, 60.0), Pid(1.0, 60.0)).fault_removed is repaired
 
 
 @pytest.mark.parametrize(

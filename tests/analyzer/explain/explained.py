@@ -18,10 +18,10 @@ from identification.controller.pi_regression import Trends
 from identification.estimation.model import Model, gain
 from identification.estimation.prediction_error import descended
 from identification.mismatch.answer import answer
+from identification.mismatch.baseline import inputs_of, prepared
 from identification.mismatch.catalogue import CANDIDATES
 from identification.mismatch.diagnosis import controller_finding_of, recorder_finding_of
 from identification.mismatch.explanation import Explanation
-from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.proof import held_out
 from identification.mismatch.selection import Candidate
 from identification.models import Backlash, Fopdt, Loop, Pid
@@ -73,7 +73,7 @@ def explanation(kind: str) -> Explained:
     """An explanation with that verdict: backlash, none, quantization, controller-settings or unexplained."""
     given = of_loop(2.0 if kind == "backlash" else 0.0, 0.8 if kind == "quantization" else 0.01,
                     1.0 if kind == "controller-settings" else 1.8)  # fmt: skip
-    s = given.subject
+    s = given.recording
     assert s.sp is not None
     assert s.stated is not None
     inputs = inputs_of(s)

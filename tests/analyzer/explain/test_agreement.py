@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import pytest
 
-from analyzer.explain.words import TOLD, agreement, beside_night
+from analyzer.explain.words import TOLD, agreement, night_note
 
 
 @pytest.mark.parametrize(
@@ -46,6 +46,6 @@ def test_an_explanation_of_a_loop_without_action_says_so(block: str, text: str) 
     """
     night = {"cause": "none", "action": "none", "valve_fault": "none", "lanes": None}
     assert (
-        beside_night(night, "backlash" if block == "valve" else "second-lag", block)
+        night_note(night, "backlash" if block == "valve" else "second-lag", block)
         == (TOLD["beside_verdict"][text])
     )

@@ -61,7 +61,7 @@ def test_page_of_backlash_shows_both_models_and_the_user_model(tmp_path: Path) -
     page = pages.explanation_page(e)
     whole = next(b for b in blocks(page) if isinstance(b, Trend))
     assert {"recorded", "baseline", "model", "brought"} <= {b.kind for b in whole.bands}
-    size = {k: float(np.std(e.case.subject.pv - x)) for k, x in simulations(e).items()}
+    size = {k: float(np.std(e.case.recording.pv - x)) for k, x in simulations(e).items()}
     assert size["model"] < size["baseline"] < size["brought"]
     fit = next(t for t in page.tables() if t.name == "fit")
     assert [row[0].text for row in fit.rows] == ["baseline model", "improved model", "your model"]

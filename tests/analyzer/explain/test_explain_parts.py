@@ -24,9 +24,9 @@ from analyzer.history.series import Series
 from analyzer.loop.record.quality import prepare
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.spec import LoopSpec
-from analyzer.night.asked import Asked
 from analyzer.night.nights import ALWAYS
 from analyzer.night.opened import guarded
+from analyzer.night.request import ExportRequest
 from identification.estimation.problem import in_blocks
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
@@ -89,7 +89,7 @@ def test_part_with_constant_op_is_left_out(tmp_path: Path, still: int) -> None:
     frame.to_parquet(tmp_path / "x.parquet", index=False)
     start = stamp[0].timestamp()
     changes = (changed(start + 2500, 1.0, 1.5), changed(start + 4000, 1.5, 2.0))
-    request = Asked((tmp_path / "x.parquet",), None, changes, ALWAYS, Config(), "UTC", {})
+    request = ExportRequest((tmp_path / "x.parquet",), None, changes, ALWAYS, Config(), "UTC", {})
     explained, others = asked_cases(request, guarded(request), "A", ())
     moving = [n for i, n in enumerate(lengths) if i != still]
     assert [len(c.prepared.record) for c in (explained, *others.values())] == moving
@@ -137,8 +137,8 @@ def test_a_long_recording_is_explained_on_the_stretch_that_its_night_fitted(
     """
     n = 186_400
     whole = prepare(SPEC, trends(n), Config().quality)
-    window = in_blocks(np.zeros(3000), np.zeros(30_000), np.ones(3000, dtype=bool), 10.0, 10, first=10_000)
-    verdict = SimpleNamespace(require_measured=SimpleNamespace(window=window))
+    problem = in_blocks(np.zeros(3000), np.zeros(30_000), np.ones(3000, dtype=bool), 10.0, 10, first=10_000)
+    verdict = SimpleNamespace(require_measured=SimpleNamespace(problem=problem))
     part, text = stretch_of_night(whole, verdict, most)  # type: ignore[arg-type]
     assert (len(latest_night(whole).record), len(part.record)) == (86_400, count)
     assert part.record.start_s == whole.record.start_s + first

@@ -20,8 +20,8 @@ from analyzer.explain.models import (
 )
 from analyzer.loop.record.quality import Scale
 from identification.errors import InputError
+from identification.mismatch.baseline import inputs_of, prepared
 from identification.mismatch.explanation import Explanation, carried_over
-from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.recording import Recording
 from identification.models import Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop

@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analyzer.finder.bag import ANSWERS, HELD_ALONE
 from analyzer.finder.held import (
     answers,
-    apart,
     closeness,
     deviation_of_mean,
     long_blocks,
     nearness,
+    nearness_margin,
     resting_level,
 )
 from analyzer.finder.pair import SURE_PCT, FoundPair
 from analyzer.finder.pairs import found_pairs
+from analyzer.finder.tag_set import ANSWERS, HELD_ALONE
 from tests.analyzer.finder.test_finder_pairs import pi_loop, unrelated_tags
 
 
@@ -88,14 +88,14 @@ def test_a_response_of_op_is_no_proof_of_pv() -> None:
     """A pair whose OP responds to the set point is not sure if another tag explains more of OP with that set
     point.
     """
-    answering = FoundPair(0, 1, 2, 0.4, 0.6, 1, 0.04, 0.0, freer=4.0, answers=True, other=0.43)
+    answering = FoundPair(0, 1, 2, 0.4, 0.6, 1, 0.04, 0.0, output_evidence=4.0, answers=True, other=0.43)
     assert answering.sure_pct >= SURE_PCT
     assert replace(answering, other=0.46).sure_pct < SURE_PCT
 
 
 def test_a_sensor_that_follows_pv_is_not_chosen_as_pv() -> None:
     """A pair whose law leaves a residual of 18 % is not sure if another tag with its set point leaves 0.3 %."""
-    follower = FoundPair(0, 1, 2, 0.82, 0.4, 4, 0.5, 0.04, towards=2.0, nearer=1.0, other=0.997)
+    follower = FoundPair(0, 1, 2, 0.82, 0.4, 4, 0.5, 0.04, direction_evidence=2.0, nearer=1.0, other=0.997)
     assert follower.sure_pct < SURE_PCT
     assert replace(follower, other=0.5).sure_pct >= SURE_PCT
 
@@ -123,7 +123,7 @@ def test_a_random_set_point_is_separate_as_rarely_as_theory_predicts(spread: flo
     found = []
     for level in rng.uniform(0.0, 100.0, (6000, 40)):
         near = closeness(np.abs(level - x.mean()), x.std())
-        found.append(apart(x, level, near))
+        found.append(nearness_margin(x, level, near))
     share = (np.array(found)[:, None] > (1.0, 2.0, 3.0)).mean(axis=0)
     assert (share < 1.15 * np.exp([-1.0, -2.0, -3.0])).all()
     assert not exact or share == pytest.approx(np.exp([-1.0, -2.0, -3.0]), rel=0.15)
@@ -136,7 +136,7 @@ def test_a_set_point_as_near_as_others_is_not_separate() -> None:
     x = np.linspace(0.0, 100.0, 101)
     level = np.array([51.0, 49.0, 49.0])
     near = closeness(np.abs(level - x.mean()), x.std())
-    assert apart(x, level, near) == pytest.approx(0.0, abs=1e-9)
+    assert nearness_margin(x, level, near) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_single_set_point_near_a_quiet_pv_is_separate_by_the_distance_of_the_next() -> None:
@@ -144,4 +144,4 @@ def test_a_single_set_point_near_a_quiet_pv_is_separate_by_the_distance_of_the_n
     x = 36.24 + 0.04 * np.resize([-1.0, 1.0], 1000)
     level = np.array([36.25, 37.24, 30.0])
     near = closeness(np.abs(level - x.mean()), x.std())
-    assert apart(x, level, near) == pytest.approx(np.log(100.0), rel=1e-6)
+    assert nearness_margin(x, level, near) == pytest.approx(np.log(100.0), rel=1e-6)

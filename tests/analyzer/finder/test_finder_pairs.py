@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analyzer.finder.pair import LAW_TOLD, SURE_PCT
+from analyzer.finder.pair import LEAST_LAW_SHARE, SURE_PCT
 from analyzer.finder.pairs import found_pairs
 from analyzer.loops.spec import read_loops
 from analyzer.loops.tags import controller
@@ -79,7 +79,7 @@ def test_the_loops_of_a_renamed_mill_are_found(mill: pd.DataFrame) -> None:
         spec = stated[loop]
         span = (spec.pv_hi or 0.0) - (spec.pv_lo or 0.0)
         pid = controller(spec, span)
-        if pair.told < LAW_TOLD or pid is None:
+        if pair.law_share < LEAST_LAW_SHARE or pid is None:
             continue
         assert pair.kp * span / 100.0 == pytest.approx(pid.kp, rel=0.2), loop
         if pair.ti_samples is not None:

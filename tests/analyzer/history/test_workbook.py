@@ -15,9 +15,9 @@ from click.testing import CliRunner
 from workbooks import binary_book, open_book, open_row, record
 
 from analyzer.cli import main
-from analyzer.history import spans
+from analyzer.history import cell_spread
+from analyzer.history.cell_spread import require_dense
 from analyzer.history.export import open_export
-from analyzer.history.spans import require_dense
 from analyzer.history.table import ReadOptions
 from identification.errors import InputError
 
@@ -111,8 +111,8 @@ def test_records_of_a_binary_sheet_are_found_for_any_block_size(monkeypatch, blo
     """Kinds and first numbers of records are found for any block size of reading."""
     rng = random.Random(block)
     wrote = [(rng.randrange(16_384), rng.randbytes(rng.choice([4, 8, 130, 5000]))) for _ in range(40)]
-    monkeypatch.setattr(spans, "BLOCK_BYTES", block)
-    found = spans._records(io.BytesIO(b"".join(record(kind, data) for kind, data in wrote)))
+    monkeypatch.setattr(cell_spread, "BLOCK_BYTES", block)
+    found = cell_spread._records(io.BytesIO(b"".join(record(kind, data) for kind, data in wrote)))
     assert list(found) == [(kind, int.from_bytes(data[:4], "little")) for kind, data in wrote]
 
 

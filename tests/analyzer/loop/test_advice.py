@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analyzer.loop.advice.advise import advise, propose, sought_for
+from analyzer.loop.advice.advise import advise, propose, tuning_model
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.cause.verdict import NO_CAUSE, not_assessed
 from analyzer.loop.conclusion import concluded
@@ -89,14 +89,14 @@ def test_proposal_is_stable_on_the_true_process(tank, pipe):
         new = propose(
             found.verdict, sketch.controller, found.oscillations.first.period_s, CONFIG
         ).proposal.controller
-        loop = sought_for(found.verdict, sketch.controller, CONFIG.advice)[0]
+        loop = tuning_model(found.verdict, sketch.controller, CONFIG.advice)[0]
         true = replace(loop, process=Fopdt(*sketch.process), controller=new)
         assert maximum_sensitivity(true) < LIMITS.ms_most_sample
 
 
 def test_samples_spread_about_the_fit(tank):
     """Samples keep the sign and the kind of the process; their slopes are within a factor of three of the fit."""
-    loop, fit, _ = sought_for(tank.verdict, TANK.controller, CONFIG.advice)
+    loop, fit, _ = tuning_model(tank.verdict, TANK.controller, CONFIG.advice)
     samples = uncertain(fit, loop, 40)
     ratio = np.array([one.process.slope / loop.process.slope for one in samples])
     assert all(isinstance(one.process, Integrator) for one in samples)
@@ -114,7 +114,7 @@ def test_load_keeps_the_noise_of_a_scan(tank):
     """The reconstructed load has the simulated noise from scan to scan, although block means have lost it."""
     m = tank.verdict.measured
     fit = tank.verdict.fit
-    assert scan_noise(m.window, TANK.controller) == pytest.approx(TANK.noise, rel=0.15)
+    assert scan_noise(m.problem, TANK.controller) == pytest.approx(TANK.noise, rel=0.15)
     load = load_of(fit, TANK.controller)
     assert np.isfinite(load).all()
     jumps = np.median(np.abs(np.diff(load, 2))) * 1.4826 / math.sqrt(6)
@@ -135,8 +135,8 @@ def test_noise_is_estimated_with_a_filter_of_pv(filter_s: float, rounding: float
         seen[k] = last
     op = 50.0 - 3.0 * seen + np.sin(2 * np.pi * np.arange(n) / 900.0)
     op = np.round(op / rounding) * rounding if rounding else op
-    window = in_blocks(50.0 + noise, op, np.ones(n, dtype=bool), 1.0)
-    assert scan_noise(window, Pid(3.0, 100.0, scan_s=1.0, pv_filter_s=filter_s)) == pytest.approx(
+    problem = in_blocks(50.0 + noise, op, np.ones(n, dtype=bool), 1.0)
+    assert scan_noise(problem, Pid(3.0, 100.0, scan_s=1.0, pv_filter_s=filter_s)) == pytest.approx(
         size, rel=0.1
     )
 
@@ -157,9 +157,9 @@ def test_noise_is_estimated_with_a_derivative(td: float, narrow: float, filter_s
         last = seen
         op[k] = 50.0 - 3.0 * (seen + slope)
     op += np.sin(2 * np.pi * np.arange(n) / 900.0)
-    window = in_blocks(50.0 + noise[::every], op[::every], np.ones(n // every, dtype=bool), float(every))
+    problem = in_blocks(50.0 + noise[::every], op[::every], np.ones(n // every, dtype=bool), float(every))
     pid = Pid(3.0, 100.0, td, scan_s=1.0, td_filter=narrow, pv_filter_s=filter_s)
-    assert scan_noise(window, pid) == pytest.approx(size, rel=0.1)
+    assert scan_noise(problem, pid) == pytest.approx(size, rel=0.1)
 
 
 def test_mirror_image_gets_mirrored_settings(pipe):
@@ -279,7 +279,7 @@ def test_outdated_settings_are_reported_without_advice():
 def test_a_model_beyond_its_record_gets_no_advice(pipe):
     """A fit whose dead time is a third of the record gets no settings, and the reason says why."""
     m = pipe.verdict.measured
-    late = m.play.moved(dead_time_s=m.window.duration_s / 3)
+    late = m.play.moved(dead_time_s=m.problem.duration_s / 3)
     verdict = replace(pipe.verdict, measured=replace(m, play=late), fault="backlash")
     p = propose(verdict, PIPE.controller, 100.0, CONFIG).proposal
     assert p.controller is None
@@ -321,7 +321,7 @@ def test_missing_integral_action_is_reported(pipe):
 
 def test_backlash_is_in_the_model_if_it_causes_a_cycle(tank):
     """If the loop oscillates with the identified backlash, that backlash is in the model and in all its samples."""
-    loop, fit, others = sought_for(tank.verdict, TANK.controller, CONFIG.advice)
+    loop, fit, others = tuning_model(tank.verdict, TANK.controller, CONFIG.advice)
     assert loop.valve == Backlash(fit.valve.stickband)
     assert all(isinstance(one.valve, Backlash) for one in others)
 
@@ -347,7 +347,7 @@ def test_loops_that_a_cycle_does_not_distinguish_have_its_loop_gain(pipe):
     load.
     """
     fit, period_s = pipe.verdict.fit, pipe.oscillations.first.period_s
-    loop = sought_for(pipe.verdict, PIPE.controller, CONFIG.advice)[0]
+    loop = tuning_model(pipe.verdict, PIPE.controller, CONFIG.advice)[0]
     # An integrator and a wider valve have less phase lag, which the dead time replaces.
     late = 0.25 * period_s
     fit = fit.moved(dead_time_s=fit.dead_time_s + late)

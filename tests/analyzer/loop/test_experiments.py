@@ -12,9 +12,9 @@ from click.testing import CliRunner
 
 from analyzer.cli import main
 from analyzer.config import Config
-from analyzer.loop.experiments.found import learned
-from analyzer.night.asked import asked_of
+from analyzer.loop.experiments.found import experiment_results
 from analyzer.night.opened import opened
+from analyzer.night.request import asked_of
 
 INPUTS = Path(__file__).parents[3].parent / "shared" / "inputs"
 shared = pytest.mark.skipif(
@@ -34,7 +34,7 @@ def learned_from(name, loops=None):
     export = INPUTS / f"{name}.csv"
     plant = opened(asked_of([export], loops and INPUTS / loops, None, Config()))
     one = plant.last_night(plant.loops[0])
-    return learned(one.spec, plant.trends(one.spec.tags, one.night), one.prepared, plant.config)
+    return experiment_results(one.spec, plant.trends(one.spec.tags, one.night), one.prepared, plant.config)
 
 
 @pytest.fixture(scope="module")
@@ -201,9 +201,11 @@ def test_a_model_against_the_controller_is_not_reported(tmp_path):
         (tmp_path / "loops.csv").write_text(f"loop,kp,ti,pv_lo,pv_hi\nT1,{kp},60,0,100\n")
         plant = opened(asked_of([tmp_path / "steps.csv"], tmp_path / "loops.csv", None, Config()))
         one = plant.last_night(plant.loops[0])
-        return learned(one.spec, plant.trends(one.spec.tags, one.night), one.prepared, plant.config)
+        return experiment_results(
+            one.spec, plant.trends(one.spec.tags, one.night), one.prepared, plant.config
+        )
 
     right, wrong = model(0.8), model(-0.8)
     assert right.model.estimates["gain"].value == pytest.approx(1.2, rel=0.1)
     assert wrong.model is None
-    assert "opposite sign of its controller" in wrong.untold[0][1]
+    assert "opposite sign of its controller" in wrong.without_model[0][1]

@@ -6,13 +6,23 @@ from dataclasses import replace
 
 import pytest
 
-from analyzer.loop.decisions import Action, Cause, Due, Fault, Finding, Remedy, Root, Status, Swing
+from analyzer.loop.decisions import (
+    Action,
+    Cause,
+    Due,
+    Fault,
+    Finding,
+    OscillationFigures,
+    Remedy,
+    SourceLoop,
+    Status,
+)
 
 NOW = Finding(
     "L",
     "2026-03-15",
     Status.OK,
-    swing=Swing(5.0, 90.0, 2400.0),
+    swing=OscillationFigures(5.0, 90.0, 2400.0),
     cause=Cause.VALVE,
     fault=Fault.BACKLASH,
     remedy=Remedy(Action.RETUNE, "x", 5.98, 2180.0),
@@ -28,4 +38,4 @@ def test_a_contradictory_finding_is_refused() -> None:
     with pytest.raises(ValueError, match="repair"):
         Remedy(Action.RETUNE, due=Due.NOW)
     with pytest.raises(ValueError, match="follows F"):
-        replace(NOW, follows=Root("F", 0.9, None, 90.0))
+        replace(NOW, follows=SourceLoop("F", 0.9, None, 90.0))

@@ -8,7 +8,7 @@ import pytest
 from analyzer.config import Config
 from analyzer.loop.assess import assess
 from analyzer.loop.decisions import Cause
-from analyzer.loop.identification.fit_data import fit_stretch, whole_window, window_of
+from analyzer.loop.identification.fit_data import fit_stretch, problem_of, whole_problem
 from analyzer.loop.record.quality import Prepared, Scale
 from benchmarks.world.simulate import Controller, Process, Valve, simulate
 from identification.models import Pid
@@ -51,11 +51,11 @@ def test_the_whole_window_has_the_complete_record_in_few_blocks():
     """
     pv = 50.0 + np.random.default_rng(7).standard_normal(DAY_S)
     record = _record(pv)
-    window = window_of(record, PERIOD_S, CONFIG.cause)
-    whole = whole_window(record, window, 1000, PERIOD_S)
+    problem = problem_of(record, PERIOD_S, CONFIG.cause)
+    whole = whole_problem(record, problem, 1000, PERIOD_S)
     assert whole.blocks.factor == 87
     assert whole.pv == pytest.approx(pv[: DAY_S // 87 * 87].reshape(-1, 87).mean(axis=1))
-    assert whole_window(record, window, DAY_S, PERIOD_S).blocks.factor == window.blocks.factor
+    assert whole_problem(record, problem, DAY_S, PERIOD_S).blocks.factor == problem.blocks.factor
 
 
 @pytest.mark.parametrize("every", [1, 10])

@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from analyzer.config import Config
-from analyzer.loop.advice.advise import sought_for
+from analyzer.loop.advice.advise import tuning_model
 from analyzer.loop.advice.sluggish import faster_settings
 from analyzer.loop.assess import assess
 from analyzer.loop.identification.identified import joined, load_of_night, scan_noise
@@ -47,7 +47,7 @@ def night() -> tuple[LoopRecord, np.ndarray, Fitted]:
     return (
         record_of(made.pv, made.sp, made.op),
         made.pv - response,
-        sought_for(found.verdict, PID, Config().advice)[1],
+        tuning_model(found.verdict, PID, Config().advice)[1],
     )
 
 
@@ -87,8 +87,8 @@ def test_noise_is_estimated_while_op_is_free(period: float) -> None:
     noise = size * rng.standard_normal(n)
     op = np.clip(50.0 + 120.0 * np.sin(2 * np.pi * np.arange(n) / period) - 3.0 * noise, 0.0, 100.0)
     assert np.mean((op <= 0.0) | (op >= 100.0)) > 0.6
-    window = in_blocks(50.0 + noise, op, np.ones(n, dtype=bool), 1.0)
-    assert scan_noise(window, Pid(3.0, 100.0, scan_s=1.0)) == pytest.approx(size, rel=0.1)
+    problem = in_blocks(50.0 + noise, op, np.ones(n, dtype=bool), 1.0)
+    assert scan_noise(problem, Pid(3.0, 100.0, scan_s=1.0)) == pytest.approx(size, rel=0.1)
 
 
 @pytest.mark.parametrize("way", ["plain", "every 10 s"])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from analyzer.config import Config
-from analyzer.loop.advice.advise import Advice, advise, sought_for
+from analyzer.loop.advice.advise import Advice, advise, tuning_model
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.identification.agreement import agreement
 from analyzer.loop.identification.identified import load_of
@@ -62,7 +62,7 @@ def test_a_worn_valve_is_searched_with_its_gain_alone(valve: Valve, fault: str) 
     found, advice, pid = advised(drawn(LEVEL, 25.0, valve), 24.0)
     assert (found.verdict.fault, advice.action) == (fault, "repair valve")
     assert "check kp and ti" not in advice.reason
-    loop, fit, _ = sought_for(found.verdict, pid, Config().advice)
+    loop, fit, _ = tuning_model(found.verdict, pid, Config().advice)
     assert agreement(loop, fit, load_of(fit, pid)).worst(Config().advice) is None
     assert advice.ti_new in (None, 0.0)
 

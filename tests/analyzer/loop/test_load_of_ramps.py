@@ -9,7 +9,7 @@ import pytest
 
 from analyzer.config import Config
 from analyzer.history.export import open_export
-from analyzer.loop.advice.advise import sought_for
+from analyzer.loop.advice.advise import tuning_model
 from analyzer.loop.assess import assess
 from analyzer.loop.identification.agreement import agreement
 from analyzer.loop.identification.identified import load_of
@@ -34,7 +34,7 @@ def test_the_simulated_present_agrees_under_ramps_of_the_load(at: int) -> None:
         one = prepare(spec, open_export(files).read(spec.tags), config.quality)
     controller = controller_of(spec, one)
     assert controller is not None
-    loop, fit, _ = sought_for(assess(one, controller, config).verdict, controller, config.advice)
+    loop, fit, _ = tuning_model(assess(one, controller, config).verdict, controller, config.advice)
     found = agreement(loop, fit, load_of(fit, controller))
     assert found.error == pytest.approx(1.0, abs=0.15)
     assert found.op_travel == pytest.approx(1.0, abs=0.05)

@@ -11,7 +11,7 @@ import pytest
 
 from analyzer.config import Config
 from analyzer.history.export import open_export
-from analyzer.loop.assess import hidden
+from analyzer.loop.assess import aliasing_requirement
 from analyzer.loop.identification.measure import time_scale
 from analyzer.loop.oscillation.detection import detect
 from analyzer.loop.record.judged_stretch import controller_of, differing, shown
@@ -134,7 +134,9 @@ def test_a_short_integral_time_hides_a_cycle_only_where_the_record_agrees(true_s
     """
     config = Config()
     record = thinned(recorded(replace(PI, ti_s=true_s, kp=PI.kp if true_s > 10.0 else 0.1)), 10)
-    needs = hidden(record, detect(record, config.oscillation), replace(PI, ti_s=stated_s), config)
+    needs = aliasing_requirement(
+        record, detect(record, config.oscillation), replace(PI, ti_s=stated_s), config
+    )
     assert (needs is not None) == lacks
 
 

@@ -42,7 +42,7 @@ def test_backlash_is_no_stiction(seed):
     _, verdict = seen(BACKLASH, seed)
     assert (verdict.cause, verdict.fault) == ("valve", "backlash")
     assert verdict.measured is not None
-    assert not verdict.measured.window.blocks.decoded
+    assert not verdict.measured.problem.blocks.decoded
 
 
 def test_advice_states_the_friction_that_it_is_based_on():

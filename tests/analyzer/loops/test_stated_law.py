@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from analyzer.loop.record.quality import beyond_gap
-from analyzer.loops.slips import slip
 from analyzer.loops.spec import LoopSpec, read_loops
 from analyzer.loops.tags import as_stated, controller
-from analyzer.words.units import beside_settings
+from analyzer.loops.typing_errors import typing_error
+from analyzer.words.units import corrected_columns
 from identification.errors import InputError
 from identification.models import ErrorForm, Form, Pid
 
@@ -105,9 +105,9 @@ def test_the_typing_error_that_explains_the_settings_is_named(spec, found, chang
     is named.
     """
     if changed or found.kp == 7.0:
-        assert slip(spec, found, 250.0) == changed
+        assert typing_error(spec, found, 250.0) == changed
     else:
-        assert "form" not in slip(replace(spec, form=Form.IDEAL), found, 250.0)
+        assert "form" not in typing_error(replace(spec, form=Form.IDEAL), found, 250.0)
 
 
 def test_found_terms_are_written_in_the_units_of_loops_csv(tmp_path):
@@ -116,7 +116,7 @@ def test_found_terms_are_written_in_the_units_of_loops_csv(tmp_path):
     stated = controller(spec, 200.0)
     assert stated is not None
     seen = replace(stated, gap=1.0, op_rate=1.0, op_hi=50.0, error_form=ErrorForm.SQUARED)
-    written = beside_settings(stated, seen, spec, 200.0)
+    written = corrected_columns(stated, seen, spec, 200.0)
     assert written == "error_form squared, gap 2, op_rate 0.16, op_hi_limit 12"
     columns, cells = zip(*(part.split(" ") for part in written.split(", ")), strict=True)
     head, filled = "pv_lo,pv_hi,op_lo,op_hi,kp,ti", "100,300,4,20,2,60"

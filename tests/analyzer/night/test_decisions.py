@@ -21,8 +21,8 @@ from analyzer.loop.decisions import (
     Remedy,
     Requirement,
     RequirementKind,
-    Root,
     SignKind,
+    SourceLoop,
     Status,
     counts,
 )
@@ -62,7 +62,7 @@ def test_a_follower_is_under_load_for_any_own_signs(own):
     """For a follower the load is at least as probable as the coherence and more probable than valve and tuning; no
     own action.
     """
-    root = Root("FIC101", 0.9, None, 96.0)
+    root = SourceLoop("FIC101", 0.9, None, 96.0)
     confidence, remedy = dict(zip(CAUSES, own, strict=True)), Remedy(Action.RETUNE, kp_new=1.0)
     alone = Finding("L", "2026-03-02", Status.OK, confidence=confidence, remedy=remedy)
     found = following(alone, root, None, (SignKind.FOLLOWS, ()), PlantLimits())

@@ -354,7 +354,7 @@ def dies(arguments: object, began: object) -> None:
 @linux
 def test_a_process_that_dies_while_reading_is_reported_in_one_line(export, tmp_path, monkeypatch):
     """If the process that examines an export is ended, the run ends with exit 2 and one line."""
-    monkeypatch.setattr(opened, "find_out", dies)
+    monkeypatch.setattr(opened, "opened_with_spans", dies)
     result = ran(export, tmp_path / "store")
     assert result.exit_code == 2
     assert "reading it ended without a result (its worker process was ended by SIGKILL" in result.stderr

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner, Result
 
-from analyzer import places
+from analyzer import locations
 from analyzer.cli import main
 from analyzer.store import lock as store_lock
 from analyzer.store import store as store_module
@@ -83,13 +83,13 @@ def ran(export: str, store: str, *more: str) -> Result:
 
 def kept(store: str, folder: Path) -> dict[str, list[dict[str, object]]]:
     """The tables of a store at a URL."""
-    (copy,), _ = places.at_hand([places.place(store)], folder)
+    (copy,), _ = locations.local_copies([locations.place(store)], folder)
     return tables(copy)
 
 
 def put(path: Path, url: str) -> str:
     """A file copied to a URL."""
-    places.place(url).write_bytes(path.read_bytes())
+    locations.place(url).write_bytes(path.read_bytes())
     return url
 
 
@@ -103,7 +103,7 @@ def test_a_night_on_shared_storage_is_that_of_a_directory(
     result = ran(url, store, "--jobs", "2")
     assert result.exit_code == 0, result.stderr
     assert kept(store, tmp_path) == whole
-    names = {p.name for p in places.place(store).rglob("*") if p.is_file()}
+    names = {p.name for p in locations.place(store).rglob("*") if p.is_file()}
     assert names == {"2026-03-02.parquet", "store.json"}
     listed = [CliRunner().invoke(main, ["rank", where, "--format", "csv"]).stdout for where in (store, store)]
     assert listed[0].count("\n") == 7
@@ -152,7 +152,7 @@ def test_a_stopped_run_on_shared_storage_is_continued(
     with monkeypatch.context() as patch:
         patch.setattr("analyzer.night.batch.finish_night", killed)
         ran(str(export), store)
-    assert any(p.name.startswith("nights-") for p in places.place(store).rglob("*"))
+    assert any(p.name.startswith("nights-") for p in locations.place(store).rglob("*"))
     assert finish.finish_night is not killed
     assert ran(str(export), store, "--resume").exit_code == 0
     assert kept(store, tmp_path) == whole
@@ -160,7 +160,7 @@ def test_a_stopped_run_on_shared_storage_is_continued(
 
 def test_two_runs_on_one_store_at_once(bucket: str, monkeypatch: pytest.MonkeyPatch):
     """A current signature refuses a second run in one line; a signature that is too old belongs to a dead run."""
-    store = places.place(f"{bucket}/held")
+    store = locations.place(f"{bucket}/held")
     monkeypatch.setattr(store_lock, "ALIVE_S", 0.05)
     with locked(store):
         with (
@@ -171,9 +171,9 @@ def test_two_runs_on_one_store_at_once(bucket: str, monkeypatch: pytest.MonkeyPa
             locked(store),
         ):
             pass
-        first = json.loads(places.content(store / OWNER))["alive_s"]
+        first = json.loads(locations.content(store / OWNER))["alive_s"]
         for _ in range(1000):
-            if json.loads(places.content(store / OWNER))["alive_s"] > first:
+            if json.loads(locations.content(store / OWNER))["alive_s"] > first:
                 break
             time.sleep(0.01)
         else:
@@ -181,7 +181,7 @@ def test_two_runs_on_one_store_at_once(bucket: str, monkeypatch: pytest.MonkeyPa
     assert not (store / OWNER).exists()
     (store / OWNER).write_text(json.dumps({"alive_s": time.time() - 3600.0, "mark": "dead"}))
     with locked(store):
-        assert json.loads(places.content(store / OWNER))["process"] == os.getpid()
+        assert json.loads(locations.content(store / OWNER))["process"] == os.getpid()
 
 
 def test_an_empty_url_is_not_damaged(bucket: str, monkeypatch: pytest.MonkeyPatch):
@@ -219,7 +219,7 @@ def test_a_worker_on_another_machine_fetches_a_missing_copy(bucket: str, export:
     """An export without a copy on this machine is fetched again when a loop is read."""
     from analyzer.history.export import ReadOptions, open_export
 
-    url = places.place(put(export, f"{bucket}/again/night.parquet"))
+    url = locations.place(put(export, f"{bucket}/again/night.parquet"))
     opened = open_export([url], ReadOptions(scratch=tmp_path))
     (copy,) = opened.origins
     before = opened.read(["L00.PV"])["L00.PV"].value
@@ -248,5 +248,5 @@ def test_a_name_that_leads_out_is_refused(bucket: str, export: Path, tmp_path: P
 
     s3fs.S3FileSystem().pipe_file("mill/climbing/../../../evil.parquet", export.read_bytes())
     with pytest.raises(InputError, match="leads out of its folder"):
-        places.at_hand([places.place(f"{bucket}/climbing")], tmp_path / "copies")
+        locations.local_copies([locations.place(f"{bucket}/climbing")], tmp_path / "copies")
     assert not list(tmp_path.rglob("*.parquet"))

@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner, Result
 
-from analyzer import places
+from analyzer import locations
 from analyzer.cli import main
 from analyzer.store import lock as store_lock
 from analyzer.store.lock import OWNER, locked
@@ -115,7 +115,7 @@ def ran(export: Path, store: str, *more: str) -> Result:
 
 def kept(store: str, folder: Path) -> dict[str, list[dict[str, object]]]:
     """The tables of a store at a URL."""
-    (copy,), _ = places.at_hand([places.place(store)], folder)
+    (copy,), _ = locations.local_copies([locations.place(store)], folder)
     return tables(copy)
 
 
@@ -142,7 +142,7 @@ def test_an_outage_is_one_line_and_can_be_resumed(
 
     Nothing is called damaged, and --resume gives the store of an undisturbed run.
     """
-    monkeypatch.setattr(places, "TRIES", 2)
+    monkeypatch.setattr(locations, "TRIES", 2)
     store = f"{bucket}/down-{after}"
     with disturbed(lambda count, _: 503 if count > after else None):
         result = ran(export, store)
@@ -164,7 +164,7 @@ def test_a_storage_that_never_responds_ends_the_run(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """If requests are accepted without a response, the run ends with status 75 after its tries."""
-    monkeypatch.setattr(places, "TRIES", 1)
+    monkeypatch.setattr(locations, "TRIES", 1)
     monkeypatch.setattr(s3fs.S3FileSystem, "read_timeout", 1)
     with disturbed(lambda count, _: 0) as proxy:
         result = ran(export, f"{bucket}/silent")
@@ -176,7 +176,7 @@ def test_of_two_runs_at_one_moment_one_is_refused(bucket: str, monkeypatch: pyte
     """If two runs both find no signature, the storage creates one, and the other run is refused with the owner of the
     store.
     """
-    store, found = places.place(f"{bucket}/two"), threading.Barrier(2)
+    store, found = locations.place(f"{bucket}/two"), threading.Barrier(2)
     look, first = store_lock._require_unsigned, threading.local()
 
     def both(path: Path) -> bool:
@@ -212,7 +212,7 @@ def test_a_signature_of_a_dead_process_is_ignored(bucket: str) -> None:  # noqa:
 
     A signature of a running process or of another machine is not.
     """
-    store = places.place(f"{bucket}/dead")
+    store = locations.place(f"{bucket}/dead")
     signed = {"host": socket.gethostname(), "process": 2**22 + 12345, "alive_s": time.time(), "mark": "x"}
     (store / OWNER).write_text(json.dumps(signed))
     with locked(store):

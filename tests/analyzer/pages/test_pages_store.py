@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from analyzer.belief.nights import settle_anew
+from analyzer.belief.nights import recompute_beliefs
 from analyzer.columns import row_of
 from analyzer.config import Config
 from analyzer.loops.changes import TuningChange
@@ -83,7 +83,7 @@ def test_loops_that_the_store_lacks_are_named(store: Store) -> None:
 def test_morning_page_names_every_loop_once(tmp_path: Path) -> None:
     """Loops that are not assessed are listed with their reason, and changes are listed under New and Better."""
     store = small_store(tmp_path)
-    settle_anew(store, Config())
+    recompute_beliefs(store, Config())
     view = read_night(store, "2026-03-09", 50)
     page = morning.morning_page(view)
     lost = table(page, "not-assessed")
@@ -273,7 +273,7 @@ def test_loops_side_by_side_have_their_own_units(tmp_path: Path) -> None:
 def test_beliefs_without_a_column_of_this_version_are_read(tmp_path: Path) -> None:
     """A column that is missing from beliefs of an earlier version is unknown, and the others are unchanged."""
     old = small_store(tmp_path / "store")
-    settle_anew(old, Config())
+    recompute_beliefs(old, Config())
     night = old.require()
     whole = old.rows("nights", night, ["loop", "growing", "worn_pct"])
     file = old.file("beliefs", night)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analyzer.loop.decisions import Cause, Finding, Sign, SignKind, Status, Swing
+from analyzer.loop.decisions import Cause, Finding, OscillationFigures, Sign, SignKind, Status
 from analyzer.words.reason import in_short, reason
 
 
@@ -25,7 +25,7 @@ def test_a_loop_that_oscillates_for_a_part_of_the_night_is_reported(share: float
     oscillate.
     """
     signs = (Sign(Cause.LOAD, 1.0, SignKind.REGULARITY, (1.5, 0.2, 1.0)),)
-    swing = Swing(1.0, share, 1086.0 if share else None, 1.0)
+    swing = OscillationFigures(1.0, share, 1086.0 if share else None, 1.0)
     cause = Cause.LOAD if share >= 20 else Cause.NONE
     assert reason(Finding("L", "2026-03-02", Status.OK, swing=swing, cause=cause, signs=signs)) == expected
 

@@ -11,12 +11,12 @@ from analyzer.loop.decisions import (
     Cause,
     Finding,
     MissingData,
+    OscillationFigures,
     Requirement,
     RequirementKind,
     Sign,
     SignKind,
     Status,
-    Swing,
 )
 from analyzer.plantwide.structure import Tie
 from analyzer.store.rows import finding_of, night_row, piece_row
@@ -59,7 +59,7 @@ FOUND = Finding(
     Status.OK,
     Requirement(MissingData.FINER, RequirementKind.PV_AS_MEASURED, (98.0, 0.8)),
     MissingData.FINER,
-    Swing(20.0, 90.0, 60.0, 2.0),
+    OscillationFigures(20.0, 90.0, 60.0, 2.0),
     Cause.UNDECIDED,
     signs=SIGNS,
 )

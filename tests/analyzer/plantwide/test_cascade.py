@@ -14,11 +14,11 @@ from analyzer.loop.decisions import (
     Fault,
     Finding,
     GroupRole,
+    OscillationFigures,
     Remedy,
-    Root,
     SignKind,
+    SourceLoop,
     Status,
-    Swing,
 )
 from analyzer.plantwide.cascade import linked, reassign_sources
 from analyzer.plantwide.night import following
@@ -33,7 +33,7 @@ def found(
     loop: str, cause: Cause, period_s: float | None, action: Action = Action.NONE, **known: Any
 ) -> Finding:
     """A loop with a cause; it oscillates if it has a period."""
-    swing = Swing() if period_s is None else Swing(20.0, 90.0, period_s, 2.0)
+    swing = OscillationFigures() if period_s is None else OscillationFigures(20.0, 90.0, period_s, 2.0)
     pct = {c: 90.0 if c is cause else 5.0 for c in CAUSES}
     fault = Fault.STICTION if cause is Cause.VALVE else Fault.NONE
     remedy = Remedy(action, kp_new=1.0, ti_new=10.0) if action is Action.RETUNE else Remedy(action)
@@ -126,11 +126,11 @@ def test_a_loop_that_follows_a_third_one_is_left_as_it_is() -> None:
 
 def test_followers_of_a_master_follow_its_slave_if_the_slave_is_the_root() -> None:
     """A group has one root: loops that followed the master follow its slave, also in the rows of the group."""
-    root = Root("TIC1", 0.9, 30.0, 80.0)
+    root = SourceLoop("TIC1", 0.9, 30.0, 80.0)
     third = following(
         found("PIC7", Cause.LOAD, 360.0),
         root,
-        Swing(),
+        OscillationFigures(),
         (SignKind.FOLLOWS, ()),
         LIMITS,
     )
@@ -148,11 +148,11 @@ def test_followers_of_a_master_follow_its_slave_if_the_slave_is_the_root() -> No
 
 def test_a_source_of_one_group_that_follows_in_another_stays_a_source() -> None:
     """Only a master loses its role as source, and only to its own slave."""
-    root = Root("PIC9", 0.9, None, 80.0)
+    root = SourceLoop("PIC9", 0.9, None, 80.0)
     leads = following(
         found("FIC2", Cause.LOAD, 360.0),
         root,
-        Swing(),
+        OscillationFigures(),
         (SignKind.FOLLOWS, ()),
         LIMITS,
     )

@@ -13,7 +13,7 @@ from analyzer.loop.decisions import Cause, Finding
 from analyzer.loop.oscillation.detection import detect
 from analyzer.plantwide.groups import Group, groups_of
 from analyzer.plantwide.night import Traced, followers_of, may_follow, trace
-from analyzer.plantwide.wave import Wave, waves_in, waves_of, waves_table
+from analyzer.plantwide.oscillation_lines import OscillationLines, error_lines_of, waves_in, waves_table
 from proofs.plant import CONFIG, START_S, peer, record
 
 HOURS_8 = 28_800
@@ -42,14 +42,14 @@ def loop(
     seed: int = 1,
     dt_s: float = 1.0,
     start_s: float = START_S,
-) -> tuple[Wave, ...]:
+) -> tuple[OscillationLines, ...]:
     """The oscillations of a loop whose error is a signal plus its own noise."""
     pv = 50.0 - error + noise * np.random.default_rng(seed).standard_normal(error.size)
     own = replace(record(pv, dt_s=dt_s), start_s=start_s)
-    return waves_of(name, detect(own, CONFIG.oscillation), start_s + own.duration_s, LIMITS)
+    return error_lines_of(name, detect(own, CONFIG.oscillation), start_s + own.duration_s, LIMITS)
 
 
-def grouped(*loops: Sequence[Wave]) -> list[Group]:
+def grouped(*loops: Sequence[OscillationLines]) -> list[Group]:
     """Groups of some loops."""
     return groups_of([w for oscillations in loops for w in oscillations], LIMITS)
 
@@ -59,7 +59,7 @@ def names(groups: Sequence[Group]) -> list[set[str]]:
     return [set(g.loops) for g in groups]
 
 
-def traced(peers: dict[str, Finding], *loops: Sequence[Wave]) -> list[Traced]:
+def traced(peers: dict[str, Finding], *loops: Sequence[OscillationLines]) -> list[Traced]:
     """Groups with their sources."""
     return trace([w for oscillations in loops for w in oscillations], peers, LIMITS)
 

@@ -16,7 +16,7 @@ from click.testing import CliRunner, Result
 from analyzer.cli import main
 from analyzer.columns import NIGHTS
 from analyzer.store import store as store_module
-from analyzer.store.care import problems
+from analyzer.store.maintenance import problems
 from analyzer.store.store import Store
 from proofs.plant import Sketch, simulate, write_export
 from tests.analyzer.conftest import RunPlant

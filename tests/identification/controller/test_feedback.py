@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.controller.pi_regression import fed_back
+from identification.controller.pi_regression import feedback_share
 
 
 def closed(seed: int, n: int = 2000) -> tuple[np.ndarray, np.ndarray]:
@@ -34,17 +34,17 @@ def scripted(seed: int, n: int = 2000) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_controllers_output_follows_pv(seed: int) -> None:
     """PV explains more than 90 % of the moves of a PI controller."""
-    assert fed_back(*closed(seed)) > 0.9
+    assert feedback_share(*closed(seed)) > 0.9
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_script_does_not_follow_pv(seed: int) -> None:
     """PV explains less than 3 % of scripted moves, although PV responds to them."""
-    assert fed_back(*scripted(seed)) < 0.03
+    assert feedback_share(*scripted(seed)) < 0.03
 
 
 def test_a_constant_output_and_a_short_record_have_no_feedback() -> None:
     """A constant OP and a record of a hundred samples have a feedback of zero."""
     op, pv = closed(4)
-    assert fed_back(np.full(op.size, 50.0), pv) == 0.0
-    assert fed_back(op[:100], pv[:100]) == 0.0
+    assert feedback_share(np.full(op.size, 50.0), pv) == 0.0
+    assert feedback_share(op[:100], pv[:100]) == 0.0

@@ -9,7 +9,7 @@ from analyzer.config import Config
 from analyzer.loop.record.judged_stretch import recorded
 from identification.controller.free_law import FreeLaw, free_law
 from identification.controller.law_comparison import compare_laws
-from identification.controller.law_ways import fastest
+from identification.controller.law_variants import fastest
 from identification.models import ErrorForm, Pid
 from identification.record import LoopRecord
 from proofs.controllers_plant import Controlled, controlled

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from identification.controller.law_comparison import LawsCompared, compare_laws
-from identification.controller.law_ways import fastest
+from identification.controller.law_variants import fastest
 from identification.models import ErrorForm, Pid
 from identification.record import LoopRecord
 

@@ -59,7 +59,7 @@ def measured(d: Drawn, every: int, scan_s: float) -> Measured:
 def test_a_width_recorded_every_ten_seconds_is_that_of_the_valve(drawn: Drawn) -> None:
     """With one row in ten of a controller that scans every second, the backlash is recovered within 15 %."""
     m = measured(drawn, 10, 1.0)
-    assert m.window.blocks.steps == 10
+    assert m.problem.blocks.steps == 10
     assert m.play.valve.stickband == pytest.approx(drawn.valve.band, rel=0.15)
 
 
@@ -68,7 +68,7 @@ def test_a_controller_no_faster_than_its_record_holds_op_between_rows() -> None:
     rows is likelier. Its width is that of the valve within 15 %."""
     d = replace(BACKLASH_LOOPS[0], controller=replace(BACKLASH_LOOPS[0].controller, scan_s=10.0))
     m = measured(d, 1, 1.0)
-    assert m.window.blocks.steps == 1
+    assert m.problem.blocks.steps == 1
     assert m.play.valve.stickband == pytest.approx(d.valve.band, rel=0.15)
 
 
@@ -83,8 +83,8 @@ def rows_of(n: int = 400) -> Rows:
 def test_op_is_the_recorded_one_at_each_row() -> None:
     """Every path of OP passes through the recorded values, and between rows the paths differ by opposite noise."""
     rows = rows_of()
-    window = in_blocks(rows.pv, rows.op, np.ones(rows.pv.size, dtype=bool), 10.0)
-    fit = start_at(window, 1.0, (80.0, 12.0), sticking(1.0, 0.0), np.zeros(8))
+    problem = in_blocks(rows.pv, rows.op, np.ones(rows.pv.size, dtype=bool), 10.0)
+    fit = start_at(problem, 1.0, (80.0, 12.0), sticking(1.0, 0.0), np.zeros(8))
     paths = op_at_scans(fit, Scans(rows, Pid(2.0, 60.0), 10))
     assert np.array_equal(paths[:, ::10], np.broadcast_to(rows.op, (len(paths), rows.op.size)))
     assert np.ptp(paths[:, 5::10], axis=0).min() > 0.0

@@ -8,7 +8,12 @@ from itertools import product
 import numpy as np
 import pytest
 
-from identification.estimation.backlash_stiction import better_linear, fit_linear, fit_play, fit_stick_slip
+from identification.estimation.backlash_stiction import (
+    better_linear,
+    fit_backlash,
+    fit_linear,
+    fit_stick_slip,
+)
 from identification.estimation.evidence import evidence
 from identification.estimation.gauss_newton import descend, innovations
 from identification.estimation.problem import Problem, Stems, block_means, in_blocks, stem_blocks
@@ -61,7 +66,7 @@ def test_ideal_valve_gives_no_evidence_of_backlash(seed):
     """Behind an ideal valve the evidence of backlash is below 5 nats, under half of the limit for a verdict."""
     w = problem_of(Fopdt(2.0, 30.0, 5.0), None, 10 + seed)
     linear = fit_linear(w, 120.0)
-    found = fit_play(linear, 120.0)
+    found = fit_backlash(linear, 120.0)
     assert evidence(found, better_linear(linear, found)) < 5.0
 
 
@@ -70,7 +75,7 @@ def test_width_of_backlash_is_recovered(width):
     """Backlash of 1 to 5 % under a moving OP is recovered within 0.1 %, with an evidence above 100 nats."""
     w = problem_of(Fopdt(2.0, 30.0, 5.0), Backlash(width), 20)
     linear = fit_linear(w, 120.0)
-    found = fit_play(linear, 120.0)
+    found = fit_backlash(linear, 120.0)
     assert found.valve.stickband == pytest.approx(width, abs=0.1)
     assert evidence(found, better_linear(linear, found)) > 100
 
@@ -82,7 +87,7 @@ def test_backlash_is_recovered_from_its_limit_cycle():
     noise[5:] += 1.0  # a step of the load: without it the stem would never cross its backlash
     record = closed_loop(loop, np.full(N, 50.0), noise)
     w = in_blocks(record.pv, record.op, np.ones(N, dtype=bool), 1.0)
-    found = fit_play(fit_linear(w, 38.0), 38.0)
+    found = fit_backlash(fit_linear(w, 38.0), 38.0)
     assert found.valve.stickband == pytest.approx(1.0, rel=0.02)
     assert found.slope == pytest.approx(0.4, rel=0.02)
 
@@ -193,7 +198,7 @@ def test_stick_slip_is_recovered_from_its_limit_cycle(jump):
     likelihood than any backlash."""
     tank = oscillating_tank(3, 2.43, jump)
     linear = fit_linear(tank, 60.0)
-    backlash = fit_play(linear, 60.0)
+    backlash = fit_backlash(linear, 60.0)
     found = fit_stick_slip(backlash, 60.0)
     assert found.valve.stickband == pytest.approx(2.43, rel=0.03)
     assert found.valve.slip_jump == pytest.approx(jump, rel=0.1)
@@ -209,7 +214,7 @@ def test_descent_and_innovations_agree():
     pv = block_means(respond(op - 50, unit_lag(300.0, 12.0, 1.0)), 8) + rng.normal(0, 0.05, 600) + 3.0
     for fine in (False, True):
         data = in_blocks(pv, op, np.ones(600, dtype=bool), 8.0, 8, fine=fine)
-        for fit in (fit_linear(data, 400.0), fit_play(fit_linear(data, 400.0), 400.0)):
+        for fit in (fit_linear(data, 400.0), fit_backlash(fit_linear(data, 400.0), 400.0)):
             assert float(np.mean(innovations(fit) ** 2)) == pytest.approx(fit.loss, rel=1e-6)
     process = fit_linear(data, 400.0).process
     assert process.time_constant_s == pytest.approx(300.0, rel=0.05)

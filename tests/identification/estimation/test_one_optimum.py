@@ -56,15 +56,17 @@ def test_both_fits_find_the_same_constants(seed: int) -> None:
     within 30 %."""
     pv, op = oscillating(seed)
     good = np.ones(N, dtype=bool)
-    window = in_blocks(pv, op, good, 1.0)
-    begun = start_at(window, 1.1 * GAIN, (0.9 * LAG, DEAD), StemLaw(BAND / 2, BAND / 2, 0.0), generic_noise())
+    problem = in_blocks(pv, op, good, 1.0)
+    begun = start_at(
+        problem, 1.1 * GAIN, (0.9 * LAG, DEAD), StemLaw(BAND / 2, BAND / 2, 0.0), generic_noise()
+    )
     one = descend_lag(begun, free_width=True)
     spread = np.sqrt(np.diag(covariance(one, free_width=True)))
 
-    any_fit = descend_any(window, Model((EFFECTS["backlash"].variants[0],), begun.model.c), 40)
+    any_fit = descend_any(problem, Model((EFFECTS["backlash"].variants[0],), begun.model.c), 40)
     found = any_fit.model.c
     deviation = {
-        param.slot: d for param, d in zip(any_fit.model.params, deviations(window, any_fit), strict=True)
+        param.slot: d for param, d in zip(any_fit.model.params, deviations(problem, any_fit), strict=True)
     }
 
     pairs = (
@@ -89,8 +91,8 @@ def test_the_kernel_has_the_residual_of_the_simulator(law: StemLaw, dead_s: floa
     """The residual of a lag with a valve is PV minus the response of the simulator, except for a constant,
     after the first value of PV has no effect."""
     pv, op = oscillating(6)
-    window = in_blocks(pv, op, np.ones(N, dtype=bool), 1.0)
-    fit = start_at(window, GAIN, (LAG, dead_s), law, generic_noise())
+    problem = in_blocks(pv, op, np.ones(N, dtype=bool), 1.0)
+    fit = start_at(problem, GAIN, (LAG, dead_s), law, generic_noise())
     inputs = ModelInputs(op, 1.0, float(op.mean()), 0.0, (0.0, 100.0))
     c = as_parameters(fit.process, law.valve)
     if law.breakaway > 0.0:

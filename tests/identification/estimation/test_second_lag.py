@@ -19,7 +19,7 @@ from analyzer.loop.record.quality import prepare
 from benchmarks.world.__main__ import export, spec_of
 from benchmarks.world.draw import drawn
 from benchmarks.world.pairs import varied
-from identification.estimation.backlash_stiction import fit_linear, fit_play
+from identification.estimation.backlash_stiction import fit_backlash, fit_linear
 from identification.estimation.evidence import evidence, with_second_lag
 from identification.estimation.problem import in_blocks
 
@@ -46,9 +46,9 @@ def gains(second_s: float, width: float = 0.0) -> tuple[float, float]:
         stem[k] = moved
     block = 10
     y = behind(stem, second_s).reshape(-1, block).mean(axis=1)
-    window = in_blocks(y, op, np.ones(y.size, bool), float(block), block)
-    linear = fit_linear(window, 300.0)
-    return evidence(with_second_lag(linear), linear), evidence(fit_play(linear, 300.0), linear)
+    problem = in_blocks(y, op, np.ones(y.size, bool), float(block), block)
+    linear = fit_linear(problem, 300.0)
+    return evidence(with_second_lag(linear), linear), evidence(fit_backlash(linear, 300.0), linear)
 
 
 def test_a_second_lag_explains_more_than_backlash_where_there_is_one() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from identification.estimation.backlash_stiction import fit_linear, fit_play, fit_stick_slip
+from identification.estimation.backlash_stiction import fit_backlash, fit_linear, fit_stick_slip
 from identification.estimation.irregular_slips import fit_irregular
 from identification.estimation.noise import generic_noise
 from identification.estimation.problem import in_blocks
@@ -146,11 +146,11 @@ def oscillating(scatter: float, seed: int, n: int = 4000) -> tuple[Floats, Float
 def fitted(scatter: float, seed: int):
     """The fits of backlash and of a slip path for such a loop, without its first quarter."""
     pv, op = (x[1000:] for x in oscillating(scatter, seed))
-    window = in_blocks(pv, np.ascontiguousarray(op), np.ones(pv.size, dtype=bool), 1.0)
+    problem = in_blocks(pv, np.ascontiguousarray(op), np.ones(pv.size, dtype=bool), 1.0)
     crossings = int((np.diff(np.sign(op - op.mean())) != 0).sum())
     period = 2.0 * op.size / max(crossings, 1)
     period = max(period, 40.0)
-    backlash = fit_play(fit_linear(window, period), period)
+    backlash = fit_backlash(fit_linear(problem, period), period)
     return backlash, fit_irregular(backlash, generic_noise(), period)
 
 
@@ -193,8 +193,8 @@ def test_a_square_pv_of_a_fast_flow_is_not_backlash(seed):
         pipe.append(stem)
         x += (1.0 - math.exp(-1.0 / 12.0)) * (50.0 + 1.1 * (pipe.pop(0) + load - 50.0) - x)
     pv, op = np.array(pv_out[100:]), np.array(op_out[100:])
-    window = in_blocks(pv, op, np.ones(pv.size, dtype=bool), 10.0)
-    backlash = fit_play(fit_linear(window, 300.0), 300.0)
+    problem = in_blocks(pv, op, np.ones(pv.size, dtype=bool), 10.0)
+    backlash = fit_backlash(fit_linear(problem, 300.0), 300.0)
     assert backlash.gain > 3.0 * 1.1
     path = fit_irregular(backlash, generic_noise(), 300.0)
     assert path is not None
@@ -219,8 +219,8 @@ def test_a_jump_of_nearly_the_stickband_is_recovered():
         pipe.append(stem)
         x += (1.0 - math.exp(-1.0 / 57.0)) * (1.4 * (pipe.pop(0) + load - 50.0) - x)
     pv, op = pv[1800:], np.ascontiguousarray(op[1800:])  # the oscillation has reached its full amplitude
-    window = in_blocks(pv, op, np.ones(pv.size, dtype=bool), 1.0)
-    backlash = fit_play(fit_linear(window, 92.0), 92.0)
+    problem = in_blocks(pv, op, np.ones(pv.size, dtype=bool), 1.0)
+    backlash = fit_backlash(fit_linear(problem, 92.0), 92.0)
     assert backlash.valve.stickband > 1.4 * (static + kinetic)
     assert backlash.gain > 1.5 * 1.4
     found = fit_stick_slip(backlash, 92.0)

@@ -24,7 +24,7 @@ CALM = Drawn(
 BLOCK = 4
 
 
-def _window(d: Drawn, scale: float = 1.0) -> Problem:
+def _problem(d: Drawn, scale: float = 1.0) -> Problem:
     t = run(d, hours=8)
     n = t.pv.size // BLOCK
     pv, op = scale * block_means(t.pv, BLOCK), np.ascontiguousarray(t.op[: n * BLOCK])
@@ -40,22 +40,22 @@ def test_a_tight_loop_is_identified_without_set_point_moves():
     """Under a smooth load, slope and dead time of a ringing loop are recovered within 15 %, and its Ms is above
     3."""
     true_ms, period = sensitivity(TIGHT.process, TIGHT.controller)
-    window, (pid, law) = _window(TIGHT), _law(TIGHT, period)
-    found = fit_smooth(window, period, resonant_starts(window, period, law))
+    problem, (pid, law) = _problem(TIGHT), _law(TIGHT, period)
+    found = fit_smooth(problem, period, resonant_starts(problem, period, law))
     assert found.process.slope == pytest.approx(1.2 / 150.0, rel=0.15)
     assert found.process.dead_time_s == pytest.approx(20.0, rel=0.15)
     assert true_ms > 3.5
     assert maximum_sensitivity(Loop(found.process, pid)) > 3.0
-    lined = fit_line(window, period, [found])
+    lined = fit_line(problem, period, [found])
     assert lined.log_likelihood - found.log_likelihood < 15.0
 
 
 def test_a_sine_is_a_line_of_the_load():
     """In a well tuned loop under a sine, a spectral line of the load explains far more than a smooth load, and
     keeps its phase."""
-    window, (pid, law) = _window(CALM), _law(CALM, 240.0)
-    smooth = fit_smooth(window, 240.0, resonant_starts(window, 240.0, law))
-    lined = fit_line(window, 240.0, [smooth], [(72.0, 12.0), (480.0, 12.0)])
+    problem, (pid, law) = _problem(CALM), _law(CALM, 240.0)
+    smooth = fit_smooth(problem, 240.0, resonant_starts(problem, 240.0, law))
+    lined = fit_line(problem, 240.0, [smooth], [(72.0, 12.0), (480.0, 12.0)])
     assert lined.log_likelihood - smooth.log_likelihood > 20.0
     assert lined.line is not None
     assert lined.line.kept > 10.0
@@ -65,7 +65,7 @@ def test_a_sine_is_a_line_of_the_load():
 
 def test_another_unit_of_pv_scales_the_gain_alone():
     """PV in another unit scales gain and innovations, and does not change time constant, dead time and load."""
-    one, other = (fit_smooth(_window(TIGHT, s), 100.0, [((100.0, 16.0), None)]) for s in (1.0, 3.0))
+    one, other = (fit_smooth(_problem(TIGHT, s), 100.0, [((100.0, 16.0), None)]) for s in (1.0, 3.0))
     assert other.process.gain == pytest.approx(3.0 * one.process.gain, rel=1e-6)
     assert other.sigma2 == pytest.approx(9.0 * one.sigma2, rel=1e-6)
     assert np.allclose(other.theta, one.theta, rtol=1e-6)
@@ -73,7 +73,7 @@ def test_another_unit_of_pv_scales_the_gain_alone():
 
 def test_missing_blocks_hardly_change_the_process():
     """Missing blocks, one in twenty, change slope and dead time by less than 10 %."""
-    whole = _window(TIGHT)
+    whole = _problem(TIGHT)
     missing = np.random.default_rng(3).random(whole.usable.size) < 0.05
     y = np.interp(np.arange(missing.size), np.flatnonzero(~missing), whole.pv[~missing])
     thin = in_blocks(y, whole.blocks.op, ~missing, whole.dt_s, whole.blocks.factor)
@@ -87,7 +87,7 @@ def test_the_load_as_an_autoregression_leaves_the_same_innovations():
     load."""
     from identification.estimation.gauss_newton import innovations
 
-    window = _window(TIGHT)
-    found = fit_smooth(window, 100.0, [((100.0, 16.0), None)])
-    left = innovations(as_fit(found, window))[200:]
+    problem = _problem(TIGHT)
+    found = fit_smooth(problem, 100.0, [((100.0, 16.0), None)])
+    left = innovations(as_fit(found, problem))[200:]
     assert float(np.var(left)) == pytest.approx(found.sigma2, rel=0.05)

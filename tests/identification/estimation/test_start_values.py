@@ -7,7 +7,7 @@ import pytest
 
 from identification.estimation.problem import in_blocks
 from identification.estimation.search import plain_processes
-from identification.mismatch.plain_loop import prepared
+from identification.mismatch.baseline import prepared
 from identification.models import Fopdt, Loop, Pid
 from identification.record import LoopRecord
 from identification.simulation.closed_loop import closed_loop

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.estimation.backlash_stiction import fit_linear, fit_play
+from identification.estimation.backlash_stiction import fit_backlash, fit_linear
 from identification.estimation.evidence import (
     Trials,
     gains,
@@ -14,7 +14,7 @@ from identification.estimation.evidence import (
 )
 from identification.estimation.problem import in_blocks
 from identification.models import Backlash, Fopdt
-from identification.signals.turns import turning_points, turns_of
+from identification.signals.reversals import op_reversals, turning_points
 from identification.simulation.valve import RESTS, StemLaw
 from tests.identification.slow_responses import pv_of
 
@@ -34,9 +34,9 @@ def judged(valve: Backlash | None, seed: int) -> Trials:
     op = oscillating(seed)
     noise = 0.2 * np.random.default_rng(seed + 100).standard_normal(N)
     pv = pv_of(Fopdt(1.5, 30.0, 5.0), valve, op, 1.0) + noise
-    window = in_blocks(pv, op, np.ones(N, dtype=bool), 1.0)
-    linear = fit_linear(window, PERIOD)
-    found = trials(fit_play(linear, PERIOD), linear, PERIOD)
+    problem = in_blocks(pv, op, np.ones(N, dtype=bool), 1.0)
+    linear = fit_linear(problem, PERIOD)
+    found = trials(fit_backlash(linear, PERIOD), linear, PERIOD)
     assert found is not None
     return found
 
@@ -52,7 +52,7 @@ def test_turning_points_are_those_of_a_triangle():
 
 def test_op_reverses_twice_a_period():
     """OP with half periods of any size reverses about twice per period."""
-    assert turns_of(oscillating(3), PERIOD).size == pytest.approx(2 * N / PERIOD, abs=4)
+    assert op_reversals(oscillating(3), PERIOD).size == pytest.approx(2 * N / PERIOD, abs=4)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -75,16 +75,16 @@ def test_trials_do_not_agree_behind_an_ideal_valve(seed):
 def test_a_fit_has_no_gain_over_itself():
     """A fit has no gain over itself."""
     op = oscillating(1)
-    window = in_blocks(pv_of(Fopdt(1.5, 30.0, 5.0), None, op, 1.0), op, np.ones(N, dtype=bool), 1.0)
-    candidate = fit_linear(window, PERIOD)
+    problem = in_blocks(pv_of(Fopdt(1.5, 30.0, 5.0), None, op, 1.0), op, np.ones(N, dtype=bool), 1.0)
+    candidate = fit_linear(problem, PERIOD)
     assert not gains(candidate, candidate).any()
 
 
 def test_too_few_reversals_are_no_trials():
     """A record with two OP reversals has no trials."""
     op = oscillating(1)[:300]
-    window = in_blocks(op.copy(), op, np.ones(300, dtype=bool), 1.0)
-    candidate = fit_linear(window, PERIOD)
+    problem = in_blocks(op.copy(), op, np.ones(300, dtype=bool), 1.0)
+    candidate = fit_linear(problem, PERIOD)
     assert trials(candidate, candidate, PERIOD) is None
 
 
@@ -94,11 +94,11 @@ def test_moves_of_a_stem_are_trials_without_an_oscillation(seed):
     as often as OP reverses."""
     op = oscillating(seed)
     noise = 0.2 * np.random.default_rng(seed + 100).standard_normal(N)
-    window = in_blocks(
+    problem = in_blocks(
         pv_of(Fopdt(1.5, 30.0, 5.0), Backlash(3.0), op, 1.0) + noise, op, np.ones(N, dtype=bool), 1.0
     )
-    linear = fit_linear(window, PERIOD)
-    backlash = fit_play(linear, PERIOD)
+    linear = fit_linear(problem, PERIOD)
+    backlash = fit_backlash(linear, PERIOD)
     found = trials_between_moves(backlash, linear)
     assert found is not None
     assert found.count == pytest.approx(2 * N / PERIOD, abs=3)
@@ -108,7 +108,7 @@ def test_moves_of_a_stem_are_trials_without_an_oscillation(seed):
 def test_a_stem_that_never_moves_is_no_trial():
     """Backlash wider than OP's range gives no move of the stem, and so no trial."""
     op = 50 + np.sin(np.arange(N) / 50.0)
-    window = in_blocks(0.1 * np.random.default_rng(1).standard_normal(N), op, np.ones(N, dtype=bool), 1.0)
-    linear = fit_linear(window, PERIOD)
+    problem = in_blocks(0.1 * np.random.default_rng(1).standard_normal(N), op, np.ones(N, dtype=bool), 1.0)
+    linear = fit_linear(problem, PERIOD)
     still = linear.moved(valve=StemLaw(5.0, 5.0, RESTS))
     assert trials_between_moves(still, linear) is None

@@ -61,6 +61,6 @@ def test_widths_that_are_too_small_are_not_distinguished_from_none() -> None:
     m = measured(MOVED, 1)
     found = width_profile(m.linear, m.play)
     assert found[0] == 0.0
-    assert found[0.5 * np.ptp(m.window.blocks.op) < WIDTHS].max() < -100.0
-    beyond = found[np.ptp(m.window.blocks.op) * 1.25 < WIDTHS]
+    assert found[0.5 * np.ptp(m.problem.blocks.op) < WIDTHS].max() < -100.0
+    beyond = found[np.ptp(m.problem.blocks.op) * 1.25 < WIDTHS]
     assert np.ptp(beyond) == 0.0

@@ -9,7 +9,7 @@ import pytest
 from identification.estimation.prediction_error import scales
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS, RECORDER_FAULTS
 from identification.mismatch.effect import Fault
-from identification.mismatch.outside import OUTSIDE, RIVALS
+from identification.mismatch.outside import COMPETING_EFFECTS, OUTSIDE
 from identification.record import Floats
 from identification.simulation.open_loop import ModelInputs, simulate
 from identification.simulation.parameters import Param, Slot, Variant, neutral
@@ -49,7 +49,9 @@ def with_one_changed(c: Floats, p: Param) -> Floats:
     return out
 
 
-@pytest.mark.parametrize("variant", [*CANDIDATES, *RIVALS], ids=lambda v: f"{v.name} {v.label}".strip())
+@pytest.mark.parametrize(
+    "variant", [*CANDIDATES, *COMPETING_EFFECTS], ids=lambda v: f"{v.name} {v.label}".strip()
+)
 def test_every_parameter_acts(variant: Variant) -> None:
     """Every free parameter of an effect changes the simulated PV. A parameter that no kernel uses is detected."""
     plain = neutral()

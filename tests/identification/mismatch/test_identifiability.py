@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.mismatch.answer import ANSWERS, answer, brings, too_short, unanswered
+from identification.mismatch.answer import ANSWERS, answer, gain_by_op, too_short, unanswered
+from identification.mismatch.baseline import inputs_of, prepared
 from identification.mismatch.explanation import Explanation, carried_over
-from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.recording import Recording
 from identification.simulation.parameters import Slot
 from tests.identification.recordings import noise, recording
@@ -48,7 +48,7 @@ def test_slow_level_is_identifiable_although_its_gain_is_unknown() -> None:
     """A near integrator is identifiable, although only the ratio of its gain and time constant is known."""
     s = recording(5)
     found = baseline_fit(s)
-    assert brings(found.p, found.plain) > 10 * ANSWERS
+    assert gain_by_op(found.p, found.plain) > 10 * ANSWERS
 
 
 @pytest.mark.parametrize(("kind", "too_short_expected"), [("temperature", True), ("level", False)])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from identification.estimation.problem import problem
-from identification.mismatch.plain_loop import Clip, inputs_of, plain
+from identification.mismatch.baseline import Clip, inputs_of, plain
 from identification.mismatch.proof import anchored
 from identification.models import Fopdt
 from identification.signals.filters import without_lines

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from identification.mismatch.baseline import inputs_of, prepared
 from identification.mismatch.diagnosis import LEFT_OVER
-from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.reference import Prediction, best_prediction, on_above
 from proofs.concealed.plant import Plant
 from proofs.experiments import drawn

@@ -11,10 +11,10 @@ from identification.estimation.model import Model
 from identification.estimation.prediction_error import descended, residual_fit
 from identification.mismatch import diagnosis
 from identification.mismatch.answer import alternatives
+from identification.mismatch.baseline import inputs_of, prepared
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.diagnosis import replacement_step
 from identification.mismatch.explanation import Explanation
-from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.recording import Recording
 from identification.mismatch.selection import Candidate, silent
 

@@ -8,9 +8,9 @@ import pytest
 
 from identification.estimation.model import Model
 from identification.estimation.noise import NO_NOISE
+from identification.mismatch.baseline import inputs_of, prepared
 from identification.mismatch.catalogue import CANDIDATES
 from identification.mismatch.explanation import Explanation, is_stack
-from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.selection import Candidate
 from tests.identification.plain_loop import Plant, recording
 

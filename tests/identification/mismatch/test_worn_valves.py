@@ -12,12 +12,12 @@ from identification.estimation.model import Fitted, Model
 from identification.estimation.prediction_error import descended
 from identification.estimation.problem import Problem, problem
 from identification.mismatch.answer import Answer, answer
+from identification.mismatch.baseline import inputs_of
 from identification.mismatch.candidate_proof import runs_out
 from identification.mismatch.catalogue import EFFECTS
-from identification.mismatch.diagnosis import explain, without_the_idle
+from identification.mismatch.diagnosis import explain, without_redundant
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.friction import simulated_anew
-from identification.mismatch.plain_loop import inputs_of
 from identification.mismatch.proof import HeldOut, Misfit
 from identification.mismatch.recording import Recording, SeenInCycles
 from identification.mismatch.selection import Candidate, applies
@@ -217,7 +217,7 @@ def test_idle_effect_is_removed() -> None:
         c[rows[name].params[0].slot] = value
         fit = descended(p, Model((*fit.model.added, rows[name]), c), 20)
         taken.append(Candidate(fit, 0.0, 0.0))
-    kept = without_the_idle(Explanation(p, fit, fit, tuple(taken)), 0)
+    kept = without_redundant(Explanation(p, fit, fit, tuple(taken)), 0)
     assert [c.name for c in kept.accepted] == ["backlash"] == list(kept.best.names)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.signals.turns import StemMarks, halves
+from identification.signals.reversals import StemMarks, halves
 
 PERIOD = 100
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analyzer.finder.beside import LIVE_SHARE
 from analyzer.finder.held import LEAST_MOVES, SLOW_BLOCKS, answers, nearness, tracked
 from analyzer.finder.law import Matrix, blocks
+from analyzer.finder.position_and_mode import LIVE_SHARE
 
 FOLLOWS = 0.3
 """Correlation of averages over long blocks from which one tag may be the set point of the other:
@@ -36,7 +36,7 @@ Cause = tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Bag:
+class TagSet:
     """An unordered set of tags on one clock: values, shape (n, tags), and how they move.
 
     live : tags that move often enough to be PV or OP; still : tags that never move; same : first tag with identical
@@ -50,7 +50,7 @@ class Bag:
     same: NDArray[np.int64]
 
     @classmethod
-    def of(cls, values: Matrix) -> Bag:
+    def of(cls, values: Matrix) -> TagSet:
         """From values without gaps."""
         moved = (np.diff(values, axis=0) != 0).sum(axis=0)
         first: dict[bytes, int] = {}
@@ -60,12 +60,12 @@ class Bag:
         live, moving = np.flatnonzero(own & (moved >= least)), np.flatnonzero(own & (moved > 0))
         return cls(values, tuple(live), tuple(np.flatnonzero(moved == 0)), tuple(moving), same)
 
-    def twice(self, tag: int) -> bool:
+    def is_duplicate(self, tag: int) -> bool:
         """Whether another tag has identical values: the output of a master and the set point of its slave."""
         return bool((self.same == tag).sum() > 1)
 
 
-def errors(bag: Bag) -> set[Cause]:
+def errors(bag: TagSet) -> set[Cause]:
     """Pairs of tags that may be PV and SP, because one follows the other about its level."""
     if not bag.live or not bag.moving:
         return set()
@@ -73,7 +73,7 @@ def errors(bag: Bag) -> set[Cause]:
     moving = np.array(bag.moving)
     slow = blocks(bag.values[:, moving], width)
     mean, spread = slow.mean(axis=0), np.maximum(slow.std(axis=0), 1e-9)
-    unit, twice = (slow - mean) / spread, np.array([bag.twice(k) for k in moving])
+    unit, twice = (slow - mean) / spread, np.array([bag.is_duplicate(k) for k in moving])
     found: set[Cause] = set()
     for i in np.flatnonzero(np.isin(moving, bag.live)):
         alike = unit.T @ unit[:, i] / len(unit)
@@ -86,21 +86,21 @@ def errors(bag: Bag) -> set[Cause]:
     return found
 
 
-def held_at(bag: Bag) -> set[Cause]:
+def held_at(bag: TagSet) -> set[Cause]:
     """Tags with the set point at which each is clearly controlled, unlike any other tag. The set point rarely moves,
     or is recorded twice, as a master's output is."""
-    moving = [k for k in bag.moving if k not in bag.live or bag.twice(k)]
+    moving = [k for k in bag.moving if k not in bag.live or bag.is_duplicate(k)]
     if len(bag.live) < 2 or not moving:
         return set()
     unlike = tracked(bag.values[:, bag.live], bag.values[:, moving]) < UNLIKE
-    never = np.equal.outer(bag.live, moving) | (unlike & ~np.array([bag.twice(k) for k in moving]))
+    never = np.equal.outer(bag.live, moving) | (unlike & ~np.array([bag.is_duplicate(k) for k in moving]))
     near = np.where(never, 0.0, nearness(bag.values, bag.live, moving))
     best, (second, first) = np.argmax(near, axis=0), np.sort(near, axis=0)[-2:]
     plain = (first >= HELD) & (first - second >= HELD_ALONE)
     return {(bag.live[best[k]], moving[k]) for k in np.flatnonzero(plain)}
 
 
-def answering(bag: Bag, held: set[Cause]) -> dict[Cause, int]:
+def answering(bag: TagSet, held: set[Cause]) -> dict[Cause, int]:
     """The tag that moves immediately with the set point of another tag, if it is the only one: OP."""
     pairs = sorted(held)
     others = [k for k in bag.live if k not in {pv for pv, _ in pairs}]

@@ -88,7 +88,7 @@ STRAIGHT: Shape = (0.0, 0.0, False)
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class LawVariant:
     """Properties of a law other than its gains: the error shape, a filter of PV [samples], and the set point weight
     of the gain [-], None if unknown."""
 
@@ -105,7 +105,7 @@ class Seen:
     moves: dict[int, Floats]
     weight: Floats
     free: Floats
-    way: Way
+    way: LawVariant
     rows: Floats = field(repr=False)
 
     def is_law(self, gains: Floats) -> bool:
@@ -126,7 +126,7 @@ class Seen:
         """Misfit of given gains: mean logarithm of the residual, comparable between all variants of the law."""
         return float(np.mean(np.log(SMALL + self.left(gains))))
 
-    def does(self, gains: Floats) -> bool:
+    def reproduces_op(self, gains: Floats) -> bool:
         """Whether the gains reproduce OP about as well as any, and well enough."""
         left, least = self.left(gains), self.left(self.free)
         unsure = np.array([blurred(m, gains) for m in self.moves.values()])
@@ -195,7 +195,7 @@ def with_shape(c: Pid, shape: Shape) -> Pid:
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class PreparedRecord:
     """A recording prepared for comparison: samples without a law, lengths of increments [samples], and the
     controller's scan [s]."""
 
@@ -208,7 +208,7 @@ class Look:
         """Rows of an error and its slope (pid_regression.rows_of)."""
         return rows_of(self.record, error, slope, self.scan_s)
 
-    def seen(self, rows: Floats, way: Way) -> Seen | None:
+    def seen(self, rows: Floats, way: LawVariant) -> Seen | None:
         """The recording under one variant; None where no length shows a law."""
         every = len(self.record) // MOST_INCREMENTS
         of = {k: increments(rows, self.out, k, max(k // 8, every, 1), True) for k in self.lengths}
@@ -223,15 +223,15 @@ class Look:
 
     def plainly(self, shape: Shape) -> Seen | None:
         """The simplest variant with an error of that shape."""
-        return self.seen(self.rows(shaped(self.record.error, shape)), Way(shape))
+        return self.seen(self.rows(shaped(self.record.error, shape)), LawVariant(shape))
 
 
-def look(record: LoopRecord, scale_s: float, stated: Pid) -> Look:
+def prepared_record(record: LoopRecord, scale_s: float, stated: Pid) -> PreparedRecord:
     """Prepare the recording of a loop that moves on a time scale [s]."""
     n, ti = len(record), stated.ti_s if stated.ki else 0.0
     reach = min(n / 20, max(REACH * max(ti, scale_s) / record.dt_s, LEAST_REACH))
     lengths = tuple(LONGER**k for k in range(12) if LONGER**k <= reach)
-    return Look(record, no_law(record, stated), lengths, stated.scan_s)
+    return PreparedRecord(record, no_law(record, stated), lengths, stated.scan_s)
 
 
 def slope_filters(dt_s: float, laws: Iterable[Pid]) -> tuple[float, ...]:
@@ -240,7 +240,7 @@ def slope_filters(dt_s: float, laws: Iterable[Pid]) -> tuple[float, ...]:
     return (*(float(1.0 / np.log1p(part)) for part in sorted(parts)), *SLOPE_FILTERS)
 
 
-def usual_ways(x: Look, shape: Shape, *laws: Pid, smoothing: bool = True) -> Iterator[Seen]:
+def usual_ways(x: PreparedRecord, shape: Shape, *laws: Pid, smoothing: bool = True) -> Iterator[Seen]:
     """The usual variants of laws on an error of that shape, simplest first; smoothing : also with filters of PV."""
     record, narrow = x.record, slope_filters(x.record.dt_s, laws)
     moves = float(np.ptp(record.sp)) > 0 and not record.sp_estimated
@@ -249,7 +249,7 @@ def usual_ways(x: Look, shape: Shape, *laws: Pid, smoothing: bool = True) -> Ite
     for smooth, (late_pv, late_sp) in product(filters, LATE if moves else LATE[:2]):
         pv, sp = delayed(first_order(record.pv, smooth), late_pv), delayed(record.sp, late_sp)
         for rows, weight in _slopes(x, sp, pv, narrow, moves, shape):
-            found = x.seen(rows, Way(shape, smooth, weight))
+            found = x.seen(rows, LawVariant(shape, smooth, weight))
             if found is not None:
                 yield found
 
@@ -260,7 +260,7 @@ def delayed(x: Floats, samples: int) -> Floats:
 
 
 def _slopes(
-    x: Look, sp: Floats, pv: Floats, narrow: Iterable[float], moves: bool, shape: Shape
+    x: PreparedRecord, sp: Floats, pv: Floats, narrow: Iterable[float], moves: bool, shape: Shape
 ) -> Iterator[tuple[Floats, float | None]]:
     """Rows for every slope filter and set point weight, and that weight; None for the rows with the effect of set
     point moves removed."""
@@ -274,7 +274,7 @@ def _slopes(
         yield np.vstack((x.rows(shaped(sp - pv, shape), slope), sp)), None
 
 
-def rough_ways(x: Look, shape: Shape) -> Iterator[Seen]:
+def rough_ways(x: PreparedRecord, shape: Shape) -> Iterator[Seen]:
     """Variants that ignore changes of PV from sample to sample: a derivative, or a filter, used other PV values
     between the samples."""
     record, pv = x.record, x.record.pv
@@ -284,12 +284,12 @@ def rough_ways(x: Look, shape: Shape) -> Iterator[Seen]:
     if float(np.ptp(record.sp)) > 0:
         rows.append(np.vstack((rows[0], record.sp)))
     for each, weight in zip(rows, (1.0, None), strict=False):
-        found = x.seen(each, Way(shape, sp_weight=weight))
+        found = x.seen(each, LawVariant(shape, sp_weight=weight))
         if found is not None:
             yield found
 
 
-def bent_shapes(x: Look, gains: Floats | None) -> Iterator[Shape]:
+def bent_shapes(x: PreparedRecord, gains: Floats | None) -> Iterator[Shape]:
     """Nonlinear error shapes that fit the record best: a squared one, and the best gaps for the least-squares law and
     for these gains, if any."""
     yield 0.0, 0.0, True
@@ -302,7 +302,7 @@ def bent_shapes(x: Look, gains: Floats | None) -> Iterator[Shape]:
             yield width, inside, False
 
 
-def _best_gap(x: Look, size: float, inside: float, gains: Floats | None) -> float:
+def _best_gap(x: PreparedRecord, size: float, inside: float, gains: Floats | None) -> float:
     """The gap with which the given gains, or the least-squares law, reproduce OP best [% PV]; 0 if none is better."""
 
     def poor(width: float) -> float:
@@ -320,7 +320,7 @@ def _best_gap(x: Look, size: float, inside: float, gains: Floats | None) -> floa
     return 0.5 * (low + high)
 
 
-def recognized(x: Look, stated: Pid, seen: Seen, way: Way) -> Pid:
+def recognized(x: PreparedRecord, stated: Pid, seen: Seen, way: LawVariant) -> Pid:
     """A stated controller completed by what the record shows: the properties `way` of the variant seen, which agrees
     with the stated gains, and the visible limits of OP and of its rate."""
     way = _clearer(x, seen, way, stated)
@@ -329,7 +329,7 @@ def recognized(x: Look, stated: Pid, seen: Seen, way: Way) -> Pid:
     return terms_of(x, stated, replace(seen, way=way))
 
 
-def terms_of(x: Look, c: Pid, seen: Seen) -> Pid:
+def terms_of(x: PreparedRecord, c: Pid, seen: Seen) -> Pid:
     """A controller with the terms of a variant, and with the visible limits of OP and of its rate."""
     record, way, c = x.record, seen.way, with_shape(c, seen.way.shape)
     if way.pv_filter >= SEEN_FILTER and not c.pv_filter_s:
@@ -345,7 +345,7 @@ def terms_of(x: Look, c: Pid, seen: Seen) -> Pid:
     return replace(c, op_lo=float(max([c.op_lo, *low[:1]])), op_hi=float(min([c.op_hi, *high[:1]])))
 
 
-def _set_point_weight(x: Look, seen: Seen, gains: Floats) -> float:
+def _set_point_weight(x: PreparedRecord, seen: Seen, gains: Floats) -> float:
     """The set point weight of the gain, from OP's moves with SP and within WITH_SP samples after it that the law with
     the full weight leaves [-]; 1 where other signals act on OP too."""
     if seen.rows.shape[0] != 6 or x.record.feed is not None or gains[0] == 0.0:
@@ -357,7 +357,7 @@ def _set_point_weight(x: Look, seen: Seen, gains: Floats) -> float:
     return float(np.clip(1.0 + with_sp / gains[0], 0.0, 1.0))
 
 
-def _clearer(x: Look, seen: Seen, way: Way, stated: Pid) -> Way:
+def _clearer(x: PreparedRecord, seen: Seen, way: LawVariant, stated: Pid) -> LawVariant:
     """The properties of the variant seen, or those with a filter of PV with which the stated gains
     reproduce OP clearly better. If little of OP is noise, gains agree with the record under any filter."""
     own = seen.poorness(gains_of(stated))
@@ -368,25 +368,25 @@ def _clearer(x: Look, seen: Seen, way: Way, stated: Pid) -> Way:
     return replace(way, pv_filter=best) if found.get(best, own) < own - PLAINLY_BETTER else way
 
 
-def with_best_filter(x: Look, way: Way, gains: Floats | None) -> Seen | None:
+def with_best_filter(x: PreparedRecord, way: LawVariant, gains: Floats | None) -> Seen | None:
     """A variant with the filter of PV, near its own, with which the gains, or the least-squares law, reproduce OP
     best."""
     return _filtered(x, way, _best_filter(x, way, gains))
 
 
-def _filtered(x: Look, way: Way, smooth: float) -> Seen | None:
+def _filtered(x: PreparedRecord, way: LawVariant, smooth: float) -> Seen | None:
     """A variant with another filter of PV [samples]."""
     error = x.record.sp - first_order(x.record.pv, smooth)
     return x.seen(x.rows(shaped(error, way.shape)), replace(way, pv_filter=smooth))
 
 
-def _poorness(x: Look, way: Way, gains: Floats | None, smooth: float) -> float:
+def _poorness(x: PreparedRecord, way: LawVariant, gains: Floats | None, smooth: float) -> float:
     """Misfit of the gains, or of the least-squares law, as Seen.poorness, behind another filter of PV [samples]."""
     seen = _filtered(x, way, smooth)
     return np.inf if seen is None else seen.poorness(seen.free if gains is None else gains)
 
 
-def _best_filter(x: Look, way: Way, gains: Floats | None) -> float:
+def _best_filter(x: PreparedRecord, way: LawVariant, gains: Floats | None) -> float:
     """The filter of PV, near that of a variant, with which the gains, or the least-squares law, reproduce OP best
     [samples]; the variant's own if there is a derivative, which also has a filter."""
     if gains is not None and gains[2]:

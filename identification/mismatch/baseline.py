@@ -52,7 +52,7 @@ def prepared(
     inputs: ModelInputs,
     y: Floats,
     usable: Mask,
-    brought: Floats | None = None,
+    user_model: Floats | None = None,
     clip: Clip | None = None,
     limits: ExplainLimits = LIMITS,
     experiment: bool = False,
@@ -60,13 +60,13 @@ def prepared(
     """A problem with robustly weighted outliers, and its baseline fit. An experiment is judged by simulation, with
     the memory of the most flexible model's residual, which is nearest to the noise.
 
-    Samples at a clip are left out; those after them count, and the model is clipped too. `brought` are the constants
-    of the user's own model, shape (SIZE,), an additional start.
+    Samples at a clip are left out; those after them count, and the model is clipped too. `user_model` are the
+    constants of the user's own model, shape (SIZE,), an additional start.
     """
     p = problem(inputs, y, usable, limits, NO_NOISE if experiment else None)
     if clip is not None:
         p = replace(p, weight=np.where(clip.where, 0.0, p.weight))
-    first = plain(p, brought, clip)
+    first = plain(p, user_model, clip)
     calm = replace(p, weight=robust_weights(first.e, p.weight > 0))
     fit = descended(calm, first.model, FULL_STEPS)
     if experiment:
@@ -75,9 +75,9 @@ def prepared(
     return calm, fit
 
 
-def plain(p: Problem, brought: Floats | None = None, clip: Clip | None = None) -> Fitted:
+def plain(p: Problem, user_model: Floats | None = None, clip: Clip | None = None) -> Fitted:
     """The baseline model at its optimum, from several starts."""
-    starts = [] if brought is None else [brought.copy()]
+    starts = [] if user_model is None else [user_model.copy()]
     for process in plain_processes(p):
         c = as_parameters(process)
         c[Slot.START] = p.y[0]

@@ -42,7 +42,7 @@ HARMONICS = (2, 3)
 
 
 @dataclass(frozen=True, slots=True)
-class Wave:
+class OscillationLines:
     """Spectral lines of a loop's error near one period.
 
     loop; period_s [s]; harmonic, 1 for a period of the loop's own, m for the m-th harmonic of one; own, whether the
@@ -121,7 +121,7 @@ def in_steps(x: Floats, first: int, few: int) -> tuple[int, Floats]:
 
 def _cut(
     s: Spectrum, power: Floats, loop: str, start_s: float, error: Floats, asked: tuple[float, int, bool]
-) -> Wave | None:
+) -> OscillationLines | None:
     """The lines near one period of a loop's error, None if the spectrum has too few.
 
     power : of all lines; asked : period [s], harmonic and whether the loop alone shows the oscillation.
@@ -134,7 +134,7 @@ def _cut(
         return None
     near = slice(math.floor(line / APART), math.ceil(line * APART) + 1)
     above = float(power[max(math.ceil(line / (2 * APART)), 1) :].sum())
-    return Wave(
+    return OscillationLines(
         loop,
         period_s,
         harmonic,
@@ -150,7 +150,9 @@ def _cut(
     )
 
 
-def waves_of(loop: str, found: Oscillations, end_s: float, limits: PlantLimits) -> tuple[Wave, ...]:
+def error_lines_of(
+    loop: str, found: Oscillations, end_s: float, limits: PlantLimits
+) -> tuple[OscillationLines, ...]:
     """The oscillations of a loop, the harmonics of the first, and weaker peaks of its spectrum.
 
     found : with spectrum and bands; end_s : end of the record [s since 1970-01-01 UTC]; the spectrum is of its last
@@ -176,10 +178,10 @@ def waves_of(loop: str, found: Oscillations, end_s: float, limits: PlantLimits) 
     return tuple(w for w in cut if w is not None)
 
 
-SCALARS = [f.name for f in fields(Wave) if f.name not in ("lines", "trend")]
+SCALARS = [f.name for f in fields(OscillationLines) if f.name not in ("lines", "trend")]
 
 
-def waves_table(waves: Sequence[Wave]) -> pa.Table:
+def waves_table(waves: Sequence[OscillationLines]) -> pa.Table:
     """One row per oscillation."""
     columns = {name: [getattr(w, name) for w in waves] for name in SCALARS}
     real = [w.lines.real.astype(np.float32) for w in waves]
@@ -207,7 +209,7 @@ class Laid:
         return self[:] if dtype is None else self[:].astype(dtype)
 
 
-def waves_in(tables: Iterable[pa.Table], file: BinaryIO | None = None) -> list[Wave]:
+def waves_in(tables: Iterable[pa.Table], file: BinaryIO | None = None) -> list[OscillationLines]:
     """The oscillations of some tables; with a file their lines and trends stay in it, to save memory."""
     found = []
     for table in tables:
@@ -216,11 +218,11 @@ def waves_in(tables: Iterable[pa.Table], file: BinaryIO | None = None) -> list[W
         for scalars, x, y, t in zip(known, real, imag, trend, strict=True):
             held: list[Any] = [x + 1j * y, t]
             laid: list[Any] = held if file is None else [Laid(part, file) for part in held]
-            found.append(Wave(**scalars, lines=laid[0], trend=laid[1]))
+            found.append(OscillationLines(**scalars, lines=laid[0], trend=laid[1]))
     return found
 
 
-def on_one_clock(waves: Sequence[Wave]) -> list[Wave]:
+def on_one_clock(waves: Sequence[OscillationLines]) -> list[OscillationLines]:
     """The comparable oscillations, all over the span of most of them."""
     if not waves:
         return []
@@ -230,7 +232,7 @@ def on_one_clock(waves: Sequence[Wave]) -> list[Wave]:
     return [w for w in moved if w is not None]
 
 
-def _on_span(wave: Wave, span: tuple[float, float]) -> Wave | None:
+def _on_span(wave: OscillationLines, span: tuple[float, float]) -> OscillationLines | None:
     """The lines of an oscillation over another span, start and duration [s]; None if its record covers too little of
     it."""
     start, length = span

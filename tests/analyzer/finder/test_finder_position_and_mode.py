@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import lfilter
 
-from analyzer.finder.beside import may_be_mode, modes, positions
 from analyzer.finder.clock import Sampled
 from analyzer.finder.draft import by_data
+from analyzer.finder.position_and_mode import may_be_mode, modes, positions
 from tests.analyzer.finder.test_finder_pairs import pi_loop, unrelated_tags
 
 

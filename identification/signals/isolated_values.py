@@ -7,7 +7,7 @@ import numpy as np
 from identification.record import Floats, Mask
 
 
-def lone_values(x: Floats, usable: Mask, factor: float, least: float) -> Mask:
+def isolated_values(x: Floats, usable: Mask, factor: float, least: float) -> Mask:
     """True where a single value differs from both neighbours, in one direction, by so many usual changes and by a
     share `least` of the range of all others, while the neighbours are near each other; shape (n,)."""
     out = np.zeros(x.size, dtype=bool)

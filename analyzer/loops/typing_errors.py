@@ -28,7 +28,7 @@ def _readings(spec: LoopSpec) -> Iterator[tuple[dict[str, str], LoopSpec]]:
             yield changed, replace(spec, ti_unit=other[0], gain_unit=other[1], form=Form(other[2]))
 
 
-def slip(spec: LoopSpec, found: Pid, pv_span: float | None) -> dict[str, str]:
+def typing_error(spec: LoopSpec, found: Pid, pv_span: float | None) -> dict[str, str]:
     """The columns and new values with which the stated figures agree with the identified settings; empty for none.
 
     found : in percent and seconds; pv_span : in the PV's own unit.

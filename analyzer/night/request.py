@@ -21,7 +21,7 @@ ALWAYS: Span = (-math.inf, math.inf)
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class ExportRequest:
     """Files, loops.csv, changes of settings, span of time [s since 1970-01-01 UTC] and limits.
 
     zone : the plant's time zone, of nights, pages and options; reading : format options of text exports, as in
@@ -47,7 +47,7 @@ def asked_of(
     until: datetime | None = None,
     finding: bool = False,
     **reading: Any,
-) -> Asked:
+) -> ExportRequest:
     """The request of a command line or a notebook; times without a stated zone are on the plant's clock."""
     zone = str(zone_of(reading.get("timezone")))
     reading["good_quality"] = tuple(reading.get("good_quality") or ()) or None
@@ -57,4 +57,4 @@ def asked_of(
     last = last if until is None else utc_seconds(until, zone)
     if last <= first:
         raise InputError(f"--since {since} --until {until}", "an end after the start", "swap them")
-    return Asked(tuple(export), loops, dated, (first, last), config, zone, reading, finding)
+    return ExportRequest(tuple(export), loops, dated, (first, last), config, zone, reading, finding)

@@ -46,7 +46,7 @@ def _usual_range(x: Floats, length: int) -> float:
     return float(np.median(np.ptp(x[: rows * length].reshape(rows, length), axis=1)))
 
 
-def turns_of(op: Floats, period: float) -> np.ndarray:
+def op_reversals(op: Floats, period: float) -> np.ndarray:
     """Samples of OP reversals, shape (t,), in a cycle of a period [samples]; op of shape (n,)."""
     half = max(int(period / (2 * SMOOTHED)), 1)
     kernel = np.full(2 * half + 1, 1.0 / (2 * half + 1))
@@ -55,7 +55,7 @@ def turns_of(op: Floats, period: float) -> np.ndarray:
 
 
 @dataclass(frozen=True, slots=True)
-class Half:
+class HalfCycle:
     """One half-cycle after an OP reversal.
 
     start_s : time of the reversal, from the record's start [s]; op, pv, late : OP, PV, and PV delayed by the dead
@@ -90,7 +90,7 @@ def halves(
     period_s: float,
     marks: StemMarks,
     most: int,
-) -> tuple[Half, ...]:
+) -> tuple[HalfCycle, ...]:
     """The last half-cycles of a record without bad samples.
 
     op, pv : shape (n,) [% of OP, % of span]; good : bool, shape (n,), True where samples may be used; turns : shape
@@ -98,7 +98,7 @@ def halves(
     of half-cycles. Oldest first; empty with fewer than two OP reversals.
     """
     step = max(0.5 * period_s / POINTS, dt_s)
-    found: list[Half] = []
+    found: list[HalfCycle] = []
     clock = np.arange(op.size)
     for first, last in reversed(list(pairwise(turns))):
         if len(found) == most:
@@ -108,7 +108,7 @@ def halves(
         at = np.arange(first, min(last, first + LONGEST * 0.5 * period_s / dt_s) + 1e-9, step / dt_s)
         o, p = np.interp(at, clock, op), np.interp(at, clock, pv)
         later = np.interp(at + marks.dead_s / dt_s, clock, pv)
-        found.append(Half(float(first) * dt_s, step, o, p, later, _stuck(o, step, marks)))
+        found.append(HalfCycle(float(first) * dt_s, step, o, p, later, _stuck(o, step, marks)))
     return tuple(reversed(found))
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from analyzer.finder.bag import Bag, Cause
 from analyzer.finder.held import CERTAIN, LEAST_MOVES, at_no_limit, limited, slower
 from analyzer.finder.law import TINY, Matrix, Moves, blocks, direction, fitted, innovations
 from analyzer.finder.scores import Scores
+from analyzer.finder.tag_set import Cause, TagSet
 
 RESOLVED = 0.7
 """Correlation of neighbouring averages from which their order shows cause and effect: proofs/finder.md."""
@@ -28,13 +28,13 @@ STEPS = 0.1
 proofs/finder.md."""
 
 
-def freer(pv: Matrix, op: Matrix, still: bool) -> float:
+def output_evidence(pv: Matrix, op: Matrix, still: bool) -> float:
     """How much more OP moves like an output than PV: it rests at its limits and, with constant SP, drifts."""
     drift = np.clip(slower(pv, op) * DRIFT, -DRIFT_CERTAIN, DRIFT_CERTAIN) * still
     return float(drift + AT_LIMITS * (float(limited(op)) - float(limited(pv))))
 
 
-def towards(held: Matrix, scores: Scores, c: int, j: int) -> float:
+def direction_evidence(held: Matrix, scores: Scores, c: int, j: int) -> float:
     """Evidence for the law from PV to OP, the columns of `held`, over the reverse: at the width with the strongest
     evidence among those with similar neighbouring averages, because an undersampled cycle is no evidence."""
     found = [0.0]
@@ -61,7 +61,7 @@ def resolved(held: Matrix, width: int) -> bool:
     return bool(((x[1:] * x[:-1]).sum(axis=0) >= RESOLVED * (x**2).sum(axis=0)).all())
 
 
-def pv_and_sp(bag: Bag, scores: Scores, cause: Cause, op: int) -> tuple[int, int]:
+def pv_and_sp(bag: TagSet, scores: Scores, cause: Cause, op: int) -> tuple[int, int]:
     """Which of two tags that follow each other is PV, and which SP: SP is duplicated by another tag in its own scale
     (a master's output, a leader's PV), or rarely moves; otherwise it is the one that does not follow OP later."""
     pv, sp = cause
@@ -79,9 +79,9 @@ def pv_and_sp(bag: Bag, scores: Scores, cause: Cause, op: int) -> tuple[int, int
     return (sp, pv) if swap else (pv, sp)
 
 
-def _held_elsewhere(bag: Bag, scores: Scores, tag: int, own: Cause) -> bool:
+def _held_elsewhere(bag: TagSet, scores: Scores, tag: int, own: Cause) -> bool:
     """Whether a tag's innovations are those of another tag outside its `own` loop."""
-    if bag.twice(tag) or tag not in bag.live:
-        return bag.twice(tag)
+    if bag.is_duplicate(tag) or tag not in bag.live:
+        return bag.is_duplicate(tag)
     others = np.flatnonzero(~np.isin(bag.live, own))
     return bool(scores.noise[0, bag.live.index(tag), others].max(initial=0.0) > COPIED)

@@ -21,8 +21,8 @@ from identification.estimation.problem import Problem
 from identification.estimation.search import Dynamics
 from identification.estimation.smooth_load import SmoothFit, as_fit, fit_line, innovations_of, with_harmonics
 from identification.record import Floats
+from identification.signals.reversals import op_reversals
 from identification.signals.robust import clipped_gain
-from identification.signals.turns import turns_of
 from identification.simulation.valve import IDEAL, StemLaw, sticking
 
 SHARES = np.geomspace(0.08, 0.95, 12)
@@ -34,13 +34,13 @@ CLOSE = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class BesideLine:
-    """The joint model: the fit of its process and backlash, `worn`, and the likeliest with an ideal valve, `sound`,
+class BacklashUnderLine:
+    """The joint model: the fit of its process and backlash, `worn`, and the likeliest with an ideal valve, `ideal`,
     and the gain in log likelihood of the first in each half-cycle [nat], shape (t,), outliers limited."""
 
     play: Fitted
     worn: SmoothFit
-    sound: SmoothFit
+    ideal: SmoothFit
     gained: Floats
 
     @property
@@ -55,27 +55,29 @@ class BesideLine:
 
 
 def beside_line(
-    window: Problem, begins: Sequence[Dynamics], valves: Sequence[StemLaw], period_s: float
-) -> BesideLine:
+    problem: Problem, begins: Sequence[Dynamics], valves: Sequence[StemLaw], period_s: float
+) -> BacklashUnderLine:
     """Backlash under a load with a line of a period [s].
 
     begins : time constants and dead times [s], and valves : backlash or stick-slip, at which the search begins.
     """
-    lined = fit_line(window, period_s, (), begins)
-    laws = [sticking(float(w), 0.0) for w in SHARES * window.reach] + [x for x in valves if x.stickband > 0.0]
-    scanned = [fit_line(window, period_s, (lined,), begins, law) for law in laws]
+    lined = fit_line(problem, period_s, (), begins)
+    laws = [sticking(float(w), 0.0) for w in SHARES * problem.reach] + [
+        x for x in valves if x.stickband > 0.0
+    ]
+    scanned = [fit_line(problem, period_s, (lined,), begins, law) for law in laws]
     first = max(scanned, key=_likelihood)
-    worn = with_width(first, window, period_s)
-    sound = _sound(window, worn, lined, period_s)
-    return BesideLine(as_fit(worn, window), worn, sound, _gained(worn, sound, window, period_s))
+    worn = with_width(first, problem, period_s)
+    ideal = _ideal(problem, worn, lined, period_s)
+    return BacklashUnderLine(as_fit(worn, problem), worn, ideal, _gained(worn, ideal, problem, period_s))
 
 
-def with_width(near: SmoothFit, window: Problem, period_s: float) -> SmoothFit:
-    """The fit behind backlash, or stick-slip of the same shape, with its width refined in a window."""
+def with_width(near: SmoothFit, problem: Problem, period_s: float) -> SmoothFit:
+    """The fit behind backlash, or stick-slip of the same shape, with its width refined in a problem."""
     jump_share, at = near.law.slip_jump / near.law.stickband, math.log(near.law.stickband)
 
     def behind(log_width: float) -> SmoothFit:
-        return fit_line(window, period_s, (near,), (), sticking(math.exp(log_width), jump_share))
+        return fit_line(problem, period_s, (near,), (), sticking(math.exp(log_width), jump_share))
 
     best = minimize_scalar(
         lambda x: -behind(x).log_likelihood,
@@ -86,27 +88,27 @@ def with_width(near: SmoothFit, window: Problem, period_s: float) -> SmoothFit:
     return max((near, behind(float(best.x))), key=_likelihood)
 
 
-def in_window(found: BesideLine, window: Problem, period_s: float) -> SmoothFit:
-    """The joint model behind a faulty valve, fitted again in another window, with its width refined."""
+def in_window(found: BacklashUnderLine, problem: Problem, period_s: float) -> SmoothFit:
+    """The joint model behind a faulty valve, fitted again in another problem, with its width refined."""
     process = found.worn.process
-    begins = [(process.time_constant_s, max(process.dead_time_s - window.half_block_s, 0.0))]
-    return with_width(fit_line(window, period_s, (), begins, found.worn.law), window, period_s)
+    begins = [(process.time_constant_s, max(process.dead_time_s - problem.half_block_s, 0.0))]
+    return with_width(fit_line(problem, period_s, (), begins, found.worn.law), problem, period_s)
 
 
 def _likelihood(fit: SmoothFit) -> float:
     return fit.log_likelihood
 
 
-def _sound(window: Problem, worn: SmoothFit, near: SmoothFit, period_s: float) -> SmoothFit:
+def _ideal(problem: Problem, worn: SmoothFit, near: SmoothFit, period_s: float) -> SmoothFit:
     """The likeliest fit with an ideal valve, whose load may have harmonics."""
-    lined = fit_line(window, period_s, (near, worn), (), IDEAL)
-    return max((lined, with_harmonics(lined, window, period_s)), key=_likelihood)
+    lined = fit_line(problem, period_s, (near, worn), (), IDEAL)
+    return max((lined, with_harmonics(lined, problem, period_s)), key=_likelihood)
 
 
-def _gained(worn: SmoothFit, sound: SmoothFit, window: Problem, period_s: float) -> Floats:
+def _gained(worn: SmoothFit, ideal: SmoothFit, problem: Problem, period_s: float) -> Floats:
     """Gain in log likelihood of the first in each half-cycle of OP [nat], outliers limited."""
-    at, mine = innovations_of(worn, window, period_s)
-    gained: Floats = np.zeros(window.y.size)
-    gained[at] = clipped_gain(mine, innovations_of(sound, window, period_s)[1])
-    turns = turns_of(window.inputs.op, period_s / window.dt_s)
+    at, mine = innovations_of(worn, problem, period_s)
+    gained: Floats = np.zeros(problem.y.size)
+    gained[at] = clipped_gain(mine, innovations_of(ideal, problem, period_s)[1])
+    turns = op_reversals(problem.inputs.op, period_s / problem.dt_s)
     return np.asarray(np.add.reduceat(gained, turns)[:-1]) if turns.size > 1 else gained.sum(keepdims=True)

@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 from benchmarks.world.draw import wander
 from benchmarks.world.simulate import BACKLASH, Controller, Process, Valve, simulate
-from identification.estimation.beside_line import BesideLine, beside_line
+from identification.estimation.backlash_under_line import BacklashUnderLine, beside_line
 from identification.estimation.problem import block_means, in_blocks
 from identification.estimation.smooth_load import _line, _whitened
 from identification.record import Floats
@@ -35,11 +35,11 @@ def _trends(
     return t.pv, t.op
 
 
-def _found(trends: tuple[Floats, Floats]) -> BesideLine:
+def _found(trends: tuple[Floats, Floats]) -> BacklashUnderLine:
     pv, op = trends
     y = block_means(pv, BLOCK)
-    window = in_blocks(y, np.ascontiguousarray(op), np.ones(y.size, dtype=bool), 1.0 * BLOCK, BLOCK)
-    return beside_line(window, STARTS, (), PERIOD_S)
+    problem = in_blocks(y, np.ascontiguousarray(op), np.ones(y.size, dtype=bool), 1.0 * BLOCK, BLOCK)
+    return beside_line(problem, STARTS, (), PERIOD_S)
 
 
 def test_backlash_under_a_sine_is_found_with_its_width():

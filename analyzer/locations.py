@@ -69,11 +69,11 @@ def place(text: str) -> Path:
     except (ImportError, ValueError) as error:
         seen = f"{text}: this kind of storage is not supported"
         raise InputError(seen, "the extra 'remote'", NEEDED) from error
-    be_patient(cast(Path, found))
+    enable_retries(cast(Path, found))
     return cast(Path, found)
 
 
-def be_patient(path: Path) -> None:
+def enable_retries(path: Path) -> None:
     """Let this process repeat requests to shared storage, with growing delays, if it fails temporarily; no effect for
     a local path. A worker calls this before it reads or writes."""
     if not is_remote(path) or cast(Any, path).protocol not in ("s3", "s3a"):
@@ -182,7 +182,7 @@ def is_whole(path: Path) -> bool:
         return False
 
 
-def at_hand(paths: Sequence[Path], into: Path) -> tuple[list[Path], dict[Path, str]]:
+def local_copies(paths: Sequence[Path], into: Path) -> tuple[list[Path], dict[Path, str]]:
     """Local paths, and the URL from which each file among them was copied into a directory, each with its own name.
     Raises InputError if there is nothing at a URL."""
     found: list[Path] = []
@@ -194,7 +194,7 @@ def at_hand(paths: Sequence[Path], into: Path) -> tuple[list[Path], dict[Path, s
         folder = into / f"fetched-{secrets.token_hex(8)}"
         copied = folder / (path.name or "export")
         found.append(copied)
-        with answering(path):
+        with refusals_as_errors(path):
             for url, local in _files(path, copied):
                 _copy(url, local)
                 origins[local] = str(url)
@@ -202,7 +202,7 @@ def at_hand(paths: Sequence[Path], into: Path) -> tuple[list[Path], dict[Path, s
 
 
 @contextmanager
-def answering(url: Path) -> Iterator[None]:
+def refusals_as_errors(url: Path) -> Iterator[None]:
     """Convert a refusal of shared storage to one line with the URL. Raises InputError if it refuses, or no server
     responds."""
     try:
@@ -256,7 +256,7 @@ def _state(url: Any) -> tuple[object, ...]:
     )
 
 
-def bring(path: Path, origins: Mapping[Path, str]) -> None:
+def fetch_missing(path: Path, origins: Mapping[Path, str]) -> None:
     """Copy a file missing on this machine: a worker of a cluster has none of the copies made elsewhere."""
     if path in origins and not path.exists():
         made = path.parent
