@@ -28,7 +28,7 @@ from analyzer.loop.advice import tune as of_settings
 from analyzer.loop.advice.advise import withheld
 from analyzer.night.nights import Plant, PlantLoop
 from analyzer.night.opened import opened
-from analyzer.night.request import asked_of
+from analyzer.night.request import export_request
 from analyzer.store.store import Store
 from identification.errors import InputError, NotAssessedError
 from identification.models import Estimate, Loop, Pid, Process, Valve
@@ -80,8 +80,8 @@ def read(
     """
     paths = [Path(p) for p in ([export] if isinstance(export, str | Path) else export)]
     stated, dated = (None if path is None else Path(path) for path in (loops, changes))
-    asked = asked_of(paths, stated, dated, config or Config(), None, None, **reading)
-    return opened(asked)
+    request = export_request(paths, stated, dated, config or Config(), None, None, **reading)
+    return opened(request)
 
 
 def assess(loop: PlantLoop) -> of_night.Assessment:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from analyzer.commands import explain, loops, options, report, run, store, test_plan
-from analyzer.commands.options import say
+from analyzer.commands.options import print_visible
 from analyzer.loop.decisions import Lane
 from reports.texts import visible
 
@@ -41,7 +41,7 @@ def main() -> None:
 @main.command()
 @options.finding
 @options.export_options
-def check(asked: ExportRequest) -> None:
+def check(request: ExportRequest) -> None:
     """Check an export: loops, tags, gaps, quality, and the analyses that the data allow.
 
     Example: triage check export.csv --loops loops.csv
@@ -49,7 +49,7 @@ def check(asked: ExportRequest) -> None:
     from analyzer.night.check import check_lines
 
     lost = 0
-    for line, bad in check_lines(asked):
+    for line, bad in check_lines(request):
         lost += bad
         click.echo(visible(line))  # one line, also if a tag contains control characters
     sys.exit(options.EXIT_SOME_FAILED if lost else 0)
@@ -97,7 +97,7 @@ def rank(
     shown = [r for r in rows if r["loop"] not in hidden][:top]
     click.echo(rendered(shown, form, name, wide, by["lane"]))
     if hidden:
-        say(f"hidden by their notes (--all shows them): {', '.join(hidden)}", err=True)
+        print_visible(f"hidden by their notes (--all shows them): {', '.join(hidden)}", err=True)
 
 
 @main.command()
@@ -106,7 +106,7 @@ def rank(
 @options.DECIDED
 @options.formats("text", "json")
 @click.option("--out", type=options.FOLDER, help="Directory for pictures, and a page to simulate settings.")
-def tune(asked: ExportRequest, tag: str, store: Path | None, form: str, out: Path | None) -> None:
+def tune(request: ExportRequest, tag: str, store: Path | None, form: str, out: Path | None) -> None:
     """One loop: the night's decision, model, predicted limit cycle, new Kp and Ti, forecast, travel map.
 
     Example: triage tune export.parquet --loops loops.csv --loop LIC2107 --store store --out pictures
@@ -115,15 +115,15 @@ def tune(asked: ExportRequest, tag: str, store: Path | None, form: str, out: Pat
     from analyzer.night.opened import guarded
     from reports.plain import json_ready
 
-    one = guarded(asked).last_night(tag)
-    told = proposal(one, options.decision(one, store), out is not None)
+    one = guarded(request).last_night(tag)
+    tuning = proposal(one, options.decision(one, store), out is not None)
     if form == "json":
-        click.echo(json.dumps(json_ready(told.as_data())))
+        click.echo(json.dumps(json_ready(tuning.as_data())))
     else:
-        say("\n".join(told.lines))
+        print_visible("\n".join(tuning.lines))
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
-        for name, picture in told.pictures.items():
+        for name, picture in tuning.pictures.items():
             (out / name).write_bytes(picture)
             click.echo(f"written: {out / name}", err=form == "json")
 

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 from analyzer.cli import main as triage
 from analyzer.explain.text import answer_lines
-from analyzer.explain.words import TOLD, held_out
+from analyzer.explain.words import TEXTS, held_out
 from analyzer.loop.decisions import Due
 from analyzer.pages.night import pages_of_night
 from analyzer.store.store import Store
@@ -81,7 +81,7 @@ def of_explain(export: tuple[str, ...], row: dict[str, Any], store: str) -> Iter
     if "night" in found:
         yield from parted(row, found["night"], "explain")
     named = {VALVE_EFFECTS[e["name"]] for e in found["effects"] if e["name"] in VALVE_EFFECTS}
-    stated_so = TOLD["beside_verdict"]["calm_valve"] in " ".join(answer_lines(found))
+    stated_so = TEXTS["beside_verdict"]["calm_valve"] in " ".join(answer_lines(found))
     if (
         row["valve_fault"] in ("none", "backlash", "stiction")
         and named - {row["valve_fault"]}

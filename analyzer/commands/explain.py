@@ -21,7 +21,7 @@ from analyzer.commands.options import (
     export_options,
     formats,
     of_loop,
-    say,
+    print_visible,
     trying,
 )
 from analyzer.loop.decisions import decided_fault
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     help="Folder for the page and Markdown's pictures. Default: HTML for a terminal goes here.",
 )
 def explain(
-    asked: ExportRequest,
+    request: ExportRequest,
     tag: str,
     store: Path | None,
     model: Path | None,
@@ -65,7 +65,7 @@ def explain(
 
     Example: triage explain export.parquet --loops loops.csv --loop FIC101
     """
-    from analyzer.explain.case import asked_cases
+    from analyzer.explain.case import requested_cases
     from analyzer.explain.explained import abstained, explained, with_night
     from analyzer.explain.models import read_model
     from analyzer.explain.page import abstention, explanation_page
@@ -73,12 +73,12 @@ def explain(
 
     decision = None
     try:
-        with trying() as tell:
+        with trying() as report:
             user_model = read_model(model, tag) if model is not None else None
-            plant = guarded(asked)
+            plant = guarded(request)
             decision = decision_of(plant, tag, store)
-            case, others = asked_cases(asked, plant, tag, held_out, decided_fault(decision))
-            found = explained(case, tell, user_model, others)
+            case, others = requested_cases(request, plant, tag, held_out, decided_fault(decision))
+            found = explained(case, report, user_model, others)
     except NotAssessedError as error:
         data = with_night(abstained(tag, str(error)), decision)
         _show(data, lambda: abstention(data), form, out)
@@ -87,7 +87,7 @@ def explain(
     found = replace(found, data=with_night(found.data, decision))
     if save_model is not None:
         save_model.write_text(json.dumps(found.model(), indent=1))
-    _show(found.data, lambda: explanation_page(found, asked.zone), form, out)
+    _show(found.data, lambda: explanation_page(found, request.zone), form, out)
 
 
 def _show(data: dict[str, Any], page: Callable[[], Page], form: str, out: Path | None) -> None:
@@ -97,7 +97,7 @@ def _show(data: dict[str, Any], page: Callable[[], Page], form: str, out: Path |
     elif form == "text":
         from analyzer.explain.text import answer_lines
 
-        say("\n".join(answer_lines(data)))
+        print_visible("\n".join(answer_lines(data)))
     else:
         from analyzer.pages.rank import interactive
         from reports import folder, html, markdown
@@ -121,7 +121,7 @@ def _show(data: dict[str, Any], page: Callable[[], Page], form: str, out: Path |
 @click.option(
     "--closed-loop", is_flag=True, help="Run the stated controller from SP instead of the recorded OP."
 )
-def simulate(model: Path, asked: ExportRequest, tag: str, out: Path, closed_loop: bool) -> None:
+def simulate(model: Path, request: ExportRequest, tag: str, out: Path, closed_loop: bool) -> None:
     """Simulate a saved model on another recording of its loop; only a constant bias is fitted.
 
     Example: triage simulate model.json week2.parquet --loops loops.csv --loop FIC101 --out week2-sim.parquet
@@ -131,7 +131,7 @@ def simulate(model: Path, asked: ExportRequest, tag: str, out: Path, closed_loop
     from analyzer.explain.case import whole
     from analyzer.explain.models import read_model, simulated
 
-    case, raw = whole(asked, tag)
+    case, raw = whole(request, tag)
     pv, op = simulated(case, read_model(model, tag), raw.stamp_s, closed_loop)
     stamp = pd.to_datetime((raw.stamp_s * 1e6).round().astype("int64"), unit="us")
     pd.DataFrame({"timestamp": stamp, "PV": pv, "OP": op}).to_parquet(out, index=False)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from analyzer.commands.options import bar, export_options, say
+from analyzer.commands.options import bar, export_options, print_visible
 
 if TYPE_CHECKING:
     from analyzer.night.request import ExportRequest
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     type=click.Path(dir_okay=False, path_type=Path),
     help="File that the draft is written to. Default: stdout.",
 )
-def loops(asked: ExportRequest, out: Path | None) -> None:
+def loops(request: ExportRequest, out: Path | None) -> None:
     """Write a draft of loops.csv: the loops of an export, found by their tags' names and by the data.
 
     Loops stated with --loops are kept. A loop with low confidence is written after a #, with the evidence for it.
@@ -32,7 +32,7 @@ def loops(asked: ExportRequest, out: Path | None) -> None:
     from reports.whole_file import whole_file
 
     with bar("tags") as progress:
-        rows = drafted(asked, progress)
+        rows = drafted(request, progress)
     text = as_csv(rows)
     if out is None:
         click.echo(text, nl=False)
@@ -44,4 +44,4 @@ def loops(asked: ExportRequest, out: Path | None) -> None:
         f"{n} {by}" for by in ("stated", "names", "data") if (n := sum(r.found_by == by for r in sure))
     )
     more = f"; {len(rows) - len(sure)} less sure, behind #" if len(rows) > len(sure) else ""
-    say(f"{len(sure)} loops ({kinds or 'none'}){more}{f', in {out}' if out else ''}", err=True)
+    print_visible(f"{len(sure)} loops ({kinds or 'none'}){more}{f', in {out}' if out else ''}", err=True)

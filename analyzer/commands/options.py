@@ -35,7 +35,7 @@ Command = Callable[..., Any]
 EXIT_SOME_FAILED, EXIT_NOTHING_DONE, EXIT_TRY_LATER = 1, 2, 75
 """Exit status if some loops failed, if nothing could be done, and if a run ended because shared storage
 failed. After the last one the same command may succeed later (EX_TEMPFAIL of sysexits)."""
-MOST_SAID = 600
+MOST_CHARACTERS = 600
 """Maximum characters of an error line."""
 
 
@@ -80,8 +80,8 @@ def what_went_wrong(error: Exception) -> str | None:
         )
         return f"{one_line(what_failed(error))}; {remedy}"
     if refused(error):
-        said = one_line(f"{type(error).__name__}: {error}")
-        return f"{said}; check URL, endpoint and credentials of the storage"
+        message = one_line(f"{type(error).__name__}: {error}")
+        return f"{message}; check URL, endpoint and credentials of the storage"
     return None
 
 
@@ -89,8 +89,8 @@ def unforeseen(error: Exception) -> str:
     """An error of the program itself as one line: what, where, and what to do."""
     at = traceback.extract_tb(error.__traceback__)[-1]
     where = f"{Path(at.filename).name}, line {at.lineno}"
-    said = one_line(f"{type(error).__name__}: {error}")
-    return f"an error of the program ({said}; {where}); report it; 'python -X dev' shows all of it"
+    message = one_line(f"{type(error).__name__}: {error}")
+    return f"an error of the program ({message}; {where}); report it; 'python -X dev' shows all of it"
 
 
 def what_failed(error: OSError) -> str:
@@ -101,12 +101,12 @@ def what_failed(error: OSError) -> str:
 def one_line(text: str) -> str:
     """A message as one line of printable characters, with its middle left out if it is very long."""
     shown = " ".join(visible(text).split())
-    if len(shown) <= MOST_SAID:
+    if len(shown) <= MOST_CHARACTERS:
         return shown
-    return f"{shown[: MOST_SAID // 2]} ... {shown[-MOST_SAID // 2 :]}"
+    return f"{shown[: MOST_CHARACTERS // 2]} ... {shown[-MOST_CHARACTERS // 2 :]}"
 
 
-def say(text: str, err: bool = False) -> None:
+def print_visible(text: str, err: bool = False) -> None:
     """Print a text that may contain a plant's names, without control characters for the terminal."""
     click.echo(visible_lines(text), err=err)
 
@@ -180,8 +180,8 @@ TIMES = ("%Y-%m-%d", *(f"%Y-%m-%d{between}%H:%M{end}" for between in "T " for en
 
 def finding(command: Command) -> Command:
     """--find-loops, for commands that take their loops from the export without a loops.csv."""
-    said = "Without --loops: search the data for loops that the tags' names do not show."
-    return click.option("--find-loops", "finding", is_flag=True, help=said)(command)
+    text = "Without --loops: search the data for loops that the tags' names do not show."
+    return click.option("--find-loops", "finding", is_flag=True, help=text)(command)
 
 
 def of_loop(text: str) -> Callable[[Command], Command]:
@@ -231,7 +231,7 @@ KINDS: dict[str, dict[str, Any]] = {
 
 
 def export_options(command: Command) -> Command:
-    """EXPORT... and the options of every command that reads one, passed as one `asked`."""
+    """EXPORT... and the options of every command that reads one, passed as one `request`."""
     names = [name.split("/")[0].lstrip("-").replace("-", "_") for name in READING]
 
     @wraps(command)
@@ -239,18 +239,20 @@ def export_options(command: Command) -> Command:
         export: tuple[Path, ...], loops: Path | None, changes: Path | None, config: Path | None, **given: Any
     ) -> Any:
         from analyzer.config import read_config
-        from analyzer.night.request import asked_of
+        from analyzer.night.request import export_request
 
         reading = {name: given.pop(name) for name in ("since", "until", *names)}
         reading["finding"] = given.pop("finding", False)
-        return command(asked=asked_of(export, loops, changes, read_config(config), **reading), **given)
+        return command(
+            request=export_request(export, loops, changes, read_config(config), **reading), **given
+        )
 
     reads = [click.option(name, help=text, **KINDS.get(name, {})) for name, text in READING.items()]
     options: list[Any] = [*SPAN, *reads]
     return reduce(lambda found, option: option(found), reversed(options), collected)
 
 
-def age_told(night: str, zone: str) -> str:
+def age_note(night: str, zone: str) -> str:
     """Age of a night, in a sentence; '' if it is recent."""
     from datetime import date
 
@@ -293,21 +295,21 @@ STILL_S = 60.0
 
 def _tenths(what: str) -> Report:
     """A line on stderr at the start, at every tenth, if the first result takes long, and once a minute."""
-    said, begun = set[int](), time.monotonic()
-    said_s = begun
+    reported, begun = set[int](), time.monotonic()
+    reported_s = begun
 
     def report(done: int, total: int) -> None:
-        nonlocal said_s
+        nonlocal reported_s
         now, tenth = time.monotonic(), 10 * done // max(total, 1)
-        compiling = done == 0 and now - begun > COMPILING_S and -1 not in said
+        compiling = done == 0 and now - begun > COMPILING_S and -1 not in reported
         new = -1 if compiling else tenth
-        if new in said and now - said_s < STILL_S:
+        if new in reported and now - reported_s < STILL_S:
             return
-        after = f" after {now - begun:.0f} s" if new in said else ""
+        after = f" after {now - begun:.0f} s" if new in reported else ""
         far = "the first run after an installation compiles for minutes"
         click.echo(f"{what}: {far if compiling else f'{done} of {total}{after}'}", err=True)
-        said.add(new)
-        said_s = now
+        reported.add(new)
+        reported_s = now
 
     return report
 
@@ -340,19 +342,19 @@ def _to_stdout(line: str) -> None:
 def trying() -> Iterator[Callable[[str], None]]:
     """A callable that receives the name of each attempt."""
     watched, begun = sys.stderr.isatty(), time.monotonic()
-    said_s = begun
+    shown_s = begun
     if not watched:
         click.echo("explain: reading the export, fitting the baseline model", err=True)
 
-    def tell(name: str) -> None:
-        nonlocal said_s
+    def show(name: str) -> None:
+        nonlocal shown_s
         if watched:
             click.echo(f"\r\033[K{f'trying {name}' if name else ''}", nl=False, err=True)
-        elif name and time.monotonic() - said_s >= QUIET_S:
-            said_s = time.monotonic()
-            click.echo(f"explain: {said_s - begun:.0f} s, trying {name}", err=True)
+        elif name and time.monotonic() - shown_s >= QUIET_S:
+            shown_s = time.monotonic()
+            click.echo(f"explain: {shown_s - begun:.0f} s, trying {name}", err=True)
 
     try:
-        yield tell
+        yield show
     finally:
-        tell("")
+        show("")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from analyzer.commands import options
-from analyzer.commands.options import EXIT_SOME_FAILED, FILE, FOLDER, Command, opened_store, say
+from analyzer.commands.options import EXIT_SOME_FAILED, FILE, FOLDER, Command, opened_store, print_visible
 from identification.errors import InputError
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def report(
     page = changes_page(found, missing, subtitle, named["find"], zone)
     write(kept, [page], form, single_file, out)
     for tag, reason in missing:
-        say(f"{tag}: {reason}", err=True)
+        print_visible(f"{tag}: {reason}", err=True)
     sys.exit(EXIT_SOME_FAILED if missing else 0)
 
 

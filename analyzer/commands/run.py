@@ -26,11 +26,11 @@ from analyzer.commands.options import (
     EXIT_SOME_FAILED,
     EXIT_TRY_LATER,
     PLACE,
-    age_told,
+    age_note,
     bar,
     export_options,
     finding,
-    say,
+    print_visible,
     unforeseen,
     watched,
     what_failed,
@@ -73,13 +73,13 @@ class RunLog:
     def __init__(self, path: Path | None) -> None:
         self._path = path
 
-    def say(self, event: str, **facts: object) -> None:
+    def write(self, event: str, **facts: object) -> None:
         """Append one line: time [UTC], process, event, and facts as name=value."""
         if self._path is None:
             return
         now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-        told = "".join(f" {name}={logfmt(value)}" for name, value in facts.items())
-        line = f"{now} triage[{os.getpid()}] {event}{told}\n".encode()
+        fields = "".join(f" {name}={logfmt(value)}" for name, value in facts.items())
+        line = f"{now} triage[{os.getpid()}] {event}{fields}\n".encode()
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             with self._path.open("ab", buffering=0) as file:
@@ -142,7 +142,7 @@ def stoppable() -> Iterator[None]:
     help="File to which each event is appended as a line.",
 )
 @click.option("--explain", "explaining", is_flag=True, help="Explain the last night's flagged loops as well.")
-def run(asked: ExportRequest, store: Path, log_file: Path | None, explaining: bool, **how: Any) -> None:
+def run(request: ExportRequest, store: Path, log_file: Path | None, explaining: bool, **how: Any) -> None:
     """The nightly batch: assess every loop and keep the results in a store.
 
     An export of several days is split by day; new settings are advised for the last day. A second export of a night
@@ -156,49 +156,49 @@ def run(asked: ExportRequest, store: Path, log_file: Path | None, explaining: bo
     from importlib.metadata import version
 
     log, begun_s = RunLog(log_file), time.monotonic()
-    export = " ".join(map(str, asked.export))
-    log.say("begin", version=version("loop-triage"), store=store, export=export, jobs=how["jobs"])
+    export = " ".join(map(str, request.export))
+    log.write("begin", version=version("loop-triage"), store=store, export=export, jobs=how["jobs"])
     try:
-        asked = _for_all_workers(asked, store, how["scheduler"])
+        request = _for_all_workers(request, store, how["scheduler"])
         with stoppable():
-            outcome, loops = _run_night(asked, store, log, explaining, how)
+            outcome, loops = _run_night(request, store, log, explaining, how)
     except StoppedError as stopped:
-        log.say("stopped", signal=stopped, status=STOPPED + stopped.number)
+        log.write("stopped", signal=stopped, status=STOPPED + stopped.number)
         with suppress(OSError):  # the terminal may be closed
-            say(f"triage: stopped by {stopped}; {_go_on(store)}", err=True)
+            print_visible(f"triage: stopped by {stopped}; {_go_on(store)}", err=True)
         sys.exit(STOPPED + stopped.number)
     except Exception as error:
-        said, again = (
+        message, again = (
             what_went_wrong(error) or unforeseen(error),
-            _may_answer_again(error, (store, *asked.export)),
+            _may_answer_again(error, (store, *request.export)),
         )
-        log.say("nothing done", error=said, status=EXIT_TRY_LATER if again else EXIT_NOTHING_DONE)
+        log.write("nothing done", error=message, status=EXIT_TRY_LATER if again else EXIT_NOTHING_DONE)
         if again:
-            why = said.partition("; ")[0]
+            why = message.partition("; ")[0]
             why = why if "://" in why else f"{store}: {why}"
-            say(f"triage: {why}; the storage failed for minutes: {_go_on(store)}", err=True)
+            print_visible(f"triage: {why}; the storage failed for minutes: {_go_on(store)}", err=True)
             sys.exit(EXIT_TRY_LATER)
         if isinstance(error, OSError) and is_full(error):
             raise InputError(what_failed(error), "room to write", f"make room; {_go_on(store)}") from error
         raise
     lost = EXIT_NOTHING_DONE if len(outcome.failed) + len(outcome.unassessed) == loops else EXIT_SOME_FAILED
     status = lost if outcome.failed or lost == EXIT_NOTHING_DONE else 0
-    log.say("end", status=status, night=outcome.nights[-1].name, seconds=time.monotonic() - begun_s)
+    log.write("end", status=status, night=outcome.nights[-1].name, seconds=time.monotonic() - begun_s)
     sys.exit(status)
 
 
-def _for_all_workers(asked: ExportRequest, store: Path, scheduler: str | None) -> ExportRequest:
+def _for_all_workers(request: ExportRequest, store: Path, scheduler: str | None) -> ExportRequest:
     """The request in a form valid for remote workers. Raises InputError if their store would be a different one."""
     from analyzer.locations import is_remote
 
     if scheduler is None:
-        return asked
+        return request
     if not is_remote(store) and not store.is_absolute():
         seen = f"--store {store} with --scheduler: each worker would write its own store"
         raise InputError(
             seen, "an absolute path, or a URL, that all machines share", f"state --store {store.resolve()}"
         )
-    return replace(asked, export=tuple(p if is_remote(p) else p.absolute() for p in asked.export))
+    return replace(request, export=tuple(p if is_remote(p) else p.absolute() for p in request.export))
 
 
 def _may_answer_again(error: Exception, places: Sequence[Path]) -> bool:
@@ -213,7 +213,7 @@ def _go_on(store: Path) -> str:
 
 
 def _run_night(
-    asked: ExportRequest, place: Path, log: RunLog, explaining: bool, how: Mapping[str, Any]
+    request: ExportRequest, place: Path, log: RunLog, explaining: bool, how: Mapping[str, Any]
 ) -> tuple[Outcome, int]:
     """Read the export, assess it with the options `how` of analyzer/night/batch.py and, if requested, explain it;
     return the outcome and the number of loops."""
@@ -222,23 +222,23 @@ def _run_night(
 
     require_place(place)
     with scratch(place, how["resume"]) as copies:
-        more = f" and {len(asked.export) - 1} more" if len(asked.export) > 1 else ""
-        with watched(f"reading {asked.export[0]}{more}"):
+        more = f" and {len(request.export) - 1} more" if len(request.export) > 1 else ""
+        with watched(f"reading {request.export[0]}{more}"):
             from analyzer.night.opened import opened_apart  # takes a second
 
-            plant = opened_apart(replace(asked, reading={**asked.reading, "scratch": copies}))
+            plant = opened_apart(replace(request, reading={**request.reading, "scratch": copies}))
         store = Store(place)
-        _say(plant.notes, log)
+        _report_notes(plant.notes, log)
         outcome = _assessed(plant, store, how, log)
         if explaining and len(outcome.unassessed) + len(outcome.failed) < len(plant.specs):
             _explain_night(plant, store, outcome.nights[-1], how["jobs"], how["resume"])
     return outcome, len(plant.specs)
 
 
-def _say(notes: Sequence[str], log: RunLog) -> None:
+def _report_notes(notes: Sequence[str], log: RunLog) -> None:
     for note in notes:
-        say(f"triage: {note}", err=True)
-        log.say("note", text=note)
+        print_visible(f"triage: {note}", err=True)
+        log.write("note", text=note)
 
 
 def _assessed(plant: Plant, store: Store, how: Mapping[str, Any], log: RunLog) -> Outcome:
@@ -247,21 +247,21 @@ def _assessed(plant: Plant, store: Store, how: Mapping[str, Any], log: RunLog) -
 
     with bar("loops") as progress:
         outcome = batch.run(plant, store, **how, progress=progress)
-    _say(outcome.notes[:FEW], log)
+    _report_notes(outcome.notes[:FEW], log)
     if len(outcome.notes) > FEW:
         more = len(outcome.notes) - FEW
-        _say([f"{more} further notes on what was read; 'triage check' prints them all"], log)
+        _report_notes([f"{more} further notes on what was read; 'triage check' prints them all"], log)
     for status, lost_loops in (("not assessed", outcome.unassessed), ("failed", outcome.failed)):
         for loop, reason in lost_loops:
-            say(f"{loop}: {reason}", err=True)
-            log.say("lost", loop=loop, status=status, reason=reason)
+            print_visible(f"{loop}: {reason}", err=True)
+            log.write("lost", loop=loop, status=status, reason=reason)
     nights, loops, failed = outcome.nights, len(plant.specs), len(outcome.failed)
     done = loops - len(outcome.unassessed) - failed
-    log.say("assessed", loops=done, of=loops, failed=failed, nights=len(nights))
+    log.write("assessed", loops=done, of=loops, failed=failed, nights=len(nights))
     several = f" ({len(nights)} nights from {nights[0].name})" if len(nights) > 1 else ""
-    said = f"{done} of {loops} loops assessed{f', {failed} failed' if failed else ''}"
-    click.echo(f"{said}, night {nights[-1].name}{several}, in {store.path}", err=True)
-    _say(list(filter(None, [age_told(nights[-1].name, plant.zone)])), log)
+    summary = f"{done} of {loops} loops assessed{f', {failed} failed' if failed else ''}"
+    click.echo(f"{summary}, night {nights[-1].name}{several}, in {store.path}", err=True)
+    _report_notes(list(filter(None, [age_note(nights[-1].name, plant.zone)])), log)
     return outcome
 
 

@@ -15,10 +15,10 @@ from analyzer.commands.options import (
     NIGHT,
     PLACE,
     STORE,
-    age_told,
+    age_note,
     formats,
     opened_store,
-    say,
+    print_visible,
 )
 from analyzer.store.notes import STATES
 from identification.errors import InputError
@@ -160,12 +160,12 @@ def note(
     if text is None and state is None and due is None:
         own = notes.read_notes(store).get(loop, ())
         zone = kept.zone()
-        say("\n".join(n.said(zone) for n in own) or f"{loop}: no notes")
+        print_visible("\n".join(n.as_line(zone) for n in own) or f"{loop}: no notes")
         return
     until, by = ("" if day is None else day.strftime("%Y-%m-%d") for day in (hide_until, due))
     written = notes.new(loop, text or state or f"due {by}", owner, until, state or "", by)
     notes.add(store, written)
-    say(f"{loop}: {written.said(kept.zone())}")
+    print_visible(f"{loop}: {written.as_line(kept.zone())}")
 
 
 @click.command()
@@ -185,7 +185,7 @@ def summary(store: Path, night: str | None, form: str) -> None:
 
     kept = opened_store(store)
     zone = kept.zone()
-    old = age_told(night or kept.nights()[-1], zone)
+    old = age_note(night or kept.nights()[-1], zone)
     found = replace(summary_page(kept, night), made=made(kept), zone=zone, subtitle=old)
     draw = {"text": plain.render, "html": html.mail, "markdown": lambda p: markdown.render(p, "")}[form]
     click.echo(draw(found).rstrip("\n"))

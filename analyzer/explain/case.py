@@ -93,11 +93,11 @@ def stated_law(spec: LoopSpec, prepared: Prepared, period_s: float, config: Conf
     if pid is None or pid.td_s > 0 or not math.isfinite(pid.ti_s) or prepared.record.gain_share is not None:
         return None
     dt_s = prepared.record.dt_s
-    said = StatedSettings(pid.kp, pid.ti_s / dt_s, dt_s / (spec.scan_s or dt_s))
-    if not said.thinned(config.explain.controller):
-        return said
+    settings = StatedSettings(pid.kp, pid.ti_s / dt_s, dt_s / (spec.scan_s or dt_s))
+    if not settings.thinned(config.explain.controller):
+        return settings
     scale_s = period_s or time_scale(prepared.record, None, pid)
-    return replace(said, confirmed=differing(prepared.record, pid, scale_s, config.settings) is None)
+    return replace(settings, confirmed=differing(prepared.record, pid, scale_s, config.settings) is None)
 
 
 def neighbour_ops(
@@ -107,9 +107,9 @@ def neighbour_ops(
     loop's clock."""
     r = p.record
     clock = r.start_s + r.time_s
-    beside = dict.fromkeys([spec.load, *(s.op for s in specs if s.loop != spec.loop)])
+    tags = dict.fromkeys([spec.load, *(s.op for s in specs if s.loop != spec.loop)])
     out = []
-    for tag in beside:
+    for tag in tags:
         if tag and tag in series:
             value, gap = onto_clock(series[tag], clock, r.dt_s, config.quality)
             if not gap.all() and float(np.ptp(value)) > 0:
@@ -137,8 +137,10 @@ def seen_in_cycles(verdict: Verdict, limits: AdviceLimits) -> SeenInCycles | Non
         return None
     cycle_s = 2.0 * m.problem.duration_s / shown.count
     known = intervals(fit, True, limits, m.controller)
-    told = {name: known[name] for name in VALVE_FIGURES if name in known}
-    return SeenInCycles(fit.process, valve, shown.count, shown.agreeing, cycle_s, m.trials is not None, told)
+    figures = {name: known[name] for name in VALVE_FIGURES if name in known}
+    return SeenInCycles(
+        fit.process, valve, shown.count, shown.agreeing, cycle_s, m.trials is not None, figures
+    )
 
 
 def verdict_on(spec: LoopSpec, prepared: Prepared, config: Config) -> tuple[Verdict, float]:
@@ -146,11 +148,11 @@ def verdict_on(spec: LoopSpec, prepared: Prepared, config: Config) -> tuple[Verd
     period of its cycle [s], 0 without one."""
     seen, span = detect_where_it_cycles(prepared.record, config.oscillation)
     stated = controller(spec, prepared.scale.span, prepared.gain_share)
-    found, said = judged_where(prepared, seen, span, stated, config, spec.type)
+    found, verdict = judged_where(prepared, seen, span, stated, config, spec.type)
     cycle = counting(found)
     if cycle is None:
-        return said if said.cause is Cause.VALVE else NO_CAUSE, 0.0
-    return said, cycle.period_s
+        return verdict if verdict.cause is Cause.VALVE else NO_CAUSE, 0.0
+    return verdict, cycle.period_s
 
 
 def as_decided(verdict: Verdict, fault: Fault | None) -> Verdict:
@@ -181,8 +183,8 @@ def informative_stretch(prepared: Prepared, most: int | None) -> tuple[Prepared,
     travel = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(r.op)))))
     first = int(np.argmax(travel[most - 1 :] - travel[: len(r) - most + 1]))
     days = f"{most * r.dt_s / 86400:.1f} of {len(r) * r.dt_s / 86400:.1f} days"
-    said = f"Judged on {most} of {len(r)} samples, the {days} in which OP moves most."
-    return replace(prepared, record=r.span(first, first + most)), said
+    note = f"Judged on {most} of {len(r)} samples, the {days} in which OP moves most."
+    return replace(prepared, record=r.span(first, first + most)), note
 
 
 def latest_night(prepared: Prepared) -> Prepared:
@@ -205,8 +207,8 @@ def stretch_of_night(prepared: Prepared, verdict: Verdict, most: int) -> tuple[P
         first = min(max(fitted - n, 0), len(r) - n)
         night = replace(night, record=r.span(first, first + n))
     days = f"{len(night.record) * r.dt_s / 86400:.1f} of {prepared.record.duration_s / 86400:.1f} days"
-    said = f"Judged on {len(night.record)} of {len(prepared.record)} samples, the {days} in which the night"
-    return night, f"{said} identified the valve."
+    note = f"Judged on {len(night.record)} of {len(prepared.record)} samples, the {days} in which the night"
+    return night, f"{note} identified the valve."
 
 
 def case(
@@ -260,12 +262,12 @@ def case(
     if factor == 1:
         return Case(spec, prepared, recording, shortened, taught)
     thin = replace(prepared, record=r.thinned(factor))
-    said = (
+    note = (
         f"Judged at one sample in {factor}, each {thin.record.dt_s:.3g} s: its time constant needs no more."
     )
     others = tuple(x[: len(thin.record) * factor : factor] for x in others)
     recording = recording_of(spec, thin, stamps[::factor], (verdict, period_s), others, config)
-    return Case(spec, thin, recording, f"{shortened} {said}".strip(), taught)
+    return Case(spec, thin, recording, f"{shortened} {note}".strip(), taught)
 
 
 def coarser(whole: Prepared, taught: ExperimentResults | None, config: Config, known: bool) -> Prepared:
@@ -344,7 +346,7 @@ def parts(
     return [out[0], *(p for p in out[1:] if p.samples >= PART_SAMPLES)]
 
 
-def parts_said(judged: Sequence[Part]) -> str:
+def parts_note(judged: Sequence[Part]) -> str:
     """A sentence on the part that is explained and those held out; empty for a single part."""
     if len(judged) < 2:
         return ""
@@ -373,32 +375,32 @@ def loop_trends(plant: Plant, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...],
     return spec, specs, series
 
 
-def whole(asked: ExportRequest, tag: str) -> tuple[Case, Series]:
+def whole(request: ExportRequest, tag: str) -> tuple[Case, Series]:
     """A loop's case over a whole export, under its last settings, and its PV."""
-    spec, specs, series = loop_trends(guarded(asked), tag)
+    spec, specs, series = loop_trends(guarded(request), tag)
     pv = series[spec.pv or ""]
-    spec = in_force(spec, asked.changes, float(pv.stamp_s[-1]))
-    return case(spec, specs, series, asked.config, None), pv
+    spec = in_force(spec, request.changes, float(pv.stamp_s[-1]))
+    return case(spec, specs, series, request.config, None), pv
 
 
-def asked_cases(
-    asked: ExportRequest, plant: Plant, tag: str, held_out: Sequence[Path], fault: Fault | None = None
+def requested_cases(
+    request: ExportRequest, plant: Plant, tag: str, held_out: Sequence[Path], fault: Fault | None = None
 ) -> tuple[Case, dict[str, Case]]:
     """The case to be explained, and those held out by name: parts under other settings, and other exports; plant, the
     opened request; fault as in `case`."""
     spec, specs, series = loop_trends(plant, tag)
-    judged = parts(spec, series, asked.changes, asked.zone)
+    judged = parts(spec, series, request.changes, request.zone)
     kept: list[tuple[Part, Case]] = []
     for part in judged:
         with nullcontext() if len(judged) == 1 else suppress(NotAssessedError):  # OP is constant in it
             most = None if kept else WHOLE_SAMPLES
-            kept.append((part, case(part.spec, specs, part.series, asked.config, most, fault)))
+            kept.append((part, case(part.spec, specs, part.series, request.config, most, fault)))
     if not kept:
         raise NotAssessedError(f"{tag}: needs OP and PV that move in one part of its settings, has none")
     first = kept[0][1]
-    first = replace(first, shortened=f"{parts_said([part for part, _ in kept])} {first.shortened}".strip())
+    first = replace(first, shortened=f"{parts_note([part for part, _ in kept])} {first.shortened}".strip())
     others = {part.name: c for part, c in kept[1:]}
     for path in held_out:
-        elsewhere = replace(asked, export=(path,), span=ALWAYS)
+        elsewhere = replace(request, export=(path,), span=ALWAYS)
         others[path.name if path.name not in others else str(path)] = whole(elsewhere, tag)[0]
     return first, others

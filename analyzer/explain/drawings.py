@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from analyzer.explain.explained import Explained
-from analyzer.explain.words import CURVES, FEATURES, NOTES, ROWS, TOLD
+from analyzer.explain.words import CURVES, FEATURES, NOTES, ROWS, TEXTS
 from analyzer.pages.words import number
 from identification.estimation.model import Fitted
 from identification.mismatch.catalogue import fault
@@ -97,8 +97,8 @@ def trend(
     whole = sum(b - a for a, b in spans) > NEARLY_ALL * usable.size * r.dt_s
     time = r.start_s + (part.start + edges) * r.dt_s
     panels = ("PV [% of span]", "residual [%]", "OP [%]")
-    name, title, said = words
-    return Trend(name, title, time, gap, tuple(bands), panels, (), said, () if whole else spans)
+    name, title, caption = words
+    return Trend(name, title, time, gap, tuple(bands), panels, (), caption, () if whole else spans)
 
 
 def close_part(e: Explained) -> slice:
@@ -188,18 +188,18 @@ def spectrum(x: Floats, dt_s: float) -> tuple[Floats, Floats]:
 
 def found_plot(e: Explained) -> Plot | None:
     """The picture of an unnamed effect that explains the loop best, otherwise of the first effect found."""
-    found, said, finding = e.found, e.said, e.found.finding
+    found, answer, finding = e.found, e.said, e.found.finding
     inputs, plain = found.p.inputs, found.plain.model.c
     if finding is not None:
         free, shown = plain.copy(), fault(finding.name)
         free[Slot.CLIP_HI], free[Slot.CLIP_LO] = np.inf, -np.inf
         model = inputs.level + simulate(inputs, free)
         return shape_plot(shown.drawn and shown.drawn(finding, e.case.recording, model), shown.caption)
-    if said.outside is not None and found.outside is not None:
-        fit, known = found.outside.fit, said.outside.parameters
+    if answer.outside is not None and found.outside is not None:
+        fit, known = found.outside.fit, answer.outside.parameters
         added = found.outside.row
     elif found.accepted:
-        fit, known = found.best, said.effects[0].parameters
+        fit, known = found.best, answer.effects[0].parameters
         added = fit.model.added[0]
     else:
         return None
@@ -212,12 +212,12 @@ def law_plot(e: Explained) -> Plot | None:
     """OP recomputed by the stated settings if no fault was found in them."""
     if e.found.controller is not None or e.found.law is None:
         return None
-    shape, said = by_stated_law(e.case.recording), NOTES["sound_controller"]
-    return shape_plot(shape, said, "law", "OP rebuilt and recorded")
+    shape, caption = by_stated_law(e.case.recording), NOTES["sound_controller"]
+    return shape_plot(shape, caption, "law", "OP rebuilt and recorded")
 
 
-def shape_plot(shape: Picture | None, said: str, name: str = "shape", title: str = "") -> Plot | None:
-    """A picture as a plot: the recorded curve below, the finding above; caption `said`, or that of its kind."""
+def shape_plot(shape: Picture | None, caption: str, name: str = "shape", title: str = "") -> Plot | None:
+    """A picture as a plot: the recorded curve below, the finding above; `caption`, or that of its kind."""
     if shape is None:
         return None
     lines, areas = [], []
@@ -230,4 +230,4 @@ def shape_plot(shape: Picture | None, said: str, name: str = "shape", title: str
     across, along = (f"{a.what} [{a.unit}]" if a.unit else a.what for a in (shape.x, shape.y))
     what = f"{shape.y.what} over {shape.x.what}"
     words = name, title or what[:1].upper() + what[1:], across, along
-    return Plot(*words, tuple(lines), marks, said or TOLD["shapes"].get(shape.kind, ""), tuple(areas))
+    return Plot(*words, tuple(lines), marks, caption or TEXTS["shapes"].get(shape.kind, ""), tuple(areas))

@@ -27,7 +27,7 @@ from identification.mismatch.recording import Recording
 from identification.mismatch.words import reason
 from reports.plain import json_ready
 
-TOLD_IN_REASON = ("note", "caution", "shown", "outside")
+PARTS_IN_REASON = ("note", "caution", "shown", "outside")
 """Parts of an answer that the data include in their reason, and under a separate key if there is such an effect."""
 
 
@@ -52,23 +52,25 @@ class Explained:
 
 def explained(
     c: Case,
-    tell: Callable[[str], None],
+    progress: Callable[[str], None],
     user_model: Mapping[str, Any] | None = None,
     held_out: Mapping[str, Case] | None = None,
 ) -> Explained:
     """Explain one loop.
 
-    tell : called with each step; user_model : the user's own model, which is judged and is one more start of the
+    progress : called with each step; user_model : the user's own model, which is judged and is one more start of the
     search; held_out : other recordings of the loop by name, on which the explanation is proven.
     """
     own, others, scale = None, held_out or {}, c.prepared.scale
     with np.errstate(all="ignore"):  # a diverging candidate loses; its overflow needs no warning
         start = None if user_model is None else plain_start(user_model)
-        found = proven_on(explain(c.recording, tell, start), [in_percent_of(c, x) for x in others.values()])
-        said = answer(found, c.recording)
+        found = proven_on(
+            explain(c.recording, progress, start), [in_percent_of(c, x) for x in others.values()]
+        )
+        result = answer(found, c.recording)
         if user_model is not None:
             own = judged(user_model, found, c.recording, span_note(scale, user_model))
-    data = as_data(c, said, own)
+    data = as_data(c, result, own)
     if c.recording.stated is None:  # if they are stated, the controller check reports
         data |= law_data(found.law, c.recording.dt_s)
     if c.learned is not None and c.learned.model is not None:
@@ -85,7 +87,7 @@ def explained(
             }
             for name, x in zip(others, found.others, strict=False)
         ]
-    return Explained(c, found, said, data, own)
+    return Explained(c, found, result, data, own)
 
 
 def with_night(data: dict[str, Any], decision: Row | None) -> dict[str, Any]:
@@ -111,22 +113,22 @@ def in_percent_of(c: Case, other: Case) -> Recording:
     return replace(other.recording, pv=pv, op=op, sp=None)
 
 
-def as_data(c: Case, said: Answer, user_model: UserModel | None = None) -> dict[str, Any]:
+def as_data(c: Case, result: Answer, user_model: UserModel | None = None) -> dict[str, Any]:
     """The answer as JSON-compatible data."""
-    data = answer_data(c.spec.loop, said, f"{reason(said)} {c.shortened}".strip())
+    data = answer_data(c.spec.loop, result, f"{reason(result)} {c.shortened}".strip())
     if user_model is not None:
         judgement = {"fitted": asdict(user_model.fitted), "held_out": asdict(user_model.held_out)}
         data["fit"]["brought"] = judgement | {"note": user_model.note}
-    if said.outside is not None:
-        outside = asdict(said.outside)
+    if result.outside is not None:
+        outside = asdict(result.outside)
         data["outside"] = {k: outside[k] for k in ("name", "block", "parameters")}
     return json_ready(data)
 
 
-def answer_data(loop: str, said: Answer, why: str) -> dict[str, Any]:
+def answer_data(loop: str, result: Answer, why: str) -> dict[str, Any]:
     """The answer alone, in the form of the contract."""
-    told = {k: v for k, v in asdict(said).items() if k not in TOLD_IN_REASON}
-    return {"loop": loop} | told | {"reason": why}
+    shown = {k: v for k, v in asdict(result).items() if k not in PARTS_IN_REASON}
+    return {"loop": loop} | shown | {"reason": why}
 
 
 def law_data(law: ControlLaw | None, dt_s: float) -> dict[str, Any]:

@@ -34,7 +34,7 @@ HUNDRED = (60.0, 160.0)
 """Ratios of two gains that indicate percent against fractions; ours: a refit moves a gain by less."""
 TIMES = (((40.0, 90.0), "minutes"), ((2400.0, 5400.0), "hours"))
 """Ratios of two time constants that indicate minutes, or hours, against seconds."""
-SAVED, ANEW = "a model saved by `triage explain`", "save it again"
+SAVED, SAVE_AGAIN = "a model saved by `triage explain`", "save it again"
 RUNS = "a model that can be run on this recording"
 SCALE = ("pv_low", "pv_span", "op_low", "op_span")
 
@@ -50,9 +50,9 @@ def read_model(path: Path, loop: str) -> dict[str, Any]:
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: {error}", SAVED, ANEW) from None
+        raise InputError(f"{path}: {error}", SAVED, SAVE_AGAIN) from None
     if not isinstance(data, dict) or "constants" not in data:
-        raise InputError(f"{path}: no model", SAVED, ANEW)
+        raise InputError(f"{path}: no model", SAVED, SAVE_AGAIN)
     if data.get("loop") != loop:
         raise InputError(f"{path}: a model of {data.get('loop')}", f"one of {loop}", "check MODEL and --loop")
     checked(data, path)
@@ -110,12 +110,14 @@ def judged(data: Mapping[str, Any], found: Explanation, s: Recording, more: str 
     cut = int((1.0 - HELD_OUT) * s.pv.size)
     window, (plain, better) = found.proven.window, found.proven.overall
     own = misfit(s.pv, out, window).rmse
-    said = f"Your model leaves {own:.3g} % of span rms, the baseline model fitted again {plain.rmse:.3g} %"
+    comparison = (
+        f"Your model leaves {own:.3g} % of span rms, the baseline model fitted again {plain.rmse:.3g} %"
+    )
     if found.accepted:
-        said += f", the improved model {better.rmse:.3g} %"
+        comparison += f", the improved model {better.rmse:.3g} %"
     units = "" if unanswered(found) else wrong_units(constants(dict(data)), restored(found.plain.model.c))
     verdict = "" if units else against_plain(own, plain.rmse, AS_GOOD)
-    note = "; ".join(x for x in (said, verdict, units, more) if x) + "."
+    note = "; ".join(x for x in (comparison, verdict, units, more) if x) + "."
     fitted, held = misfit(s.pv[:cut], out[:cut], window), misfit(s.pv[cut:], out[cut:], window)
     return UserModel(out, fitted, held, note)
 
@@ -141,18 +143,18 @@ def wrong_units(own: Floats, found: Mapping[str, float]) -> str:
     model fitted to the recording.
     """
     gain, lag_s = found["gain"], found["time_constant_s"]
-    its, said = f"its gain, {own[Slot.K]:.3g},", []
+    its, notes = f"its gain, {own[Slot.K]:.3g},", []
     if within(own[Slot.K] / gain, HUNDRED):
-        said.append(f"{its} is about 100 times off {gain:.3g}, as percent are off fractions")
+        notes.append(f"{its} is about 100 times off {gain:.3g}, as percent are off fractions")
     elif own[Slot.K] / gain < 0:
-        said.append(f"{its} has another sign than {gain:.3g} found")
+        notes.append(f"{its} has another sign than {gain:.3g} found")
     for ends, unit in TIMES:
         if within(own[Slot.T] / lag_s, ends):
             size = f"{own[Slot.T]:.3g} s against {lag_s:.3g} s"
-            said.append(
+            notes.append(
                 f"its time constant, {size} found, looks like {unit} instead of seconds or the reverse"
             )
-    return "; ".join(said)
+    return "; ".join(notes)
 
 
 def span_note(now: Scale, user_model: Mapping[str, Any]) -> str:

@@ -25,7 +25,7 @@ from identification.errors import TriageError
 TABLE = "explained"
 QUIET = (Cause.NONE, Action.NONE, "", None)
 """Causes and actions that mean none."""
-ASKED = [
+COLUMNS = [
     *("loop", "status", "oscillating_pct", "oscillation_significance", "cause", "valve_fault", "action"),
     "source_loop",
 ]
@@ -131,15 +131,15 @@ def explain_flagged(
     """
     from analyzer.explain.explained import abstained
 
-    asked = questions(plant, store.read("nights", night.name, ASKED).to_pylist(), night)
-    names = {q.spec.loop for q in asked}
+    loops = questions(plant, store.read("nights", night.name, COLUMNS).to_pylist(), night)
+    names = {q.spec.loop for q in loops}
     rows = [r for r in known(store, night.name) if resume or r["loop"] not in names]
     done = {r["loop"] for r in rows} & names
-    left = [q for q in asked if q.spec.loop not in done]
+    remaining = [q for q in loops if q.spec.loop not in done]
     keep(store, night.name, rows)
-    progress(len(done), len(asked))
-    with executor(jobs, len(left), answered, plant.config.workers) as workers:
-        for q in left:
+    progress(len(done), len(loops))
+    with executor(jobs, len(remaining), answered, plant.config.workers) as workers:
+        for q in remaining:
             workers.submit(q)
         for at, result in enumerate(workers.results(), len(done) + 1):
             if isinstance(result, WorkerDeath):
@@ -147,5 +147,5 @@ def explain_flagged(
                 result = answer_row(why, night.name)
             rows.append(result)
             keep(store, night.name, rows)
-            progress(at, len(asked))
+            progress(at, len(loops))
     return [r for r in rows if r["loop"] in names]

@@ -74,9 +74,11 @@ def _verdict_blocks(e: Explained) -> tuple[Block | None, ...]:
     user_model = None if e.user_model is None else Text((e.user_model.note,))
     night = e.data.get("night")
     first = None if night is None else Text((decided(e.data),), "lead")
-    beside = "" if night is None else words.night_note(night, e.data["verdict"], e.data["block"])
-    said = tuple(filter(None, (words.improvement(e.data), beside, words.no_better(e.data), check(e.data))))
-    return first, Text((e.data["reason"],), "lead"), Text(said), user_model, Tiles(tuple(_tiles(e)))
+    night_note = "" if night is None else words.night_note(night, e.data["verdict"], e.data["block"])
+    texts = tuple(
+        filter(None, (words.improvement(e.data), night_note, words.no_better(e.data), check(e.data)))
+    )
+    return first, Text((e.data["reason"],), "lead"), Text(texts), user_model, Tiles(tuple(_tiles(e)))
 
 
 def _tiles(e: Explained) -> list[tuple[str, str, str]]:
@@ -103,18 +105,18 @@ def _where_blocks(data: Data) -> tuple[Block, ...]:
     where = data["where"]
     signals = [("Signals", ", ".join(where["signals"]))] if where.get("signals") else []
     facts = (*signals, *places(where))
-    told = (Facts(facts),) if facts else ()
+    shown = (Facts(facts),) if facts else ()
     if not where.get("features"):
-        return (*told, Text((NOTES["untested"],), "note"))
-    return (Text((located_sentence(where),)), *told, words.features(data))
+        return (*shown, Text((NOTES["untested"],), "note"))
+    return (Text((located_sentence(where),)), *shown, words.features(data))
 
 
 def _fit_note(e: Explained) -> str:
     fit, share_held = e.data["fit"], 100 * HELD_OUT
     held = NOTES["other_recordings" if e.found.others else "last_part"].format(share=share_held)
     horizon = fit["horizon_s"] and duration(fit["horizon_s"])
-    anew = NOTES["anew"].format(horizon=horizon) if horizon else ""
-    return " ".join(filter(None, (held, NOTES["fit"], anew, *remarks(fit))))
+    refitted = NOTES["anew"].format(horizon=horizon) if horizon else ""
+    return " ".join(filter(None, (held, NOTES["fit"], refitted, *remarks(fit))))
 
 
 def _controller_blocks(e: Explained) -> tuple[Block, ...]:

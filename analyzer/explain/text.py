@@ -26,11 +26,11 @@ def answer_lines(data: Mapping[str, Any]) -> list[str]:
     night = data.get("night")
     out = [*wrap(decided(data), WIDTH), ""] if night else []
     improvement = words.improvement(data) if fit else ""
-    beside = words.night_note(night, data["verdict"], data["block"]) if night and fit else ""
-    told = (data["reason"], improvement, beside, check(data))
+    night_note = words.night_note(night, data["verdict"], data["block"]) if night and fit else ""
+    texts = (data["reason"], improvement, night_note, check(data))
     out += [
         head + block,
-        *(line for text in told for line in wrap(text, WIDTH)),
+        *(line for text in texts for line in wrap(text, WIDTH)),
     ]
     out += _part("Parameters (90 % intervals)", _texts(words.parameters(data)), (2,))
     out += _part("Controller, as SP, PV and OP show it", _controller_rows(data), (1,))

@@ -25,15 +25,15 @@ HARDLY = 0.05  # Relative change of the baseline model's constants under which t
 
 Data = Mapping[str, Any]
 
-TOLD = texts("explanation")
-FEATURES, CURVES, ROWS, NOTES = (TOLD[part] for part in ("features", "curves", "rows", "notes"))
+TEXTS = texts("explanation")
+FEATURES, CURVES, ROWS, NOTES = (TEXTS[part] for part in ("features", "curves", "rows", "notes"))
 SHOWN = 12
 """Names of tried effects shown."""
 
 
 def title(verdict: str) -> str:
     """The verdict as a heading."""
-    return TOLD["titles"].get(verdict, verdict.replace("-", " "))
+    return TEXTS["titles"].get(verdict, verdict.replace("-", " "))
 
 
 def number_text(value: float | None, unit: str = "") -> str:
@@ -119,8 +119,8 @@ def improvement(data: Data) -> str:
     plain, better = held_out(data)
     removed, banded = share(1.0 - better**2 / max(plain**2, 1e-30)), data["fit"].get("in_band")
     band = (number(banded["shortest_s"]), number_text(banded["longest_s"], "s")) if banded else ()
-    said = NOTES["in_band" if banded else "held_out"]
-    return str(said.format(*band, plain=rms(plain), better=rms(better), removed=removed))
+    text = NOTES["in_band" if banded else "held_out"]
+    return str(text.format(*band, plain=rms(plain), better=rms(better), removed=removed))
 
 
 def no_better(data: Data) -> str:
@@ -143,7 +143,7 @@ def _constants(data: Data) -> dict[str, tuple[float, float]]:
 
 def moved(data: Data) -> Table:
     """The baseline constants before and after, if the model with effects is better."""
-    named, known = TOLD["constants"], _constants(data) if improves(data) else {}
+    named, known = TEXTS["constants"], _constants(data) if improves(data) else {}
     rows = tuple(
         (Cell(named[k]["title"]), plain_cell(a), plain_cell(b), Cell(change(a, b)), Cell(named[k]["unit"]))
         for k, (a, b) in known.items()
@@ -235,13 +235,13 @@ def _standing(c: Candidate, taken: set[str]) -> str:
 
 def night_note(row: Mapping[str, Any], verdict: str, block: str) -> str:
     """One sentence on the agreement of a night's finding with the explanation; '' if there is nothing to add."""
-    told = TOLD["beside_verdict"]
+    notes = TEXTS["beside_verdict"]
     if row["action"] == Action.CHECK_MEASUREMENT and Lane.FROZEN in lanes_in(row):
-        return str(told["frozen"])
+        return str(notes["frozen"])
     if row["cause"] == Cause.LOAD and block not in (Block.VALVE, Block.LOAD):
-        return str(told["load"])
+        return str(notes["load"])
     if row["cause"] == Cause.NONE and row["action"] == Action.NONE and verdict != "none":
-        return str(told["calm_valve" if block == Block.VALVE else "calm"])
+        return str(notes["calm_valve" if block == Block.VALVE else "calm"])
     return agreement(row, verdict, block)
 
 
@@ -256,14 +256,14 @@ def agreement(row: Mapping[str, Any], verdict: str, block: str) -> str:
 
     row : the loop's row of the night: cause, valve_fault; verdict, block : the explanation's name and block.
     """
-    known, told = EFFECTS.get(verdict), TOLD["beside_verdict"]
+    known, notes = EFFECTS.get(verdict), TEXTS["beside_verdict"]
     friction = known is not None and known.friction is not None
     if row["cause"] != Cause.VALVE:
-        return told["valve_alone"] if friction or block == Block.VALVE else ""
+        return notes["valve_alone"] if friction or block == Block.VALVE else ""
     if friction:
         kind = row.get("valve_fault") or Fault.UNDECIDED
         same = kind in (verdict, Fault.UNDECIDED, Fault.NONE)
-        said = told["agree"] if same else told["other_kind"]
-        return said.format(kind=kind, verdict=verdict, stroke=told["stroke"])
+        text = notes["agree"] if same else notes["other_kind"]
+        return text.format(kind=kind, verdict=verdict, stroke=notes["stroke"])
     unasked = isinstance(known, effect.Fault) and known.ends is not Ends.NOTHING
-    return told["stopped"] if unasked else told["not_borne_out"].format(stroke=told["stroke"])
+    return notes["stopped"] if unasked else notes["not_borne_out"].format(stroke=notes["stroke"])

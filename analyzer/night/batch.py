@@ -67,16 +67,16 @@ def chunk_size(loops: int) -> int:
 
 def _tasks(plant: Plant, store: Store, nights: Sequence[Night], known: set[str]) -> list[Task]:
     """Chunks of the loops that are not yet in a piece of the last night."""
-    left = [s for s in plant.specs if s.loop not in known]
-    size = chunk_size(len(left))
+    remaining = [s for s in plant.specs if s.loop not in known]
+    size = chunk_size(len(remaining))
     mark = uuid.uuid4().hex[:8]  # a worker of a killed run may still write; its pieces have another mark
     held = held_pairs(store, nights[0].name)
     whole = Task(replace(plant, notes=()), tuple(nights), store, mark)
     tasks = []
-    for i in range(0, len(left), size):
-        part = tuple(left[i : i + size])
-        told = {s.loop: held[s.loop] for s in part if s.loop in held}
-        tasks.append(replace(whole.part(part, f"{i:06d}"), held=told))
+    for i in range(0, len(remaining), size):
+        part = tuple(remaining[i : i + size])
+        pairs = {s.loop: held[s.loop] for s in part if s.loop in held}
+        tasks.append(replace(whole.part(part, f"{i:06d}"), held=pairs))
     return tasks
 
 
@@ -216,7 +216,7 @@ def run(
         store.upgrade()
         nights = nights_of(plant)
         _require_one_clock(store, plant.zone, [night.name for night in nights] if replacing else [])
-        said = [line for night in nights for line in store.set_aside_damaged(night.name)]
+        notes = [line for night in nights for line in store.set_aside_damaged(night.name)]
         keys, met = _begun(plant, store, nights, resume), Counter[str]()
         whole = store.read_parts(nights[-1].name, "nights", keys, ["loop"])
         known = set() if whole is None else set(whole.column("loop").to_pylist())
@@ -239,7 +239,7 @@ def run(
             store.drop_parts()
             raise
         written, more = _finished(plant, store, nights, keys, replacing)
-        return _outcome(plant, store, written, (*plant.export.file_notes, *problems_text(met), *said, *more))
+        return _outcome(plant, store, written, (*plant.export.file_notes, *problems_text(met), *notes, *more))
 
 
 def _require_one_clock(store: Store, zone: str, replaced: Sequence[str]) -> None:
@@ -270,14 +270,14 @@ def _finished(
     full = [night for night, rows in zip(nights, held, strict=True) if not is_empty(rows)] or list(
         nights[-1:]
     )
-    said = []
+    notes = []
     if len(full) < len(nights):
-        said.append(f"{len(nights) - len(full)} nights without a good sample of any loop are left out")
+        notes.append(f"{len(nights) - len(full)} nights without a good sample of any loop are left out")
     with drafted(store) as draft:
         for night in full:
-            said += finish_night(draft, night.name, order, plant.config, keys, replacing)
+            notes += finish_night(draft, night.name, order, plant.config, keys, replacing)
     store.drop_parts()
-    return full, said
+    return full, notes
 
 
 def _require_all(store: Store, night: str, keys: Sequence[str], order: Sequence[str]) -> list[Row]:

@@ -87,18 +87,18 @@ def _changes_counted(changes: Sequence[TuningChange], specs: Sequence[LoopSpec])
     return text + (f"; not of {', '.join(others[:MOST_NAMES])}" if others else "")
 
 
-def check_lines(asked: ExportRequest) -> Iterator[tuple[str, bool]]:
+def check_lines(request: ExportRequest) -> Iterator[tuple[str, bool]]:
     """All lines on an export, each with whether one of its loops cannot be assessed. Raises InputError if it cannot
     be used, after the lines on it if it has no loops."""
-    plant = guarded(asked)
+    plant = guarded(request)
     export, specs, notes = plant.export, plant.specs, plant.notes
     first, last = export.span()
-    span = f"{stamp(first, asked.zone)} to {stamp(last, asked.zone)} {asked.zone}"
+    span = f"{stamp(first, request.zone)} to {stamp(last, request.zone)} {request.zone}"
     yield f"{len(export.tags)} tags, {len(specs)} loops, {span}", False
     if specs and specs[0].defaults:
         notes = (*notes, "assumed where loops.csv is silent: " + ", ".join(specs[0].defaults))
-    if specs and asked.changes:
-        notes = (*notes, _changes_counted(asked.changes, specs))
+    if specs and request.changes:
+        notes = (*notes, _changes_counted(request.changes, specs))
     for note in notes:
         yield note, False
     for spec in specs:

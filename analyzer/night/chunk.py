@@ -171,16 +171,16 @@ def _loop_row(
         known |= _typed_in(earlier, spec, found, night.zone)
         known["turns"] = half_cycle_data(prepared, found) if advising else None
         known |= _signs_kept(prepared, found, found.settings or present, spec.type, config)
-        told = concluded(found, advice, spec, night.name, config.advice, **known)
+        finding = concluded(found, advice, spec, night.name, config.advice, **known)
         if taught is not None:
-            told = with_experiment(told, taught, spec, present)
+            finding = with_experiment(finding, taught, spec, present)
         drawn = _settings_row(spec, night.name, advice)
     except Exception as error:  # an error of one loop is that loop's result and never ends the night
         kept.nights.append(_lost(error, config).of(spec, night.name, **known))
         if prepared is not None:
             kept.trends.append((spec.loop, thinned(prepared.record)))
         return
-    kept.nights.append(told)
+    kept.nights.append(finding)
     kept.trends.append((spec.loop, found.trend))
     kept.compared += drawn
     kept.moves += filter(None, [moves_of(prepared.record)])
@@ -237,15 +237,16 @@ def _lost(error: Exception, config: Config) -> FailedLoop:
     """The result of a loop that ended with an error."""
     if isinstance(error, LacksError):
         return FailedLoop(Status.NOT_ASSESSED, error.needs)
-    told = str(error) if isinstance(error, TriageError) else f"{type(error).__name__}: {error}"
+    text = str(error) if isinstance(error, TriageError) else f"{type(error).__name__}: {error}"
     if isinstance(error, MemoryError):
-        told = f"needs more memory than the {config.workers.memory_mb:.0f} MB that one loop may take"
+        text = f"needs more memory than the {config.workers.memory_mb:.0f} MB that one loop may take"
     return FailedLoop(
-        Status.NOT_ASSESSED if isinstance(error, NotAssessedError) else Status.FAILED, _as_told(told)
+        Status.NOT_ASSESSED if isinstance(error, NotAssessedError) else Status.FAILED,
+        _error_requirement(text),
     )
 
 
-def _as_told(text: str) -> Requirement:
+def _error_requirement(text: str) -> Requirement:
     """The text of an error."""
     return Requirement(None, RequirementKind.AS_TOLD, (text,))
 
@@ -295,7 +296,7 @@ def assessed(task: Task, began: Callable[[int], None] = lambda at: None) -> dict
 
 def lose(task: Task, reason: str) -> Done:
     """Write the rows of a chunk that no worker could finish."""
-    lost = FailedLoop(Status.FAILED, _as_told(reason))
+    lost = FailedLoop(Status.FAILED, _error_requirement(reason))
     for night in task.nights:
         loops = [lost.of(spec, night.name, timezone=night.zone) for spec in task.specs]
         _write_pieces(task, night.name, Rows(nights=loops))

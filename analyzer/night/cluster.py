@@ -49,8 +49,8 @@ class Cluster(Executor[T, R]):
             seen = f"--scheduler {self._address}: Dask is not installed"
             raise InputError(seen, "the extra 'cluster'", "pip install 'loop-triage[cluster]'") from error
         try:
-            asked = {"timeout": ANSWER_S, "set_as_default": False}
-            self._client: Any = Client(self._address, **asked)
+            options = {"timeout": ANSWER_S, "set_as_default": False}
+            self._client: Any = Client(self._address, **options)
         except (OSError, ValueError, TimeoutError) as error:
             seen = f"--scheduler {self._address}: no scheduler responds"
             expected = "the address that 'dask scheduler' prints"
@@ -64,7 +64,7 @@ class Cluster(Executor[T, R]):
             self._client.close(timeout=ANSWER_S)
 
     def submit(self, task: T, alone: bool = False) -> None:
-        with self._told():
+        with self._reported_loss():
             future = self._client.submit(self._function, task, pure=False)
             self._tasks[future] = task
             future.add_done_callback(self._coming.put)
@@ -72,7 +72,7 @@ class Cluster(Executor[T, R]):
     def results(self) -> Iterator[R | WorkerDeath[T]]:
         from distributed import KilledWorker
 
-        with self._told():
+        with self._reported_loss():
             while self._tasks:
                 future = self._next()
                 task = self._tasks.pop(future)
@@ -84,32 +84,32 @@ class Cluster(Executor[T, R]):
     def _next(self) -> Any:
         """The next finished task. Raises InputError if no worker has worked on any for too long."""
         idle_s = time.monotonic()
-        said = ""
+        reported = ""
         while True:
             try:
                 return self._coming.get(timeout=QUIET_S)
             except Empty:
                 seen = self._who_works()
-            if seen and seen != said:
+            if seen and seen != reported:
                 most = GIVEN_UP_S / 60.0
                 print(f"triage: --scheduler {self._address}: {seen}; waiting {most:.0f} min", file=sys.stderr)
             elif not seen:
                 idle_s = time.monotonic()
-            said = seen
+            reported = seen
             if time.monotonic() - idle_s > GIVEN_UP_S:
                 raise InputError(f"--scheduler {self._address}: {seen}", "workers that respond", GO_ON)
 
     def _who_works(self) -> str:
         """Why the cluster does not work; '' if it has workers."""
         try:
-            asked = {"callback_timeout": ANSWER_S}
-            workers = self._client.sync(self._client.scheduler.ncores, **asked)
+            options = {"callback_timeout": ANSWER_S}
+            workers = self._client.sync(self._client.scheduler.ncores, **options)
         except (TimeoutError, OSError, ValueError):
             return "the scheduler does not respond"
         return "" if workers else "no workers, 'dask worker' starts one"
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _reported_loss(self) -> Iterator[None]:
         """The end of the scheduler in one line."""
         from distributed.comm import CommClosedError
 

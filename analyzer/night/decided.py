@@ -33,7 +33,7 @@ OF_ORDER = (
 COLUMNS = tuple(dict.fromkeys((*names((*RANKING, *LISTED, *BELIEVED)), *OF_ORDER)))
 TIES = ("master", "ratio_of", "split_of", "override_with")
 """Columns of loops.csv that link a loop to another one."""
-MOST_BESIDE = 60
+MOST_NEIGHBOURS = 60
 """Largest number of loops of a plant for which common oscillations are searched: takes some seconds."""
 
 
@@ -81,7 +81,7 @@ def _related(plant: Plant, night: Night, loop: str) -> tuple[LoopSpec, ...]:
     """The loop and all loops whose night may change its row: those with a common oscillation or a link, by loops.csv
     or by the trends; in a large plant by loops.csv alone."""
     ties = [(spec.loop, other) for spec in plant.specs for other in _stated(spec)]
-    if len(plant.specs) <= MOST_BESIDE:
+    if len(plant.specs) <= MOST_NEIGHBOURS:
         ties += _seen(plant, night)
     found, before = {loop}, 0
     while len(found) > before:
@@ -97,16 +97,16 @@ def _stated(spec: LoopSpec) -> Iterable[str]:
 def _seen(plant: Plant, night: Night) -> Sequence[tuple[str, str]]:
     """Pairs of loops with a common oscillation, or in which one's output moves the other's set point."""
     series = plant.trends(list(dict.fromkeys(tag for spec in plant.specs for tag in spec.tags)), night)
-    waves: list[OscillationLines] = []
+    lines: list[OscillationLines] = []
     moves: list[Moves] = []
     config = plant.config
     for spec in plant.specs:
         with suppress(NotAssessedError):
             record = prepare(spec, {t: series[t] for t in spec.tags}, config.quality).record
             end_s = record.start_s + record.duration_s
-            waves += error_lines_of(spec.loop, detect(record, config.oscillation), end_s, config.plant)
+            lines += error_lines_of(spec.loop, detect(record, config.oscillation), end_s, config.plant)
             moves += filter(None, [moves_of(record)])
     shared = [
-        (group.loops[0], other) for group in groups_of(waves, config.plant) for other in group.loops[1:]
+        (group.loops[0], other) for group in groups_of(lines, config.plant) for other in group.loops[1:]
     ]
     return [*shared, *((loop, link.loop) for loop, link in links_of(moves, config.plant).items())]

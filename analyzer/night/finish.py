@@ -86,18 +86,18 @@ def finish_night(
     kept = {
         loop for loop, own in loops.items() if loop in old and fuller(old[loop], _worth(own), config.nights)
     }
-    beside = [loop for loop in old if loop not in loops]
+    others = [loop for loop in old if loop not in loops]
     mine = [loop for loop in loops if loop not in kept]
     for name in JOINED:  # trends are most of a night's data
         before = () if replace else store.parts_if_there(name, night)
         store.write(name, night, _joined_tables(before, held.tables(name), mine))
     groups = [*other, *reassign_sources(found, loops)]
     store.write("groups", night, rows_table(groups, GROUPS) if groups else None)
-    joined = [*(k for k in order if k in loops), *beside]
+    joined = [*(k for k in order if k in loops), *others]
     store.write("nights", night, _joined_rows(held, joined, {k: loops[k] for k in mine}, config))
     store.forget_explained(night, None if replace else mine)
     store.forget_compared()
-    return (*update_beliefs(store, night, config), *_joining_told(night, loops, old, kept, beside))
+    return (*update_beliefs(store, night, config), *_joining_notes(night, loops, old, kept, others))
 
 
 class Pieces:
@@ -182,16 +182,16 @@ def _joined_tables(
         yield pa.concat_tables([schema.empty_table(), part], promote_options="default").unify_dictionaries()
 
 
-def _joining_told(
-    night: str, loops: Mapping[str, Finding], old: Mapping[str, Row], kept: set[str], beside: Sequence[str]
+def _joining_notes(
+    night: str, loops: Mapping[str, Finding], old: Mapping[str, Row], kept: set[str], others: Sequence[str]
 ) -> tuple[str, ...]:
     """Notes on a night that already existed."""
-    said = []
-    if beside:
-        said.append(f"night {night}: {len(beside)} loops of an earlier run are also kept")
+    notes = []
+    if others:
+        notes.append(f"night {night}: {len(others)} loops of an earlier run are also kept")
     for loop in sorted(kept):
-        said.append(
+        notes.append(
             f"{loop}: the store has {_good_h(old[loop]):.1f} good hours of night {night}, this export "
             f"{_good_h(loops[loop].known):.1f}; the fuller record is kept (--replace takes this one)"
         )
-    return tuple(said)
+    return tuple(notes)

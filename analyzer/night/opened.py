@@ -31,37 +31,39 @@ MOST_NAMES = 10
 """Maximum number of loops listed in a note; the others are counted."""
 
 
-def opened(asked: ExportRequest) -> Plant:
+def opened(request: ExportRequest) -> Plant:
     """The export and its loops, found by their tags' endings without a loops.csv, and notes on them and on the
     changes."""
     stated = (
-        () if asked.loops is None else read_loops(asked.loops, asked.zone, asked.reading.get("day_first"))
+        ()
+        if request.loops is None
+        else read_loops(request.loops, request.zone, request.reading.get("day_first"))
     )
     tags = frozenset(tag for s in stated for role in ROLES if (tag := getattr(s, role)))
-    source = open_export(list(asked.export), ReadOptions(**asked.reading, stated=tags))
+    source = open_export(list(request.export), ReadOptions(**request.reading, stated=tags))
     notes: tuple[str, ...] = ()
-    if asked.loops is None and asked.finding:
-        rows = draft(source, (), asked.span)
+    if request.loops is None and request.finding:
+        rows = draft(source, (), request.span)
         specs = tuple(row.as_run for row in rows if row.sure)
         notes = found_text(rows)
-    elif asked.loops is None:
+    elif request.loops is None:
         specs = find_loops(source.tags)
     else:
         specs, notes = match(stated, source.tags)
         own = unknown_columns(stated)
         if own:
-            kept = f"{asked.loops}: columns {', '.join(own)} are not used and are kept as the plant's own"
+            kept = f"{request.loops}: columns {', '.join(own)} are not used and are kept as the plant's own"
             notes = (kept, *notes)
     specs, currents = in_milliamperes(source, specs)
-    notes = (*notes, *currents, *_of_no_loop(asked.changes, specs))
-    return Plant(source, specs, asked.config, asked.span, asked.changes, asked.zone, notes)
+    notes = (*notes, *currents, *_of_no_loop(request.changes, specs))
+    return Plant(source, specs, request.config, request.span, request.changes, request.zone, notes)
 
 
-def drafted(asked: ExportRequest, told: Callable[[int, int], None]) -> list[Row]:
-    """The rows of a draft of loops.csv, those of a given one first; `told` is called with the number of tags read,
+def drafted(request: ExportRequest, report: Callable[[int, int], None]) -> list[Row]:
+    """The rows of a draft of loops.csv, those of a given one first; `report` is called with the number of tags read,
     and of all. Raises InputError where the export cannot be used."""
-    plant = guarded(asked)
-    return draft(plant.export, () if asked.loops is None else plant.specs, asked.span, told)
+    plant = guarded(request)
+    return draft(plant.export, () if request.loops is None else plant.specs, request.span, report)
 
 
 def in_milliamperes(
@@ -75,11 +77,11 @@ def in_milliamperes(
     looked_at = unstated[:MA_LOOPS]
     if len(unstated) < 2 or not all(_lies_within(source, str(s.op), MA_LOW, MA_HIGH) for s in looked_at):
         return specs, ()
-    said = (
+    note = (
         f"OP of {len(unstated)} loops lies between 4 and 20, like mA: nothing is reported in % of OP; state "
     )
     marked = tuple(replace(s, in_ma=True) if s in unstated else s for s in specs)
-    return marked, (f"{said}op_lo 4 and op_hi 20 in loops.csv, or 0 and 100 where it is percent",)
+    return marked, (f"{note}op_lo 4 and op_hi 20 in loops.csv, or 0 and 100 where it is percent",)
 
 
 def _lies_within(source: Export, tag: str, low: float, high: float) -> bool:
@@ -99,14 +101,14 @@ def _of_no_loop(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> t
     return (f"--changes: {text}: correct the name",) if strange else ()
 
 
-def opened_apart(asked: ExportRequest) -> Plant:
+def opened_apart(request: ExportRequest) -> Plant:
     """The request, opened in a worker process, because a damaged file may need unlimited memory or time. Raises
     InputError if the export cannot be used, or the process that read it died."""
-    with Workers(1, opened_with_spans, _allowed(asked)) as workers:
-        workers.submit(asked)
+    with Workers(1, opened_with_spans, _allowed(request)) as workers:
+        workers.submit(request)
         (found,) = workers.results()
     if isinstance(found, WorkerDeath):
-        raise _ended(asked.export[0], found.why)
+        raise _ended(request.export[0], found.why)
     return found
 
 
@@ -116,20 +118,20 @@ def _ended(path: Path, why: str) -> InputError:
     return InputError(seen, "files that are whole and fit into memory", remedy)
 
 
-def guarded(asked: ExportRequest) -> Plant:
+def guarded(request: ExportRequest) -> Plant:
     """The same, with its samples also read in a worker process; errors as of `opened_apart`, also on reading
     samples."""
-    scratch = asked.reading.get("scratch") or own_scratch()  # removed with this process in any case
-    plant = opened_apart(replace(asked, reading={**asked.reading, "scratch": scratch}))
-    return replace(plant, export=Guarded.of(plant.export, asked.config.workers))
+    scratch = request.reading.get("scratch") or own_scratch()  # removed with this process in any case
+    plant = opened_apart(replace(request, reading={**request.reading, "scratch": scratch}))
+    return replace(plant, export=Guarded.of(plant.export, request.config.workers))
 
 
 class Guarded(Export):
     """An export whose samples are read in a worker process with limits of memory and time."""
 
-    __slots__ = ("__weakref__", "_plain", "_told", "_worker")
+    __slots__ = ("__weakref__", "_plain", "_sent", "_worker")
     _plain: Export
-    _told: list[Export]
+    _sent: list[Export]
     _worker: Workers[Any, dict[str, Series]]
 
     @classmethod
@@ -137,19 +139,19 @@ class Guarded(Export):
         """An export, read under limits; the worker ends with it."""
         made = cls(**{f.name: getattr(plain, f.name) for f in fields(plain)})
         worker = Workers(1, read_apart, limits)
-        for name, value in (("_plain", plain), ("_told", []), ("_worker", worker)):
+        for name, value in (("_plain", plain), ("_sent", []), ("_worker", worker)):
             object.__setattr__(made, name, value)
         finalize(made, worker.__exit__)
         return made
 
     def read(self, tags: Sequence[str]) -> dict[str, Series]:
         self._check_known(tags)
-        self._worker.submit((None if self._told else self._plain, tuple(tags)))
+        self._worker.submit((None if self._sent else self._plain, tuple(tags)))
         (found,) = self._worker.results()
         if isinstance(found, WorkerDeath):
-            self._told.clear()
+            self._sent.clear()
             raise _ended(self.sources[self._homes[tags[0]][0]].path, found.why)
-        self._told[:] = [self._plain]
+        self._sent[:] = [self._plain]
         self._met.update({tag: series.found for tag, series in found.items() if series.found})
         return found
 
@@ -173,21 +175,21 @@ def _be_silent() -> None:
         os.dup2(nowhere.fileno(), 2)
 
 
-def _allowed(asked: ExportRequest) -> WorkerLimits:
+def _allowed(request: ExportRequest) -> WorkerLimits:
     """Limits for opening the export, by its size; for shared storage the copying is not known beforehand."""
-    near = [path for path in asked.export if not is_remote(path)]
+    near = [path for path in request.export if not is_remote(path)]
     files = [file for path in near for file in (path.rglob("*") if path.is_dir() else [path])]
-    limits = asked.config.opening
+    limits = request.config.opening
     more_s = sum(file.stat().st_size for file in files if file.is_file()) / limits.bytes_per_s
-    more_s += limits.fetched_s * (len(near) < len(asked.export))
+    more_s += limits.fetched_s * (len(near) < len(request.export))
     taking = {"processor_s": limits.processor_s + more_s, "wall_s": limits.wall_s + 6.0 * more_s}
-    return replace(asked.config.workers, memory_mb=limits.memory_mb, **taking)
+    return replace(request.config.workers, memory_mb=limits.memory_mb, **taking)
 
 
-def opened_with_spans(asked: ExportRequest, began: Callable[[int], None]) -> Plant:
+def opened_with_spans(request: ExportRequest, began: Callable[[int], None]) -> Plant:
     """Open an export in a worker, including its span of time."""
     _be_silent()
-    plant = opened(asked)
+    plant = opened(request)
     for spec in plant.specs:
         if spec.pv is not None:
             plant.export.span(spec.pv)

@@ -38,7 +38,7 @@ class ExportRequest:
     finding: bool = False
 
 
-def asked_of(
+def export_request(
     export: Sequence[Path],
     loops: Path | None,
     changes: Path | None,

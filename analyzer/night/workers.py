@@ -168,19 +168,19 @@ class Workers(Executor[T, R]):
 
     def _heard(self, worker: _Worker) -> Iterator[R | WorkerDeath[T]]:
         try:
-            kind, said = worker.pipe.recv()
+            kind, content = worker.pipe.recv()
         except (EOFError, OSError):
             worker.process.join()
             status = worker.process.exitcode
             yield self._buried(worker, _cause_of_death(status, self.limits), again=status != OUT_OF_TIME)
             return
         if kind == "began":
-            worker.at, worker.since_s = said, time.monotonic()
+            worker.at, worker.since_s = content, time.monotonic()
             return
         worker.task = None
         if kind == "raised":
-            raise said
-        yield said
+            raise content
+        yield content
 
     def _buried(self, worker: _Worker, why: str, again: bool) -> WorkerDeath[T]:
         worker.process.join()
@@ -204,7 +204,7 @@ def executor(
 def _process(pipe: Connection, *given: Any) -> Any:
     """The started process of a worker: on Linux forked from a server with common imports, otherwise, or if the server
     is not available, a new one."""
-    asked: dict[str, Any] = {"target": _serve, "args": (pipe, _surroundings(), *given), "daemon": True}
+    options: dict[str, Any] = {"target": _serve, "args": (pipe, _surroundings(), *given), "daemon": True}
     if sys.platform == "linux":
         with contextlib.suppress(OSError, EOFError):  # no space for its socket, or it died at the start
             forked = multiprocessing.get_context("forkserver")
@@ -212,10 +212,10 @@ def _process(pipe: Connection, *given: Any) -> Any:
             _forget_dead_servers(Path(tempfile.gettempdir()))
             with _undisturbed():
                 forkserver.ensure_running()
-            process: Any = forked.Process(**asked)
+            process: Any = forked.Process(**options)
             process.start()
             return process
-    process = multiprocessing.get_context("spawn").Process(**asked)
+    process = multiprocessing.get_context("spawn").Process(**options)
     process.start()
     return process
 

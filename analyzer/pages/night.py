@@ -114,7 +114,7 @@ def _loop_pages(
         found = explained.get(tag)
         drawn, settings = (loads(text or "") for text in (found and found.get("page"), compared.get(tag)))
         group = by_number.get(own[-1]["group"] or "")
-        said = [n.said(night.zone) for n in night.notes.get(tag, ())]
+        said = [n.as_line(night.zone) for n in night.notes.get(tag, ())]
         part = None if group is None else groups.member_section(group, tag, around)
         about = loop.loop_page(own, trends.get(tag), found, drawn, part, said, settings)
         yield about

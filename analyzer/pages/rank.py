@@ -94,7 +94,9 @@ def _noted(row: dict[str, Any], known: Mapping[str, tuple[notes.Note, ...]]) -> 
     """A row with the newest note of its loop; non-finite numbers become unknown."""
     row = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in row.items()}
     found = notes.last(known, row["loop"])
-    said, until = (None, None) if found is None else (found.said(row["timezone"]), found.hidden_until or None)
+    said, until = (
+        (None, None) if found is None else (found.as_line(row["timezone"]), found.hidden_until or None)
+    )
     return {**row, "note": said, "hidden_until": until}
 
 

@@ -199,7 +199,7 @@ class ShownNight:
     def note(self, loop: str) -> str:
         """The newest note of a loop, '' if there is none."""
         found = last(self.notes, loop)
-        return "" if found is None else found.said(self.zone)
+        return "" if found is None else found.as_line(self.zone)
 
     def link(self, loop: str) -> Cell:
         """The loop's name, linked to its page if there is one."""

@@ -42,7 +42,7 @@ class Note:
     state: str = ""
     due: str = ""
 
-    def said(self, zone: str | None) -> str:
+    def as_line(self, zone: str | None) -> str:
         """The note in one line, with its time on the plant's clock."""
         more = f", {self.state}" if self.state else ""
         more += f", due {self.due}" if self.due else ""

@@ -67,7 +67,7 @@ def test_a_log_event_is_one_line_of_words(tmp_path: Path) -> None:
     """An event with any reason is one line of printable characters, and the shell's quoting rules split the
     line into its words again."""
     log = RunLog(tmp_path / "logs" / "x.log")
-    log.say("lost", loop="FIC 1", reason='a "quoted"\nline\x1b[2J \u202e back\\slash', share=0.5)
+    log.write("lost", loop="FIC 1", reason='a "quoted"\nline\x1b[2J \u202e back\\slash', share=0.5)
     (line,) = (tmp_path / "logs" / "x.log").read_text(encoding="utf-8").splitlines()
     assert line.isprintable()
     words = shlex.split(line)
@@ -85,8 +85,8 @@ def test_a_log_that_cannot_be_written_does_not_stop_the_night(
     """If the log's folder is a file, the program reports this once and continues to work."""
     (tmp_path / "file").write_text("")
     log = RunLog(tmp_path / "file" / "x.log")
-    log.say("begin")
-    log.say("end")
+    log.write("begin")
+    log.write("end")
     assert capsys.readouterr().err.count("no log is kept") == 1
 
 

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 from analyzer.cli import main
 from analyzer.config import Config, configured, limit_of, limits_document, read_config
-from analyzer.explain.case import asked_cases, whole
+from analyzer.explain.case import requested_cases, whole
 from analyzer.loops.changes import TuningChange
 from analyzer.night.opened import guarded
 from analyzer.night.request import ExportRequest
@@ -200,7 +200,7 @@ def test_explain_and_simulate_work_on_the_span_with_its_settings(export: Path):
     loops.write_text("loop,type,pv_lo,pv_hi,kp,ti\nLIC1,level,0,100,0.9,40\n")
     request = ExportRequest((export,), loops, changes, hour, Config(), "UTC", {})
     case, pv = whole(request, "LIC1")
-    explained, held_out = asked_cases(request, guarded(request), "LIC1", ())
+    explained, held_out = requested_cases(request, guarded(request), "LIC1", ())
     assert not held_out
     assert explained.spec == case.spec
     assert (pv.stamp_s[0], pv.stamp_s[-1]) == (hour[0], hour[1] - 1.0)

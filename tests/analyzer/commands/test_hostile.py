@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from analyzer.cli import main
-from analyzer.commands.options import MOST_SAID, one_line
+from analyzer.commands.options import MOST_CHARACTERS, one_line
 from analyzer.explain.models import checked
 from analyzer.store.store import Store
 from identification.errors import InputError
@@ -220,7 +220,7 @@ def test_a_message_is_one_line() -> None:
     """A message is one line that fits a screen, independently of the text that it quotes."""
     text = one_line("a\nb\x1b[2J\u202e" + "x" * 100_000)
     assert text.isprintable()
-    assert len(text) < MOST_SAID + 20
+    assert len(text) < MOST_CHARACTERS + 20
 
 
 def test_a_group_with_a_missing_loop(tmp_path: Path) -> None:

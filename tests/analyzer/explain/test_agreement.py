@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import pytest
 
-from analyzer.explain.words import TOLD, agreement, night_note
+from analyzer.explain.words import TEXTS, agreement, night_note
 
 
 @pytest.mark.parametrize(
@@ -14,7 +14,7 @@ from analyzer.explain.words import TOLD, agreement, night_note
     [
         ("valve", "backlash", "backlash", "valve", "agree"),
         ("valve", "undecided", "stiction", "valve", "agree"),
-        ("valve", "backlash", "positioner", "valve", TOLD["beside_verdict"]["stroke"]),
+        ("valve", "backlash", "positioner", "valve", TEXTS["beside_verdict"]["stroke"]),
         ("valve", "stiction", "none", "none", "does not confirm it"),
         ("valve", "stiction", "second-lag", "process", "does not confirm it"),
         ("valve", "backlash", "quantization", "sensor", "neither confirms nor contradicts"),
@@ -47,5 +47,5 @@ def test_an_explanation_of_a_loop_without_action_says_so(block: str, text: str) 
     night = {"cause": "none", "action": "none", "valve_fault": "none", "lanes": None}
     assert (
         night_note(night, "backlash" if block == "valve" else "second-lag", block)
-        == (TOLD["beside_verdict"][text])
+        == (TEXTS["beside_verdict"][text])
     )

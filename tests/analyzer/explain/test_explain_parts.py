@@ -14,10 +14,10 @@ import pytest
 from analyzer.config import Config
 from analyzer.explain.case import (
     PART_SAMPLES,
-    asked_cases,
     latest_night,
     parts,
-    parts_said,
+    parts_note,
+    requested_cases,
     stretch_of_night,
 )
 from analyzer.history.series import Series
@@ -53,7 +53,7 @@ def test_each_part_has_the_settings_of_its_time() -> None:
     assert [(p.samples, p.spec.kp) for p in found] == [(3000, 1.0), (1000, 1.5), (1000, 2.0)]
     stamps = np.concatenate([p.series["A.OP"].stamp_s for p in found])
     np.testing.assert_array_equal(np.sort(stamps), np.arange(N))
-    assert "1970-01-01 00:00 to 1970-01-01 00:49" in parts_said(found)
+    assert "1970-01-01 00:00 to 1970-01-01 00:49" in parts_note(found)
 
 
 def test_changes_elsewhere_leave_one_part() -> None:
@@ -61,7 +61,7 @@ def test_changes_elsewhere_leave_one_part() -> None:
     outside = (changed(2000, 1.0, 1.5, "B"), changed(-5.0, 1.0, 2.0), changed(N + 10, 2.0, 3.0))
     found = parts(SPEC, trends(), outside, "UTC")
     assert [(p.samples, p.spec.kp) for p in found] == [(N, 2.0)]
-    assert parts_said(found) == ""
+    assert parts_note(found) == ""
 
 
 def test_a_part_that_is_too_short_is_left_out() -> None:
@@ -90,7 +90,7 @@ def test_part_with_constant_op_is_left_out(tmp_path: Path, still: int) -> None:
     start = stamp[0].timestamp()
     changes = (changed(start + 2500, 1.0, 1.5), changed(start + 4000, 1.5, 2.0))
     request = ExportRequest((tmp_path / "x.parquet",), None, changes, ALWAYS, Config(), "UTC", {})
-    explained, others = asked_cases(request, guarded(request), "A", ())
+    explained, others = requested_cases(request, guarded(request), "A", ())
     moving = [n for i, n in enumerate(lengths) if i != still]
     assert [len(c.prepared.record) for c in (explained, *others.values())] == moving
 

@@ -14,7 +14,7 @@ from analyzer.cli import main
 from analyzer.config import Config
 from analyzer.loop.experiments.found import experiment_results
 from analyzer.night.opened import opened
-from analyzer.night.request import asked_of
+from analyzer.night.request import export_request
 
 INPUTS = Path(__file__).parents[3].parent / "shared" / "inputs"
 shared = pytest.mark.skipif(
@@ -32,7 +32,7 @@ def output_of(*arguments):
 def learned_from(name, loops=None):
     """The results of the experiments in a file of the study for its one loop."""
     export = INPUTS / f"{name}.csv"
-    plant = opened(asked_of([export], loops and INPUTS / loops, None, Config()))
+    plant = opened(export_request([export], loops and INPUTS / loops, None, Config()))
     one = plant.last_night(plant.loops[0])
     return experiment_results(one.spec, plant.trends(one.spec.tags, one.night), one.prepared, plant.config)
 
@@ -199,7 +199,7 @@ def test_a_model_against_the_controller_is_not_reported(tmp_path):
 
     def model(kp):
         (tmp_path / "loops.csv").write_text(f"loop,kp,ti,pv_lo,pv_hi\nT1,{kp},60,0,100\n")
-        plant = opened(asked_of([tmp_path / "steps.csv"], tmp_path / "loops.csv", None, Config()))
+        plant = opened(export_request([tmp_path / "steps.csv"], tmp_path / "loops.csv", None, Config()))
         one = plant.last_night(plant.loops[0])
         return experiment_results(
             one.spec, plant.trends(one.spec.tags, one.night), one.prepared, plant.config
