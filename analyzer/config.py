@@ -34,10 +34,10 @@ class OscillationLimits(Limits, section="oscillation"):
     def nearly(self) -> OscillationLimits:
         """The limits for a cycle that needs further confirmation: half-cycles may differ, because a valve slips when
         OP has moved far enough, at any time."""
-        asked = ("shape", "shape_least", "swing", "swing_least")
+        names = ("shape", "shape_least", "swing", "swing_least")
         return replace(
             self,
-            **{name: getattr(self, name) - self.near for name in asked},
+            **{name: getattr(self, name) - self.near for name in names},
             shape_prominence=self.near_prominence,
             share=self.near_share,
             swing_cycles=self.periods,
@@ -181,42 +181,42 @@ def _section(limits: Any, stated: Mapping[str, Any], where: str) -> Any:
 
 def _checked(field: Field[Any], default: Any, value: Any, where: str) -> Any:
     """A value of the field's type, within its range."""
-    said, whole = limit_of(field), isinstance(default, int)
+    limit, whole = limit_of(field), isinstance(default, int)
     if isinstance(default, tuple):
-        return _rows_by_type(said, value, where)
-    if not _is_number(value, said, whole):
+        return _rows_by_type(limit, value, where)
+    if not _is_number(value, limit, whole):
         kind = "a whole number" if whole else "a number"
-        raise InputError(f"{where} is {value!r}", f"{kind} {_range(said)}", REMEDY)
+        raise InputError(f"{where} is {value!r}", f"{kind} {_range(limit)}", REMEDY)
     return value if whole else float(value)
 
 
-def _is_number(value: Any, said: Limit, whole: bool = False) -> bool:
+def _is_number(value: Any, limit: Limit, whole: bool = False) -> bool:
     """Whether a value is a number of the required kind, within its range."""
     if isinstance(value, bool) or not isinstance(value, int if whole else (int, float)):
         return False
-    return bool(said.least <= value <= said.most)  # false of NaN
+    return bool(limit.least <= value <= limit.most)  # false of NaN
 
 
-def _rows_by_type(said: Limit, value: Any, where: str) -> tuple[tuple[str, float, float], ...]:
+def _rows_by_type(limit: Limit, value: Any, where: str) -> tuple[tuple[str, float, float], ...]:
     """Rows of a loop's type and two numbers."""
     rows = value if isinstance(value, list) else [value]
     for row in rows:
         shaped = isinstance(row, list) and len(row) == 3 and isinstance(row[0], str)
-        if not shaped or not all(_is_number(cell, said) for cell in row[1:]):
-            expected = f'rows such as ["flow", 60.0, 30.0], {_range(said)}'
+        if not shaped or not all(_is_number(cell, limit) for cell in row[1:]):
+            expected = f'rows such as ["flow", 60.0, 30.0], {_range(limit)}'
             raise InputError(f"{where} has {row!r}", expected, REMEDY)
     return tuple((row[0].lower(), float(row[1]), float(row[2])) for row in rows)
 
 
 def limit_of(field: Field[Any]) -> Limit:
     """The declaration of a field."""
-    said: Limit = field.metadata[KEY]
-    return said
+    limit: Limit = field.metadata[KEY]
+    return limit
 
 
-def _range(said: Limit) -> str:
-    unit = "" if said.unit == "-" else f" [{said.unit}]"
-    return f"from {said.least:g} to {said.most:g}{unit}"
+def _range(limit: Limit) -> str:
+    unit = "" if limit.unit == "-" else f" [{limit.unit}]"
+    return f"from {limit.least:g} to {limit.most:g}{unit}"
 
 
 def limits_document(config: Config) -> str:
@@ -229,8 +229,8 @@ def _part_of_file(name: str, limits: Any) -> str:
     first = (type(limits).__doc__ or "").splitlines()[0]
     lines = ["", f"# {first}", f"[{name}]"]
     for each in fields(limits):
-        said = limit_of(each)
-        text = f"{said.meaning}. {_range(said).replace('from', 'From', 1)}; {said.source}."
+        limit = limit_of(each)
+        text = f"{limit.meaning}. {_range(limit).replace('from', 'From', 1)}; {limit.source}."
         lines += [f"# {line}" for line in textwrap.wrap(text, WIDTH)]
         value = getattr(limits, each.name)  # JSON's numbers, text and lists are TOML's
         lines.append(f"{each.name} = {json.dumps(value, ensure_ascii=False)}")

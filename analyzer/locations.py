@@ -141,13 +141,13 @@ def remove_tree(path: Path) -> None:
         remote.fs.rm(remote.path, recursive=True)
 
 
-def each(function: Callable[..., T], paths: Sequence[Path], *beside: Iterable[Any]) -> list[T]:
+def each(function: Callable[..., T], paths: Sequence[Path], *others: Iterable[Any]) -> list[T]:
     """Results of a function for each of some paths, and for further arguments; in parallel for shared storage, which
     answers many requests as fast as one. The first error is raised."""
     if len(paths) < 2 or not is_remote(paths[0]):
-        return list(map(function, paths, *beside))
+        return list(map(function, paths, *others))
     with ThreadPoolExecutor(AT_ONCE) as pool:
-        return list(pool.map(function, paths, *beside))
+        return list(pool.map(function, paths, *others))
 
 
 def afresh(path: Path) -> Path:

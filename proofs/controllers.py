@@ -114,8 +114,8 @@ def judged(c: Controlled, every: int) -> Judged:
             off = None if seen.other is None else _off(seen.other, c.ideal)
             out.ways.append((what, seen.other is not None, named, off))
             if what == TRUE:
-                out.recognized, out.invented = _features(stated, seen.beside, c.extras)
-        alone = shown(p.record, None, time_scale(p.record, cycle, None), config.settings).beside
+                out.recognized, out.invented = _features(stated, seen.detected, c.extras)
+        alone = shown(p.record, None, time_scale(p.record, cycle, None), config.settings).detected
         out.alone = None if alone is None else _off(alone, c.ideal)
     return out
 

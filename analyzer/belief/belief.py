@@ -168,7 +168,7 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], config: C
         return before
     now, limits = before or Belief(row["loop"], ""), config.belief
     share = valve.faded_over(now.night, row["night"], limits) if now.night else 1.0
-    now = _recorded_anew(_after_changes(now, row, repaired_s), row, limits)
+    now = _after_recorder_change(_after_changes(now, row, repaired_s), row, limits)
     found = cycle.cycle_with_night(now.cycle, share, row, limits)
     now = _with_witness(replace(now, cycle=found), share, row, repaired_s, config)
     ended = before is not None and before.cycle.loud and not found.loud
@@ -185,9 +185,9 @@ def _with_constants(now: Belief, row: Row, limits: BeliefLimits) -> Belief:
     """The belief with the constants of an experiment, from a night without other results."""
     share = valve.faded_over(now.night, row["night"], limits) if now.night else 1.0
     constants = {k: pool.faded(share) for k, pool in now.constants.items()}
-    said = evidence_of(row) or {}
-    for name in set(CONSTANTS) & said.keys():
-        value, deviation = said[name]
+    evidence = evidence_of(row) or {}
+    for name in set(CONSTANTS) & evidence.keys():
+        value, deviation = evidence[name]
         pool = constants.get(name, Pool())
         constants[name] = pool.plus(value, deviation, LEAST_DEVIATION, MOST_DEVIATION)
     return replace(now, constants=constants)
@@ -199,14 +199,14 @@ def _span(row: Row) -> tuple[float, float]:
     return start_s, start_s + (row["duration_s"] or 0.0)
 
 
-def _recorded_anew(now: Belief, row: Row, limits: BeliefLimits) -> Belief:
+def _after_recorder_change(now: Belief, row: Row, limits: BeliefLimits) -> Belief:
     """The belief without sizes and constants, which depend on the recorder, if another recorder or compression is in
     use; the valve is the same."""
     then, straight = now.straight_pct, row["straight_pct"]
     now = replace(now, straight_pct=straight)
     if then is None or straight is None or abs(straight - then) <= limits.recorder:
         return now
-    same, seen = replace(now.cycle, usual=None, off=0), valve.recorded_otherwise(now.valve)
+    same, seen = replace(now.cycle, usual=None, off=0), valve.after_recorder_change(now.valve)
     return replace(now, cycle=same, valve=seen, constants={}, widths=(), recorder=row["night"])
 
 
@@ -215,13 +215,13 @@ def _after_changes(now: Belief, row: Row, repaired_s: Sequence[float]) -> Belief
     previous night."""
     settings, fresh = (row["kp"], row["ti"]), CycleBelief(top=now.cycle.top, loud=now.cycle.loud)
     phases = forgotten(now.phases)
-    anew = replace(now, cycle=fresh, remedy=RemedyBelief(), before=now.last, phases=phases)
+    reset = replace(now, cycle=fresh, remedy=RemedyBelief(), before=now.last, phases=phases)
     listed = now.remedy.action is Action.CHECK_SETTINGS
     if now.night and None not in (now.kp, *settings) and (now.kp, now.ti) != settings:
         # a corrected loops.csv changes no loop
-        now = replace(now, remedy=RemedyBelief()) if listed else anew
+        now = replace(now, remedy=RemedyBelief()) if listed else reset
     elif now.night and not listed and row["action"] == Action.CHECK_SETTINGS:
-        now = anew
+        now = reset
     if any(now.end_s < at <= _span(row)[1] for at in repaired_s) and now.night:
         kept = {k: v for k, v in now.constants.items() if k not in OF_VALVE}
         now = replace(now, valve=ValveBelief(), constants=kept, widths=(), cycle=fresh, remedy=RemedyBelief())
@@ -234,20 +234,20 @@ def _with_witness(now: Belief, share: float, row: Row, repaired_s: Sequence[floa
     start_s, end_s = _span(row)
     mixed = any(start_s < at < end_s for at in repaired_s)
     constants = {k: pool.faded(share) for k, pool in now.constants.items()}
-    said, limits = None if mixed else evidence_of(row), config.belief
-    if said is None:
+    evidence, limits = None if mixed else evidence_of(row), config.belief
+    if evidence is None:
         return replace(now, constants=constants)
-    wrong = valve.doubt(said, now.cycle.cause, counts(row["oscillating_pct"]), config)
-    found = valve.valve_with_night(now.valve, share, row["night"], said, wrong, limits)
+    wrong = valve.doubt(evidence, now.cycle.cause, counts(row["oscillating_pct"]), config)
+    found = valve.valve_with_night(now.valve, share, row["night"], evidence, wrong, limits)
     another = found.since != now.valve.since
     if another:
         constants = {k: pool for k, pool in constants.items() if k not in OF_VALVE}
     widths = () if another and found.width < now.valve.width else now.widths
-    if "width" in said:
-        widths = (*widths, (row["night"], *said["width"]))[-REMEMBERED:]
+    if "width" in evidence:
+        widths = (*widths, (row["night"], *evidence["width"]))[-REMEMBERED:]
     for name in CONSTANTS:
-        if name in said:
-            pool, (value, deviation) = constants.get(name, Pool()), said[name]
+        if name in evidence:
+            pool, (value, deviation) = constants.get(name, Pool()), evidence[name]
             constants[name] = pool.plus(value, deviation, LEAST_DEVIATION, MOST_DEVIATION)
     certain = ("" if another else now.valve.certain) or row["night"] if found.is_worn(limits) else ""
     return replace(now, valve=replace(found, certain=certain), constants=constants, widths=widths)
@@ -272,18 +272,18 @@ def night_decision(now: Belief, row: Row, limits: BeliefLimits) -> NightDecision
     alone = now.cycle.nights == 1 and now.valve.nights <= 1
     cycles = counts(row["oscillating_pct"])
     dead = own.cause is Cause.VALVE and own.fault is Fault.UNDECIDED and not cycles
-    told = own if alone or dead else (_of_cycle if cycles else _of_calm)(now, own, limits)
-    if cycles and told.cause is Cause.VALVE and now.is_calmed(limits):
-        told = _without_new_settings(told)
-    return replace(told, own=GIST(told) == GIST(own))
+    decision = own if alone or dead else (_of_cycle if cycles else _of_calm)(now, own, limits)
+    if cycles and decision.cause is Cause.VALVE and now.is_calmed(limits):
+        decision = _without_new_settings(decision)
+    return replace(decision, own=GIST(decision) == GIST(own))
 
 
-def _without_new_settings(told: NightDecision) -> NightDecision:
+def _without_new_settings(decision: NightDecision) -> NightDecision:
     """Decision for a loop with a worn valve whose cycle became much smaller after a change of settings. It
     has no further settings; the repair is due at the next shutdown."""
-    if not action.is_urgent(told.action, told.due):
-        return told
-    return replace(told, action=Action.REPAIR_VALVE, due=Due.SHUTDOWN, pair=None, calmed=True)
+    if not action.is_urgent(decision.action, decision.due):
+        return decision
+    return replace(decision, action=Action.REPAIR_VALVE, due=Due.SHUTDOWN, pair=None, calmed=True)
 
 
 def _own(row: Row) -> NightDecision:
@@ -325,14 +325,14 @@ def _of_cycle(now: Belief, own: NightDecision, limits: BeliefLimits) -> NightDec
     fault = now.valve.fault(now.told.fault) if worn and (cause is Cause.VALVE or surely) else Fault.NONE
     if cause is Cause.UNDECIDED and fault is Fault.NONE:
         fault = own.fault if own.fault is Fault.UNDECIDED else Fault.NONE
-    told = NightDecision(cause, confidence, fault)
-    return _with_remedy(now, own, told)
+    decision = NightDecision(cause, confidence, fault)
+    return _with_remedy(now, own, decision)
 
 
-def _with_remedy(now: Belief, own: NightDecision, told: NightDecision) -> NightDecision:
+def _with_remedy(now: Belief, own: NightDecision, decision: NightDecision) -> NightDecision:
     """Action for a cycle with a cause."""
-    worn, done = told.fault in (Fault.BACKLASH, Fault.STICTION), now.remedy
+    worn, done = decision.fault in (Fault.BACKLASH, Fault.STICTION), now.remedy
     voted = None if done.action is Action.RETUNE and done.held is None else done.action
     alone = own.cause, own.action, own.due
-    chosen, due = action.of_nights(told.cause, worn, alone, voted, action.of_votes(done.votes))
-    return replace(told, action=chosen, due=due, pair=done.held if chosen is Action.RETUNE else None)
+    chosen, due = action.of_nights(decision.cause, worn, alone, voted, action.of_votes(done.votes))
+    return replace(decision, action=chosen, due=due, pair=done.held if chosen is Action.RETUNE else None)

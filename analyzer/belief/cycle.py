@@ -35,7 +35,7 @@ WITH_PAIR = ("kp_new", "ti_new", "advice", "expected_period_s", "expected_pv_amp
 """Columns of a night for an advised pair of settings."""
 CHOICES = (Action.RETUNE, Action.REPAIR_VALVE, Action.CHECK_SETTINGS)
 """Actions on which nights vote."""
-TOLD_AGAIN = (*CHOICES, Action.NEEDS_DATA, Action.UNDECIDED)
+VOTED_ACTIONS = (*CHOICES, Action.NEEDS_DATA, Action.UNDECIDED)
 """Actions of an oscillating loop on which nights vote; the others follow from cause and lanes."""
 TWO_SIGMA = 2.0 * 1.4826
 """Two standard deviations of a normal error relative to its median absolute deviation."""
@@ -97,17 +97,17 @@ def cycle_with_night(before: CycleBelief, share: float, row: Row, limits: Belief
     """The belief with one more night; earlier ones count for a share."""
     loud, top = oscillation_state(before, row, limits)
     begun = _usual_size(before, float(row["oscillation_significance"] or 0.0) if loud else 0.0, limits)
-    told = replace(begun, since=before.since or row["night"], nights=before.nights + 1, loud=loud, top=top)
+    updated = replace(begun, since=before.since or row["night"], nights=before.nights + 1, loud=loud, top=top)
     if not counts(row["oscillating_pct"]):
-        return told
+        return updated
     weight, odds = share * before.weight + 1.0, _log_confidence(row, limits)
     sources = {k: share * v for k, v in before.sources.items()}
     if row["source_loop"]:
         sources[row["source_loop"]] = sources.get(row["source_loop"], 0.0) + 1.0
         odds = tuple(x / before.weight for x in before.odds) if before.weight else odds
     summed = tuple(share * a + b for a, b in zip(before.odds, odds, strict=True))
-    told = replace(told, weight=weight, odds=summed, sources=sources)
-    return replace(told, cause=_cause_named(told, row, limits))
+    updated = replace(updated, weight=weight, odds=summed, sources=sources)
+    return replace(updated, cause=_cause_named(updated, row, limits))
 
 
 def _usual_size(before: CycleBelief, significance: float, limits: BeliefLimits) -> CycleBelief:
@@ -189,7 +189,7 @@ def remedy_with_night(before: RemedyBelief, share: float, row: Row, limits: Beli
     """The belief with one more night; earlier ones count for a share."""
     votes = {a: share * v for a, v in before.votes.items()}
     action = row["action"]
-    if action in TOLD_AGAIN:
+    if action in VOTED_ACTIONS:
         votes[Action(action)] = votes.get(Action(action), 0.0) + 1.0
     pairs, advised, pair = before.pairs, before.advised, advised_pair(row)
     if pair is not None:

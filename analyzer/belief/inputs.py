@@ -30,8 +30,8 @@ def inputs_of(
     found = blake2b(content(store.file("nights", night)), digest_size=16)
     if before is not None:
         found.update(content(store.file("beliefs", before)))
-    said = [SCHEMA, {k: v for k, v in done.items() if v}, repr(config.belief), repr(config.wear)]
-    found.update(json.dumps(said).encode())
+    values = [SCHEMA, {k: v for k, v in done.items() if v}, repr(config.belief), repr(config.wear)]
+    found.update(json.dumps(values).encode())
     return found.hexdigest()
 
 

@@ -179,7 +179,7 @@ def _loops(store: Store, night: str, table: str) -> list[str]:
 def _repaired(store: Store) -> dict[str, list[float]]:
     """Times of valve repairs of each loop from notes [s since 1970-01-01 UTC]."""
     return {
-        loop: [n.time_s for n in own if words.says_repaired(n.text)]
+        loop: [n.time_s for n in own if words.reports_repair(n.text)]
         for loop, own in notes.read_notes(store.path).items()
     }
 
@@ -278,11 +278,13 @@ def _belief_row(
     if not text and grown and not any(growth(p, config.wear) for p in (before.phases if before else ())):
         text, tone = words.growing(*grown[0], row), "worse"
     lanes = ", ".join(filter(None, (row["lanes"], Lane.WEAR if found is not None else None)))
-    told = words.told(now, row) | {"lanes": lanes or None}
-    return known | told | {"news": text or None, "news_tone": tone or None}
+    reported = words.reported_columns(now, row) | {"lanes": lanes or None}
+    return known | reported | {"news": text or None, "news_tone": tone or None}
 
 
 def _constants_kept(pools: Mapping[str, Pooled | None]) -> str:
     """Pooled constants: value, ends of the 90 % interval, and spread between nights."""
-    said = {k: [float(f"{x:.4g}") for x in (p.value, p.low, p.high, p.spread)] for k, p in pools.items() if p}
-    return json.dumps(said, separators=(",", ":"))
+    constants = {
+        k: [float(f"{x:.4g}") for x in (p.value, p.low, p.high, p.spread)] for k, p in pools.items() if p
+    }
+    return json.dumps(constants, separators=(",", ":"))

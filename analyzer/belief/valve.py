@@ -85,12 +85,12 @@ class ValveBelief:
         return before if before in (Fault.BACKLASH, Fault.STICTION) else Fault.UNDECIDED
 
 
-def recorded_otherwise(before: ValveBelief) -> ValveBelief:
+def after_recorder_change(before: ValveBelief) -> ValveBelief:
     """The belief after a change of recorder: the same valve may appear up to a quarter wider or narrower."""
 
     def widened(x: tuple[float, ...]) -> tuple[float, ...]:
-        beside = np.pad(np.asarray(x), 1, mode="edge")
-        return tuple(np.max([beside[:-2], beside[1:-1], beside[2:]], axis=0).tolist()) if x else x
+        padded = np.pad(np.asarray(x), 1, mode="edge")
+        return tuple(np.max([padded[:-2], padded[1:-1], padded[2:]], axis=0).tolist()) if x else x
 
     alone, summed, best = map(widened, (before.alone, before.summed, before.best))
     return replace(before, recent=(), alone=alone, summed=summed, best=best)
@@ -102,7 +102,7 @@ def faded_over(before: str, night: str, limits: BeliefLimits) -> float:
     return float(0.5 ** (max(gap, 0) / limits.half_life))
 
 
-def doubt(said: Witness, cause: Cause, oscillates: bool, config: Config) -> Doubt:
+def doubt(evidence: Witness, cause: Cause, oscillates: bool, config: Config) -> Doubt:
     """Possible error of a night's likelihood, in units of the evidence required for a verdict of one night [-]: as
     one of several nights, alone, and as evidence against a width.
 
@@ -111,18 +111,18 @@ def doubt(said: Witness, cause: Cause, oscillates: bool, config: Config) -> Doub
     """
     limits = config.belief
     if oscillates and cause is not Cause.VALVE:
-        beside = limits.doubt_beside if cause is Cause.LOAD else limits.doubt_small
-        return beside, beside, beside
-    width = float(WIDTHS[int(np.argmax(said["profile"]))])
-    narrow = oscillates or width < config.cause.size * said["op_range"]
+        error = limits.doubt_beside if cause is Cause.LOAD else limits.doubt_small
+        return error, error, error
+    width = float(WIDTHS[int(np.argmax(evidence["profile"]))])
+    narrow = oscillates or width < config.cause.size * evidence["op_range"]
     alone = limits.doubt_small if narrow else limits.doubt_alone
     return limits.doubt, alone, limits.doubt_alone if oscillates else limits.doubt_against
 
 
-def weighed(said: Witness, wrong_by: float, against: float, limits: BeliefLimits) -> Floats:
+def weighed(evidence: Witness, wrong_by: float, against: float, limits: BeliefLimits) -> Floats:
     """Evidence of a night for each width [nat], beyond its possible error. Evidence at the threshold of a
     fault counts as `conviction`; no night counts for more than `most`."""
-    found = np.asarray(said["profile"], dtype=np.float64) / max(said["needed"], 1e-9)
+    found = np.asarray(evidence["profile"], dtype=np.float64) / max(evidence["needed"], 1e-9)
     found = np.maximum(found - wrong_by, 0.0) + np.minimum(found + against, 0.0)
     found *= limits.conviction
     top = float(found.max())
@@ -132,21 +132,21 @@ def weighed(said: Witness, wrong_by: float, against: float, limits: BeliefLimits
 
 
 def valve_with_night(
-    before: ValveBelief, share: float, night: str, said: Witness, wrong: Doubt, limits: BeliefLimits
+    before: ValveBelief, share: float, night: str, evidence: Witness, wrong: Doubt, limits: BeliefLimits
 ) -> ValveBelief:
     """The belief with one more night; the earlier belief counts for a share [-].
 
-    said : the night's witness; wrong : its possible error, from `doubt`.
+    evidence : the night's witness; wrong : its possible error, from `doubt`.
     """
     *each, against = wrong
-    own, alone = (weighed(said, x, against, limits) for x in each)
+    own, alone = (weighed(evidence, x, against, limits) for x in each)
     faded = [(n, share * np.asarray(p)) for n, p in before.recent]
     recent = [*faded, (night, own)][-RECENT:]
     summed = share * np.asarray(before.summed) + own if before.summed else own
     at = changed_at(summed, [p for _, p in recent], limits.change, limits.confirmed)
     if at is not None:
-        return _begun_anew(recent[at:], said)
-    jump, clear = said["jump"]
+        return _different_valve(recent[at:], evidence)
+    jump, clear = evidence["jump"]
     return replace(
         before,
         since=before.since or night,
@@ -160,12 +160,14 @@ def valve_with_night(
     )
 
 
-def _begun_anew(recent: Sequence[tuple[str, Floats]], said: Witness) -> ValveBelief:
+def _different_valve(recent: Sequence[tuple[str, Floats]], evidence: Witness) -> ValveBelief:
     """The belief about a different valve, from the recent nights."""
     each = np.array([p for _, p in recent])
     summed, best = each.sum(axis=0), np.maximum(each.max(axis=0), 0.0)
     alone, summed, best = map(_kept, (np.minimum(summed, 0.0), summed, best))
-    return ValveBelief(recent[0][0], len(recent), alone, summed, best, _nights_kept(recent), *said["jump"])
+    return ValveBelief(
+        recent[0][0], len(recent), alone, summed, best, _nights_kept(recent), *evidence["jump"]
+    )
 
 
 def _kept(x: Floats) -> tuple[float, ...]:

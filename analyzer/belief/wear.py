@@ -139,12 +139,12 @@ def with_repetitions(
     """The phases with those in a night's row; a known repetition is not counted again, and at most `most` are
     stored."""
     out = list(known)
-    for told in json.loads(row.get("phases") or "[]"):
-        ends = told["begin"], told["end"]
+    for stored in json.loads(row.get("phases") or "[]"):
+        ends = stored["begin"], stored["end"]
         at = next((k for k, p in enumerate(out) if alike((p.begin, p.end), ends)), len(out))
         phase = out[at] if at < len(out) else PhaseKnown(*ends)
         last = phase.shown[-1][1] if phase.shown else -math.inf
-        found = zip(told["start_s"], told["overshoot_pct"], strict=True)
+        found = zip(stored["start_s"], stored["overshoot_pct"], strict=True)
         new = [(start, size) for start, size in found if start > last]
         numbered = tuple((phase.count + k, *each) for k, each in enumerate(new, 1))
         shown = (*phase.shown, *numbered)[-most:]

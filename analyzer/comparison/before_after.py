@@ -127,8 +127,10 @@ def _moves_of_load(op: Side, sp: Side) -> float:
     known = op.weight > 0
     if not known.any():
         return 0.0
-    asked, moved = sp.value - sp.value[known].mean(), op.value - op.value[known].mean()
-    moved = moved - asked * float(asked[known] @ moved[known]) / max(float(asked[known] @ asked[known]), 1e-9)
+    target, moved = sp.value - sp.value[known].mean(), op.value - op.value[known].mean()
+    moved = moved - target * float(target[known] @ moved[known]) / max(
+        float(target[known] @ target[known]), 1e-9
+    )
     days = [(moved[k : k + 24], known[k : k + 24]) for k in range(0, moved.size, 24)]
     spreads = [float(np.std(x[use])) for x, use in days if use.sum() >= 12]
     return float(np.median(spreads)) if spreads else 0.0
@@ -281,16 +283,16 @@ def compare(
 
     source_loop : the loop that this one follows, if the nights name one; evidence : further evidence.
     """
-    spans, beside = (before, after), evidence or Evidence()
+    spans, further = (before, after), evidence or Evidence()
     usable = [gridded(hours, s, "usable_h").weight.sum() for s in spans]
     held = float(usable[0]), float(usable[1])
     short = _too_little(held, spans, limits)
     if short:
-        beside = replace(beside, simulated=None)
-    reasons = (*short, *reasons_against(hours, before, after, limits), *beside.reasons)
-    beside = replace(beside, reasons=reasons)
-    known = tuple(c for m in MEASURES for c in change_of(hours, spans, m, beside, limits))
-    return LoopComparison(loop, before, after, held, known, reasons, source_loop, limits, beside.reference)
+        further = replace(further, simulated=None)
+    reasons = (*short, *reasons_against(hours, before, after, limits), *further.reasons)
+    further = replace(further, reasons=reasons)
+    known = tuple(c for m in MEASURES for c in change_of(hours, spans, m, further, limits))
+    return LoopComparison(loop, before, after, held, known, reasons, source_loop, limits, further.reference)
 
 
 @dataclass(frozen=True, slots=True)
@@ -330,8 +332,8 @@ def grade(found: LoopComparison) -> Grade:
     verdicts = [c.verdict for c in found.primary]
     better = [c for c in found.primary if c.verdict is ChangeVerdict.BETTER]
     known = [c for c in found.primary if c.verdict is not ChangeVerdict.INCOMPARABLE]
-    told = {c.verdict for c in known}
-    if not told:
+    present = {c.verdict for c in known}
+    if not present:
         return Grade.INCOMPARABLE
     if ChangeVerdict.WORSE in verdicts:
         return Grade.TRADED if better else Grade.WORSE

@@ -39,7 +39,7 @@ WINDOW_POWER = 0.375
 """Mean square of the Hann window in the stored spectrum."""
 HARMONICS = (1, 2, 3, 5)
 """Multiples of a valve's cycle that are removed from the load, because the simulated valve produces them."""
-BESIDE_OCTAVES = 0.5
+CYCLE_OCTAVES = 0.5
 """Width about each of them [octaves]; ours: a cycle disturbed by a load is as wide."""
 WHOLE = 0.9
 """Share of a night inside a span that assigns it to the span; ours: the hour after a change is excluded."""
@@ -265,7 +265,7 @@ def _load(night: LoopNight, loop: Loop, h: float, rng: np.random.Generator) -> t
 def _without_cycle(night: LoopNight) -> Floats:
     """The levels interpolated linearly across the valve's cycle and its harmonics [dB]."""
     octave = np.log2(night.frequency * night.cycle_s)
-    near = np.min([np.abs(octave - math.log2(k)) for k in HARMONICS], axis=0) < BESIDE_OCTAVES
+    near = np.min([np.abs(octave - math.log2(k)) for k in HARMONICS], axis=0) < CYCLE_OCTAVES
     if near.all() or not near.any():
         return night.level
     return np.where(near, np.interp(octave, octave[~near], night.level[~near]), night.level)

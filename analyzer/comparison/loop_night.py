@@ -91,19 +91,19 @@ def night_of(row: Mapping[str, Any]) -> LoopNight | None:
     level = np.array(kept["db"], float)
     if level.size < 6:
         return None
-    known, said = row["duration_s"], json.loads(row["witness"] or "{}")
+    known, evidence = row["duration_s"], json.loads(row["witness"] or "{}")
     fault = row["valve_fault"] in (Fault.BACKLASH, Fault.STICTION)
     own = row["backlash_pct"] or row["stickband_pct"] or 0.0
-    width, jump = said.get("width", [own])[0], said.get("slip_jump", [row["slip_jump_pct"] or 0.0])[0]
+    width, jump = evidence.get("width", [own])[0], evidence.get("slip_jump", [row["slip_jump_pct"] or 0.0])[0]
     valve_made = row["cause"] == Cause.VALVE and row["period_s"] is not None
     hours, moves = known / 3600.0, row["sp_moves"] or 0.0
     travel = row["sp_travel_pct"] or 0.0
     return LoopNight(
-        *_constants(row, said),
+        *_constants(row, evidence),
         width if fault else 0.0,
         jump if fault else 0.0,
         fault,
-        "width" in said,
+        "width" in evidence,
         row["period_s"] if valve_made else 0.0,
         2.0 ** (np.arange(level.size) / 6.0) / kept["period_s"],
         level,
@@ -117,10 +117,12 @@ def night_of(row: Mapping[str, Any]) -> LoopNight | None:
     )
 
 
-def _constants(row: Mapping[str, Any], said: Mapping[str, Any]) -> tuple[tuple[Floats, Floats] | None, float]:
+def _constants(
+    row: Mapping[str, Any], evidence: Mapping[str, Any]
+) -> tuple[tuple[Floats, Floats] | None, float]:
     """Logs of slope, time constant and dead time with their deviations, and the slope's sign."""
-    if "slope" in said:
-        pairs = np.array([said[name] for name in ("slope", "time_constant_s", "dead_time_s")], float)
+    if "slope" in evidence:
+        pairs = np.array([evidence[name] for name in ("slope", "time_constant_s", "dead_time_s")], float)
     elif row["slope_pct_per_s"] and row["dead_time_s"] is not None:
         lag = row["time_constant_s"] or 0.25 * row["duration_s"]
         pairs = np.array([[row["slope_pct_per_s"], 0.2], [lag, 0.3], [row["dead_time_s"], 0.2]])

@@ -65,9 +65,9 @@ def shared_process(sides: Sequence[Spectra]) -> SharedProcess | None:
         return None
     sign = math.copysign(1.0, c.kp)
 
-    def left(theta: Floats) -> Floats:
-        told = _predicted(theta, sides, sign)
-        return np.concatenate([(x - s.level) / ROUGHNESS_DB for x, s in zip(told, sides, strict=True)])
+    def residuals(theta: Floats) -> Floats:
+        predicted = _predicted(theta, sides, sign)
+        return np.concatenate([(x - s.level) / ROUGHNESS_DB for x, s in zip(predicted, sides, strict=True)])
 
     best = None
     for dead, lag in STARTS:
@@ -81,7 +81,7 @@ def shared_process(sides: Sequence[Spectra]) -> SharedProcess | None:
             low += [noise - 15.0, math.log(c.scan_s), noise - 10.0]
             high += [noise + 40.0, math.log(1e6), noise + 5.0]
         found = least_squares(
-            left, np.clip(first, low, high), bounds=(low, high), loss="soft_l1", max_nfev=60
+            residuals, np.clip(first, low, high), bounds=(low, high), loss="soft_l1", max_nfev=60
         )
         slope, lag_s, dead_s = np.exp(found.x[:3])
         process = Fopdt(sign * slope * lag_s, lag_s, dead_s)

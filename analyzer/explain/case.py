@@ -231,7 +231,7 @@ def case(
     series = snapped(series, spec.pv or "")
     whole = prepare(spec, series, config.quality)
     taught = experiment_results(
-        spec, series, whole, config, beside=neighbour_ops(spec, specs, series, whole, config)
+        spec, series, whole, config, neighbours=neighbour_ops(spec, specs, series, whole, config)
     )
     known = controller(spec, whole.scale.span) is not None
     coarse = whole if most is None or len(whole.record) <= most else coarser(whole, taught, config, known)

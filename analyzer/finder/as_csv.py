@@ -50,7 +50,7 @@ class Row:
     spec: LoopSpec
     found_by: str
     sure_pct: float
-    says: str = ""
+    evidence: str = ""
     op_ranged: bool = True
 
     @property
@@ -87,7 +87,7 @@ def _cell(row: Row, column: str) -> str:
         "ranges": RECORDED if row.found_by not in ("stated", RECORDED) and row.spec.has_pv_range else "",
         "found_by": row.found_by,
         "sure_pct": f"{row.sure_pct:.0f}",
-        "says": row.says,
+        "says": row.evidence,
     }
     if column in own:
         return own[column]

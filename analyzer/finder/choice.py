@@ -63,8 +63,8 @@ def _by_law(scores: Scores, most: NDArray[np.float32]) -> set[Cause]:
     own = dict(zip(scores.causes, most, strict=True))
 
     def other(held: Cause) -> float:
-        rivals = (cause for cause in own if len(cause) > 1 and held[1] in cause and held[0] not in cause)
-        return max((float(own[cause]) for cause in rivals), default=0.0)
+        others = (cause for cause in own if len(cause) > 1 and held[1] in cause and held[0] not in cause)
+        return max((float(own[cause]) for cause in others), default=0.0)
 
     return {cause for cause in scores.held if other(cause) < max(LIKELY, float(own[cause]))}
 

@@ -58,8 +58,8 @@ def draft(
     whole = [spec for spec in named if spec.op is not None]
     taken |= {tag for spec in whole for tag in spec.tags}
     free = [tag for tag in export.tags if tag not in taken]
-    asked = [*free, *(tag for spec in (*whole, *open_ones) for tag in spec.tags)]
-    held = sampled(export, list(dict.fromkeys(asked)), span, report)
+    tags = [*free, *(tag for spec in (*whole, *open_ones) for tag in spec.tags)]
+    held = sampled(export, list(dict.fromkeys(tags)), span, report)
     recorded = {spec.loop: spec for spec in open_ones}
     rows = [_stated(held, spec, recorded.get(spec.loop)) for spec in stated]
     rows += [_named(held, spec) for spec in whole]
@@ -85,18 +85,20 @@ def _with_relations(held: Sampled, rows: Sequence[Row]) -> list[Row]:
         selects.setdefault(i, []).append(j)
         selects.setdefault(j, []).append(i)
     for i, k in enumerate(own):
-        said = [rows[k].says]
+        notes = [rows[k].evidence]
         if selects.get(i):
-            said.append(f"OP at times that of {', '.join(specs[j].loop for j in selects[i])}: override_with?")
+            notes.append(
+                f"OP at times that of {', '.join(specs[j].loop for j in selects[i])}: override_with?"
+            )
         if halves_of.get(i):
-            said.append(f"{', '.join(others.tags[j] for j in halves_of[i])}: a half of its split range?")
-        rests = at_rest(ops[:, i])
-        if rests >= LIMITED_SHARE:
-            said.append(f"OP is constant for {100 * rests:.0f} % of the time: in manual, or at a limit")
+            notes.append(f"{', '.join(others.tags[j] for j in halves_of[i])}: a half of its split range?")
+        resting = at_rest(ops[:, i])
+        if resting >= LIMITED_SHARE:
+            notes.append(f"OP is constant for {100 * resting:.0f} % of the time: in manual, or at a limit")
         scan = scan_of(ops[:, i])
         if scan is not None:
-            said.append(f"OP moves every {scan * held.dt_s:g} s: scan_s?")
-        out[k] = replace(rows[k], spec=led[i], says="; ".join(said))
+            notes.append(f"OP moves every {scan * held.dt_s:g} s: scan_s?")
+        out[k] = replace(rows[k], spec=led[i], evidence="; ".join(notes))
     return out
 
 
@@ -127,9 +129,9 @@ def _without_ranges_of_currents(held: Sampled, rows: Sequence[Row]) -> list[Row]
     outputs = held.of([str(row.spec.op) for row in found]).values
     if not (outputs.min() >= MA_LOW and outputs.max() <= MA_HIGH):
         return list(rows)
-    said = "its values lie between 4 and 20, like mA: state op_lo and op_hi"
+    note = "its values lie between 4 and 20, like mA: state op_lo and op_hi"
     return [
-        replace(row, says=f"{row.says}; {row.spec.op}: {said}", op_ranged=False)
+        replace(row, evidence=f"{row.evidence}; {row.spec.op}: {note}", op_ranged=False)
         if row.spec.loop in own
         else row
         for row in rows
@@ -138,16 +140,16 @@ def _without_ranges_of_currents(held: Sampled, rows: Sequence[Row]) -> list[Row]
 
 def _named(held: Sampled, spec: LoopSpec) -> Row:
     """A loop by names, with type, ranges and settings from its data."""
-    said = f"tags of one name: {', '.join(spec.tags)}"
+    evidence = f"tags of one name: {', '.join(spec.tags)}"
     known = [tag for tag in (spec.pv, spec.op, spec.sp) if tag in held.tags]
     if known[:2] != [spec.pv, spec.op] or len(held.values) < LEAST_BLOCKS:
-        return Row(spec, "names", SUREST_PCT, said)
+        return Row(spec, "names", SUREST_PCT, evidence)
     own = held.of(known)
     pair = known_pair(own.values)
     shown = _shown(own, pair)
     law = f"; {_law(own, pair)}" if pair.law_share >= LEAST_LAW_SHARE and pair.kp else ""
     found = replace(spec, type=type_of(spec.loop), pv_unit=unit_of(str(spec.pv)), **shown)
-    return Row(found, "names", SUREST_PCT, said + law + _beyond(shown, found.type))
+    return Row(found, "names", SUREST_PCT, evidence + law + _beyond(shown, found.type))
 
 
 def _stated(held: Sampled, spec: LoopSpec, with_tags: LoopSpec | None) -> Row:
@@ -170,7 +172,9 @@ def found_text(rows: Sequence[Row]) -> tuple[str, ...]:
     """Sentences on the loops found by data, and on those left out because of low confidence."""
     seen = [row for row in rows if row.found_by == "data"]
     sure = tuple(
-        f"{row.spec.loop}: found by data, {row.sure_pct:.0f} % sure: {row.says}" for row in seen if row.sure
+        f"{row.spec.loop}: found by data, {row.sure_pct:.0f} % sure: {row.evidence}"
+        for row in seen
+        if row.sure
     )
     other = [row.spec.loop for row in seen if not row.sure]
     few = ", ".join(other[:MOST_NAMES]) + (" ..." if len(other) > MOST_NAMES else "")
@@ -185,11 +189,11 @@ def by_data(held: Sampled) -> list[Row]:
     pairs = found_pairs(held.values)
     sure = [p for p in pairs if p.sure_pct >= SURE_PCT]
     outputs = {held.values[:, p.op].tobytes(): _name(held.tags[p.pv], held.tags[p.op]) for p in sure}
-    beside = _beside(held, sure)
-    return [_row(held, pair, outputs, beside.get(pair.op, {}) if pair in sure else {}) for pair in pairs]
+    further = _position_and_mode(held, sure)
+    return [_row(held, pair, outputs, further.get(pair.op, {}) if pair in sure else {}) for pair in pairs]
 
 
-def _beside(held: Sampled, sure: Sequence[FoundPair]) -> dict[int, dict[str, str]]:
+def _position_and_mode(held: Sampled, sure: Sequence[FoundPair]) -> dict[int, dict[str, str]]:
     """Tags of position and mode of the confident loops, by the index of OP."""
     own = {k for p in sure for k in (p.pv, p.op, p.sp)}
     others = [k for k in range(len(held.tags)) if k not in own]
@@ -204,7 +208,7 @@ def _beside(held: Sampled, sure: Sequence[FoundPair]) -> dict[int, dict[str, str
     return found
 
 
-def _row(held: Sampled, pair: FoundPair, outputs: dict[bytes, str], beside: dict[str, str]) -> Row:
+def _row(held: Sampled, pair: FoundPair, outputs: dict[bytes, str], further: dict[str, str]) -> Row:
     name = _name(held.tags[pair.pv], held.tags[pair.op])
     master = "" if pair.sp is None else outputs.get(held.values[:, pair.sp].tobytes(), "")
     spec = LoopSpec(
@@ -215,17 +219,19 @@ def _row(held: Sampled, pair: FoundPair, outputs: dict[bytes, str], beside: dict
         sp=None if pair.sp is None else held.tags[pair.sp],
         pv=held.tags[pair.pv],
         op=held.tags[pair.op],
-        position=beside.get("position"),
-        mode=beside.get("mode"),
+        position=further.get("position"),
+        mode=further.get("mode"),
     )
-    says = f"{_law(held, pair)}; {100 * pair.noise:.0f} % of their noise is common; the next best tag has "
-    says += f"{100 * pair.runner_up / max(pair.weight, 1e-9):.0f} % of this pair's weight"
-    says += "" if pair.sp is None else f"; {spec.sp} is where PV is held"
-    says += f"; {spec.op} moves at once when {spec.sp} does" if pair.answers else ""
-    says += f"; {spec.position} has the value of {spec.op}" if spec.position else ""
-    says += f"; {spec.op} is constant only in one value of {spec.mode}" if spec.mode else ""
+    evidence = (
+        f"{_law(held, pair)}; {100 * pair.noise:.0f} % of their noise is common; the next best tag has "
+    )
+    evidence += f"{100 * pair.runner_up / max(pair.weight, 1e-9):.0f} % of this pair's weight"
+    evidence += "" if pair.sp is None else f"; {spec.sp} is where PV is held"
+    evidence += f"; {spec.op} moves at once when {spec.sp} does" if pair.answers else ""
+    evidence += f"; {spec.position} has the value of {spec.op}" if spec.position else ""
+    evidence += f"; {spec.op} is constant only in one value of {spec.mode}" if spec.mode else ""
     shown = _shown(held, pair, pair.sure_pct >= SURE_PCT)
-    return Row(replace(spec, **shown), "data", pair.sure_pct, says + _beyond(shown, spec.type))
+    return Row(replace(spec, **shown), "data", pair.sure_pct, evidence + _beyond(shown, spec.type))
 
 
 def _shown(held: Sampled, pair: FoundPair, certain: bool = True) -> dict[str, Any]:
@@ -276,11 +282,11 @@ def _law(held: Sampled, pair: FoundPair) -> str:
 
 def _beyond(shown: dict[str, Any], kind: str) -> str:
     """What else the settings show: further terms, and a fast loop whose type no name states."""
-    said = f"; a derivative of {shown['td']:.3g} s" if "td" in shown else ""
-    said += f"; a filter of PV of {shown['pv_filter_s']:.3g} s" if "pv_filter_s" in shown else ""
+    text = f"; a derivative of {shown['td']:.3g} s" if "td" in shown else ""
+    text += f"; a filter of PV of {shown['pv_filter_s']:.3g} s" if "pv_filter_s" in shown else ""
     if not kind and 0.0 < shown.get("ti", 0.0) <= FAST_S:
-        said += f"; its integral time is {shown['ti']:.2g} s, as in a flow or pressure loop: type?"
-    return said
+        text += f"; its integral time is {shown['ti']:.2g} s, as in a flow or pressure loop: type?"
+    return text
 
 
 def _joined(found: Sequence[Row], open_loops: Sequence[LoopSpec]) -> list[Row]:

@@ -130,9 +130,9 @@ def with_settings(bag: TagSet, pair: FoundPair) -> FoundPair:
     slope, deviation = fitted(wanted, moved, summed)
     kp, repeats = -float(slope[0]), float(slope[1] / (slope[0] or TINY))
     level = blocks(error, pair.law_width)[:, 0]
-    beside = level[rows - 1] + level[rows + 2]
-    beside = beside - beside.mean()
-    other = float(beside @ (wanted - slope[0] * moved) / ((beside @ summed) or TINY) / (slope[0] or TINY))
+    outer = level[rows - 1] + level[rows + 2]
+    outer = outer - outer.mean()
+    other = float(outer @ (wanted - slope[0] * moved) / ((outer @ summed) or TINY) / (slope[0] or TINY))
     surely = abs(slope[0]) / (abs(slope[1]) + ACTS * deviation[1])
     if surely > ALONE * len(bag.values):
         return replace(pair, kp=kp, ti_samples=np.inf)

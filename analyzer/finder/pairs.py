@@ -102,7 +102,7 @@ def _pair(
     w = int(np.argmax(np.where(may, _enough(law * np.sqrt(noise), noise, required), 0.0)))
     one = np.array(bag.live)[scores.alike[[j, bag.live.index(pv)]].any(axis=0)]
     others = np.flatnonzero(~np.isin(bag.live, [k for k in (pv, sp, tag, *slaves, *one) if k is not None]))
-    rivals = scores.weight(w, others, j)
+    weights = scores.weight(w, others, j)
     shown = int(np.argmax(law >= min(LEAST_LAW_SHARE, law.max())))
     return FoundPair(
         int(pv),
@@ -112,7 +112,7 @@ def _pair(
         noise=float(noise[w]),
         width=scores.widths[w],
         required_weight=float(required[w]),
-        runner_up=float(np.max(rivals, where=rivals > SECOND * taken[others], initial=0.0)),
+        runner_up=float(np.max(weights, where=weights > SECOND * taken[others], initial=0.0)),
         direction_evidence=direction_evidence(held, scores, c, j),
         output_evidence=output_evidence(bag.values[:, pv], bag.values[:, tag], sp is None)
         + CERTAIN * (float(bag.is_duplicate(tag)) - float(bag.is_duplicate(pv))),

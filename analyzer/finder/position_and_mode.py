@@ -15,7 +15,7 @@ POSITION = 0.4
 proofs/finder.md."""
 POSITION_LATE = 3  # Samples by which a position follows OP at most [samples]: proofs/finder.md
 POSITION_LAGS = 30  # Samples among which this lag is looked for [samples]: proofs/finder.md
-BESIDE_ALONE = 3.0  # How much farther any other tag must be: proofs/finder.md
+NEXT_BEST_RATIO = 3.0  # How much farther any other tag must be: proofs/finder.md
 MODE = 0.05  # Share of the samples in which a mode may disagree with the moves of OP: proofs/finder.md
 MODE_VALUES = 6  # Values of a mode at most [values]: proofs/finder.md
 MODE_CHANGES = 2  # Changes of a mode at least [changes]: proofs/finder.md
@@ -63,7 +63,7 @@ def _alone(away: Matrix, most: float, named: Callable[[int, int], tuple[int, int
         next_best = min(
             np.delete(away[i], k).min(initial=np.inf), np.delete(away[:, k], i).min(initial=np.inf)
         )
-        if next_best >= max(BESIDE_ALONE * float(away[i, k]), most):
+        if next_best >= max(NEXT_BEST_RATIO * float(away[i, k]), most):
             found.append(named(int(i), int(k)))
     return dict(found)
 
@@ -79,6 +79,6 @@ def _disagreement(op: NDArray[np.float64], tag: NDArray[np.float64]) -> float:
     if usual < MODE_MOVES:
         return np.inf
     reach = int(np.ceil(MODE_REACH / usual))
-    stands = np.convolve(moved, np.ones(2 * reach + 1), "same") == 0
-    beside = np.convolve(np.concatenate([[False], np.diff(tag) != 0]), np.ones(4 * reach + 1), "same") > 0
-    return float(np.mean((stands != manual)[~beside])) if not beside.all() else np.inf
+    constant = np.convolve(moved, np.ones(2 * reach + 1), "same") == 0
+    near = np.convolve(np.concatenate([[False], np.diff(tag) != 0]), np.ones(4 * reach + 1), "same") > 0
+    return float(np.mean((constant != manual)[~near])) if not near.all() else np.inf

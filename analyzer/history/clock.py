@@ -16,7 +16,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history.plant_clock import DAY_S, HOUR_S
-from analyzer.history.stamps import Fields, fields, midnights_told, stamp_seconds
+from analyzer.history.stamps import Fields, fields, stamp_seconds, with_midnights
 from analyzer.history.table import WORDS, as_text, is_text, numbers
 
 EARLIEST_S = -11676096000.0
@@ -61,11 +61,11 @@ class TimeScale:
         """Note on how stamps of this scale are read."""
         if self == OF_DAY:
             return f"stamps are {self.name}; export the date too, so that the night has its own"
-        said = f"stamps are {'texts' if self == ELAPSED else 'numbers'}, read as {self.name}"
+        text = f"stamps are {'texts' if self == ELAPSED else 'numbers'}, read as {self.name}"
         another = (
             ", from 1970 on; state the unit in the column's name, as in 'Time (ms)', where it is another"
         )
-        return said + another if self in SINCE_START.values() else said
+        return text + another if self in SINCE_START.values() else text
 
 
 MISSING_HOUR = "samples are in the hour that the time zone skips in spring and are left out"
@@ -211,7 +211,7 @@ class Clock:
         if order is None and parts.open.any():  # no ambiguous date in the first rows
             order = shown_order(parts)
         second = stamp_seconds(parts, "month" if order is None else order.first)
-        return midnights_told(second, parts), not parts.stated.any()
+        return with_midnights(second, parts), not parts.stated.any()
 
 
 def time_scale_of(column: pa.Array, unit: str = "") -> TimeScale | None:
@@ -345,9 +345,9 @@ def _shares(hours: NDArray[np.float64], held: dict[float, int], least: int) -> l
     """Samples in some hours relative to the fuller adjacent hour, if there are enough."""
     shares = []
     for hour in hours.tolist():
-        beside = held.get(hour - 1.0, 0), held.get(hour + 1.0, 0)
-        if min(beside) >= least or (least == 1 and max(beside) >= 1 and hour in held):
-            shares.append(held.get(hour, 0) / max(beside))
+        adjacent = held.get(hour - 1.0, 0), held.get(hour + 1.0, 0)
+        if min(adjacent) >= least or (least == 1 and max(adjacent) >= 1 and hour in held):
+            shares.append(held.get(hour, 0) / max(adjacent))
     return shares
 
 

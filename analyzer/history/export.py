@@ -80,7 +80,7 @@ class Export:
         pieces = []
         for home in homes:
             fetch_missing(self.sources[home].path, self.origins)
-            with _faults_told(self.sources[home].path):
+            with _reported_errors(self.sources[home].path):
                 pieces.append(self.sources[home].read(tags))
         series = {}
         for tag in tags:
@@ -97,7 +97,7 @@ class Export:
         homes = range(len(self.sources)) if tag is None else self._homes[tag]
         for home in homes:
             if home not in self._spans:
-                with _faults_told(self.sources[home].path):
+                with _reported_errors(self.sources[home].path):
                     self._spans[home] = self.sources[home].span()
         spans = [self._spans[home] for home in homes]
         return min(s.first_s for s in spans), max(s.last_s for s in spans)
@@ -218,7 +218,7 @@ def _readable_files(paths: Sequence[Path], options: ReadOptions) -> tuple[list[S
 def _opened_tables(path: Path, options: ReadOptions) -> tuple[list[Source], list[InputError]]:
     """The tables of a file, one except for workbooks, and the errors of it or of other sheets of a workbook."""
     try:
-        with _faults_told(path):
+        with _reported_errors(path):
             parts = unpacked(path, options.place)
     except InputError as error:
         return [], [error]
@@ -226,7 +226,7 @@ def _opened_tables(path: Path, options: ReadOptions) -> tuple[list[Source], list
     failed: list[InputError] = []
     for part in parts:
         try:
-            with _faults_told(path):
+            with _reported_errors(path):
                 found.append(_table_source(part, options))
         except InputError as error:
             seen = error.seen.replace(str(part), str(path.with_name(part.name)))
@@ -265,7 +265,7 @@ def _some(names: Sequence[str]) -> str:
 
 
 @contextmanager
-def _faults_told(path: Path) -> Iterator[None]:
+def _reported_errors(path: Path) -> Iterator[None]:
     """Report file errors that appear only on reading: missing, truncated, damaged, too large, without a stamp."""
     try:
         yield

@@ -158,12 +158,12 @@ def is_parquet(path: Path) -> bool:
 
 def unsupported_archives(paths: Sequence[Path]) -> list[str]:
     """Sentences on export files in the given folders that are packed in an unsupported way."""
-    said = []
+    notes = []
     for folder in (Path(p) for p in paths if Path(p).is_dir()):
         found = sorted(p.name for p in folder.iterdir() if p.suffix.lower() == NOT_READ_ENDING)
         if found:
-            said.append(f"{folder}: {', '.join(found[:5])} not read: unpack it, or save it as CSV")
-    return said
+            notes.append(f"{folder}: {', '.join(found[:5])} not read: unpack it, or save it as CSV")
+    return notes
 
 
 def _exports_at(path: Path) -> list[Path]:

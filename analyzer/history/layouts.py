@@ -124,8 +124,8 @@ class Source:
 
     def read(self, tags: Sequence[str]) -> dict[str, Series]:
         """Samples of those of `tags` that are in the file."""
-        asked, long = set(tags), self.tag >= 0
-        wanted = {tag: self.columns[0 if long else k] for k, tag in enumerate(self.tags) if tag in asked}
+        requested, long = set(tags), self.tag >= 0
+        wanted = {tag: self.columns[0 if long else k] for k, tag in enumerate(self.tags) if tag in requested}
         if not wanted:
             return {}
         clocks = {c.clock for c in wanted.values()}
@@ -196,7 +196,7 @@ def open_wide(table: Table, options: ReadOptions) -> Source:
     clock = find_clock(table, options)
     others = [i for i in range(len(table.names)) if i not in clock.columns and _holds_values(table, i)]
     free = [i for i in others if not _counts_rows(table, i)] or others
-    partner, said = quality_columns(table, free, options.stated)
+    partner, notes = quality_columns(table, free, options.stated)
     values_in = [i for i in free if i not in partner.values()]
     if not values_in or not _any_number(table, values_in):
         seen = f"{table.path}: no values next to the time column '{table.names[clock.columns[0]]}'"
@@ -206,7 +206,7 @@ def open_wide(table: Table, options: ReadOptions) -> Source:
     tags = _with_loop(names, table.path.stem)
     ones = ones_prevail(table.head(sorted({*partner.values()})))
     columns = tuple(TagColumn(clock, i, partner.get(i, -1)) for i in values_in)
-    layout = [f"wide table, {len(tags)} tags", *said]
+    layout = [f"wide table, {len(tags)} tags", *notes]
     if used := {table.names[c.quality]: c.quality for c in columns if c.quality >= 0}:
         more = f" and {len(used) - 1} more" if len(used) > 1 else ""
         layout.insert(1, f"quality in column '{min(used)}'{more}")
@@ -262,7 +262,7 @@ def open_pairs(table: Table, options: ReadOptions) -> Source | None:
     groups = _groups(table, options.stated)
     if len(groups) < 2:
         return None
-    columns = tuple(c for time, beside in groups for c in _paired(table, time, beside, options))
+    columns = tuple(c for time, following in groups for c in _paired(table, time, following, options))
     tags = tuple(_tag(table, c) for c in columns)
     if len(tags) < 2 or not all(tags):
         return None
@@ -289,7 +289,7 @@ def _groups(table: Table, stated: Collection[str]) -> list[tuple[int, list[int]]
         (time, [i for i in range(time + 1, end) if not pa.types.is_null(table.types[i])])
         for time, end in zip(times, [*times[1:], len(table.names)], strict=True)
     ]
-    return groups if all(beside for _, beside in groups) else []
+    return groups if all(following for _, following in groups) else []
 
 
 def _is_time(name: str) -> bool:
@@ -298,10 +298,10 @@ def _is_time(name: str) -> bool:
     return plain(bare) in COLUMNS["stamp"] or any((TIME_WORDS.search(bare), TIME_FIRST.match(bare)))
 
 
-def _paired(table: Table, time: int, beside: Sequence[int], options: ReadOptions) -> list[TagColumn]:
+def _paired(table: Table, time: int, following: Sequence[int], options: ReadOptions) -> list[TagColumn]:
     """The tags with a common clock: the following columns of values, with their quality."""
-    quality = [i for i in beside if plain(NUMBERED.sub("", table.names[i])) in COLUMNS["quality"]]
-    held = [i for i in beside if i not in quality]
+    quality = [i for i in following if plain(NUMBERED.sub("", table.names[i])) in COLUMNS["quality"]]
+    held = [i for i in following if i not in quality]
     # a tag, whose last letters are no time zone, or the name of the time
     above = NUMBERED.sub("", table.names[time])
     clock = stamps_clock(table, time, options, above if plain(above) in COLUMNS["stamp"] else "")

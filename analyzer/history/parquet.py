@@ -64,7 +64,7 @@ PROBED_GROUPS = 64
 DONE = "done.json"
 """Description of a copy; written last."""
 NAMED = "converted-"
-Said = dict[str, list[str]]
+Description = dict[str, list[str]]
 """Results of a pass over an export: notes, and the tags of a long table in the order of their first rows."""
 
 
@@ -245,7 +245,7 @@ def converted(table: Sheet | ParquetTable, tag: int, place: Path) -> ParquetTabl
     mark = hashlib.blake2b(ends_of(table.path), digest_size=16)
     mark.update(repr((table.path.name, table, tag, version("loop-triage"))).encode())
     folder = place / f"{NAMED}{mark.hexdigest()}"
-    done = _said(folder) or _laid(table, tag, folder)
+    done = _stored_description(folder) or _write_copy(table, tag, folder)
     first = next(folder.glob("*.parquet"), None)
     if first is None:
         expected = "rows of as many columns as the header"
@@ -274,7 +274,7 @@ def forget_halves(place: Path) -> None:
             shutil.rmtree(left, ignore_errors=True)
 
 
-def _said(folder: Path) -> Said | None:
+def _stored_description(folder: Path) -> Description | None:
     """Description of a complete copy; None where there is none, or a file lost its end in a power failure."""
     try:
         found = json.loads((folder / DONE).read_text(encoding="utf-8"))
@@ -285,7 +285,7 @@ def _said(folder: Path) -> Said | None:
         return None
 
 
-def _laid(table: Sheet | ParquetTable, tag: int, folder: Path) -> Said:
+def _write_copy(table: Sheet | ParquetTable, tag: int, folder: Path) -> Description:
     """Write a copy to a folder, which exists once it is complete."""
     room = table.path.stat().st_size * (1 if isinstance(table, Sheet) else 4)
     if shutil.disk_usage(folder.parent).free < room:

@@ -116,8 +116,8 @@ def not_good(
     blank = np.array([name is None or str(name).strip() == "" for name in names])
     if good is None and bad[~blank].all() and 2 * count[blank].sum() > count.sum():
         bad = bad & ~blank
-    told = "samples have quality '{:.60}', taken as bad"
-    found = Counter({told.format(str(names[i])): int(count[i]) for i in np.flatnonzero(bad)})
+    text = "samples have quality '{:.60}', taken as bad"
+    found = Counter({text.format(str(names[i])): int(count[i]) for i in np.flatnonzero(bad)})
     if scheme is Scheme.DA:
         code = np.nan_to_num(_numbers(kinds), nan=0).astype(np.int64)
         found[FLAGGED_INTERPOLATED] = int(count[(code > 0) & ((code & INTERPOLATED) != 0)].sum())
@@ -150,8 +150,8 @@ def quality_columns(
         if _is_coded(table, i):
             return {**dict.fromkeys(values, i), **found}, []
         if _few_kinds(table.head([i])[0]):
-            said = f"column '{names[i]}' looks like quality and is not understood: its codes are not used"
-            return found, [f"{said}; name those that are good with --good-quality if it is"]
+            note = f"column '{names[i]}' looks like quality and is not understood: its codes are not used"
+            return found, [f"{note}; name those that are good with --good-quality if it is"]
     return found, []
 
 

@@ -69,7 +69,7 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
     names = (*(name.strip() for name in header), *[""] * (width - len(header)))
     decimal, doubt = (options.decimal, "") if options.decimal else detect_decimal(rows, delimiter)
     between, mark = DELIMITERS.get(delimiter, repr(delimiter)), "comma" if decimal == "," else "point"
-    said = [
+    notes = [
         f"delimited text: {between} between columns, decimal {mark}, encoding {encoding}",
         "" if guessed is None else f"no header: columns are taken as {', '.join(guessed)}",
         doubt,
@@ -77,7 +77,7 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
     sheet = Sheet(
         path,
         names,
-        found=tuple(filter(None, said)),
+        found=tuple(filter(None, notes)),
         decimal=decimal,
         first_row=place + above + 2,
         changed_ns=path.stat().st_mtime_ns,

@@ -184,14 +184,14 @@ def _readable(parts: pa.Array, part: dict[str, pa.Array], known: Mapping[str, fl
     """Stamps that match the pattern, without unknown letters or words as zone."""
     letters = pc.match_substring_regex(part["z"], "^[A-Z]+$")
     meant = pc.or_(pc.invert(letters), pc.is_in(pc.utf8_lower(part["z"]), value_set=pa.array(known)))
-    told = pc.and_(pc.is_valid(parts), meant)
+    readable = pc.and_(pc.is_valid(parts), meant)
     if pc.any(pc.not_equal(part["n"], "")).as_py():
         words = pc.and_(pc.match_substring(part["n"], " "), pc.equal(part["z"], ""))
         kinds = pc.unique(part["n"])
         unknown = kinds.filter(pa.array([named_zone(text) is None for text in kinds.to_pylist()]))
         words = pc.and_(words, pc.is_in(part["n"], value_set=unknown))
-        told = pc.and_(told, pc.invert(words))
-    return _numpy(told)
+        readable = pc.and_(readable, pc.invert(words))
+    return _numpy(readable)
 
 
 def stamp_seconds(parts: Fields, first: str = "month") -> NDArray[np.float64]:
@@ -213,7 +213,7 @@ def stamp_seconds(parts: Fields, first: str = "month") -> NDArray[np.float64]:
     return np.where(valid & (days < next_begins), days * 86400.0 + parts.clock_s - parts.offset_s, np.nan)
 
 
-def midnights_told(second: NDArray[np.float64], parts: Fields) -> NDArray[np.float64]:
+def with_midnights(second: NDArray[np.float64], parts: Fields) -> NDArray[np.float64]:
     """Stamps of one file [s]; 24:00 is the end of its day, or its beginning if only then the stamps increase."""
     midnight = parts.clock_s == 86400.0
     if not midnight.any():

@@ -109,16 +109,16 @@ def find_clock(table: Table, options: ReadOptions, tag: int = -1) -> Clock:
     second, local = clock.seconds(table.head(clock.columns))
     if np.isnan(second).all():
         raise _unreadable(table, clock.columns[0])
-    stands = _stands(table, second, tag)
-    if stands and not options.interval_s:
+    constant = _has_constant_stamps(table, second, tag)
+    if constant and not options.interval_s:
         seen = f"{table.path}: the time column '{table.names[clock.columns[0]]}' does not advance"
         remedy = "export the stamps, or state the time between rows, such as --interval 30s"
         raise InputError(seen, "a stamp of its own for each row", remedy)
-    if not stands:
+    if not constant:
         _check_seconds(table, second, tag)
     return _in_zone(
         table,
-        replace(clock, local=local, every_s=options.interval_s if stands else 0.0),
+        replace(clock, local=local, every_s=options.interval_s if constant else 0.0),
         table.names[clock.columns[0]],
     )
 
@@ -131,7 +131,7 @@ def stamps_clock(table: Table, column: int, options: ReadOptions, name: str) -> 
     return _in_zone(table, replace(clock, local=clock.seconds([head])[1]), name)
 
 
-def _stands(table: Table, second: NDArray[np.float64], tag: int) -> bool:
+def _has_constant_stamps(table: Table, second: NDArray[np.float64], tag: int) -> bool:
     """Whether all first rows have the same stamp [s], with several rows for each tag."""
     known = second[np.isfinite(second)]
     if known.size < MINUTES_ROWS or np.ptp(known) > 0.0:

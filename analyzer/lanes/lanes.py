@@ -23,28 +23,28 @@ if TYPE_CHECKING:
 class Rule:
     """One lane.
 
-    figure : the column of its ranking, largest first; said : its clause of the reason, None if the reason includes it
-    anyway; limit : the limit above which the figure puts a loop in, of the same name if ''; judged : condition for
+    figure : the column of its ranking, largest first; clause : its clause of the reason, None if the reason includes
+    it anyway; limit : the limit above which the figure puts a loop in, of the same name if ''; judged : condition for
     the lane if that is more complex; hidden_by : lanes with which it gives no additional information; of_measurement
     : whether the measurement must be checked.
     """
 
     lane: Lane
     figure: str
-    said: Callable[[Finding], str] | None = None
+    clause: Callable[[Finding], str] | None = None
     limit: str = ""
     judged: Callable[[Finding, LaneLimits], bool] | None = None
     hidden_by: frozenset[Lane] = frozenset()
     of_measurement: bool = False
 
-    def stands(self, found: Finding, limits: LaneLimits) -> bool:
+    def applies(self, found: Finding, limits: LaneLimits) -> bool:
         """Whether a loop is in the lane, even if hidden."""
         if self.judged is not None:
             return self.judged(found, limits)
         return found.number(self.figure) > float(getattr(limits, self.limit or self.figure))
 
 
-def _rests(found: Finding, limits: LaneLimits) -> bool:
+def _is_at_limit(found: Finding, limits: LaneLimits) -> bool:
     """Whether OP is at a limit permanently; a switching OP always is."""
     return found.lack is not MissingData.SWITCHES and found.number("at_limits_pct") > limits.at_limits_pct
 
@@ -113,7 +113,7 @@ HIDE_SLOW = frozenset({Lane.OSCILLATION, Lane.AT_LIMIT, Lane.FROZEN})
 RULES = (
     Rule(Lane.OSCILLATION, "oscillation_significance", judged=lambda f, limits: f.oscillates),
     Rule(Lane.MANUAL, "manual_pct", lambda f: f"in manual for {f.number('manual_pct'):.0f} % of the time"),
-    Rule(Lane.AT_LIMIT, "at_limits_pct", _at_limit, judged=_rests),
+    Rule(Lane.AT_LIMIT, "at_limits_pct", _at_limit, judged=_is_at_limit),
     Rule(Lane.LASTING_ERROR, "lasting_error_pct", _lasting, of_measurement=True),
     Rule(Lane.FROZEN, "frozen_pct", _frozen, of_measurement=True),
     Rule(Lane.SLUGGISH, "error_memory_ti", _sluggish, judged=_slow, hidden_by=HIDE_SLOW),
@@ -124,23 +124,25 @@ RULES = (
 """All lanes in reporting order."""
 FIGURE: Mapping[Lane, str] = {r.lane: r.figure for r in RULES}
 """The column of each lane's ranking, largest first."""
-SAID: Mapping[Lane, Callable[[Finding], str]] = {r.lane: r.said for r in RULES if r.said is not None}
+LANE_TEXTS: Mapping[Lane, Callable[[Finding], str]] = {
+    r.lane: r.clause for r in RULES if r.clause is not None
+}
 """One clause per lane."""
 
 
 def in_lanes(found: Finding, limits: LaneLimits) -> Finding:
     """A loop with its lanes by figures, and their effect on its action."""
-    standing = {r.lane for r in RULES if r.stands(found, limits)}
+    standing = {r.lane for r in RULES if r.applies(found, limits)}
     lanes = tuple(r.lane for r in RULES if r.lane in standing and not r.hidden_by & standing)
-    told = replace(found, lanes=lanes)
-    return decided(told, is_doubtful(told))
+    placed = replace(found, lanes=lanes)
+    return decided(placed, is_doubtful(placed))
 
 
 def is_doubtful(found: Finding) -> bool:
     """Whether a loop's lanes require a check of its measurement."""
-    asks = [r.lane for r in RULES if r.of_measurement and r.lane in found.lanes]
+    doubted = [r.lane for r in RULES if r.of_measurement and r.lane in found.lanes]
     explained = Lane.AT_LIMIT in found.lanes or _offset(found)
-    return bool(asks) and not (asks == [Lane.LASTING_ERROR] and explained)
+    return bool(doubted) and not (doubted == [Lane.LASTING_ERROR] and explained)
 
 
 def lanes_in(row: Mapping[str, Any]) -> tuple[str, ...]:

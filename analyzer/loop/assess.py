@@ -155,9 +155,9 @@ def with_valve_oscillation(
     if quiet.evidence >= config.cause.near_evidence:
         near = detect(prepared.record, config.oscillation.nearly())
         if counting(near) is not None:
-            told = cause_of(prepared, near, controller, config, kind)
-            if _made_by_valve(told, config.cause):
-                return near, told
+            explained = cause_of(prepared, near, controller, config, kind)
+            if _made_by_valve(explained, config.cause):
+                return near, explained
     period_s = ringing_period(quiet, config.cause)
     if period_s is None:
         return found, verdict
@@ -172,8 +172,8 @@ def _ringing_cycle(
     first = counting(near)
     if first is None or not same_period(first.period_s, period_s, row_s, config.cause):
         return None
-    told = cause_of(prepared, near, controller, config, kind)
-    return (near, told) if told.cause is Cause.TUNING else None
+    verdict = cause_of(prepared, near, controller, config, kind)
+    return (near, verdict) if verdict.cause is Cause.TUNING else None
 
 
 def _made_by_valve(verdict: Verdict, limits: CauseLimits) -> bool:
@@ -269,9 +269,9 @@ def _acting(seen: Shown, stated: Pid | None) -> Pid | None:
     """The controller that acts on a record: the recorded one if it differs from the stated one, otherwise
     the stated one, completed. If none is stated, the recorded one must have integral action, because a
     copy of PV also follows a proportional law."""
-    if stated is None and seen.beside is not None and not seen.beside.ki:
+    if stated is None and seen.detected is not None and not seen.detected.ki:
         return None
-    return seen.other or seen.beside or stated
+    return seen.other or seen.detected or stated
 
 
 def judged_where(
@@ -333,7 +333,7 @@ def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: C
         oscillations=found,
         verdict=judged.verdict,
         settings=judged.shown.other,
-        shown=judged.shown.beside,
+        shown=judged.shown.detected,
         scheduled_over=judged.shown.scheduled_over,
         law=judged.shown.law,
         harris=harris_index(record.error, record.usable, record.dt_s, dead_time) if dead_time else None,

@@ -162,11 +162,11 @@ def _model_known(verdict: Verdict, limits: AdviceLimits) -> Mapping[str, float |
     if m is None:
         return {}
     if verdict.cause is not Cause.VALVE and verdict.fault in (Fault.BACKLASH, Fault.STICTION):
-        return _process_known(verdict, limits) | _width_beside(verdict.fault, m)
+        return _process_known(verdict, limits) | _valve_width(verdict.fault, m)
     return _process_known(verdict, limits)
 
 
-def _width_beside(fault: Fault, m: Measured) -> dict[str, float | None]:
+def _valve_width(fault: Fault, m: Measured) -> dict[str, float | None]:
     """The width of a faulty valve if the cause is another one."""
     if fault is Fault.STICTION and m.stick_slip is not None:
         valve = m.stick_slip.valve

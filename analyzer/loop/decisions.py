@@ -182,8 +182,8 @@ def counts(oscillating_pct: float | None) -> bool:
 
 def decided_fault(row: Mapping[str, object] | None) -> Fault | None:
     """Fault of the valve in a night's row; None if there is no row, or the loop was not assessed."""
-    told = None if row is None or row["status"] != Status.OK else row.get("valve_fault")
-    return None if told is None else Fault(str(told))
+    fault = None if row is None or row["status"] != Status.OK else row.get("valve_fault")
+    return None if fault is None else Fault(str(fault))
 
 
 @dataclass(frozen=True, slots=True)

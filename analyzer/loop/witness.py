@@ -41,7 +41,7 @@ def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, config: Conf
     slips = None if verdict.for_settings is verdict else verdict.measured
     whole = prepared.compressed_share <= config.lanes.straight_share
     jump = jump_evidence(slips or m, limits) if whole else (0.0, 0.0)
-    said = {
+    values = {
         "profile": [
             round(float(x), 1) for x in _profile(m, 0.0 if with_valve_oscillation else limits.noise_widths)
         ],
@@ -53,7 +53,7 @@ def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, config: Conf
             for k, known in _constants_of_fit(m, slips, limits, oscillates).items()
         },
     }
-    return json.dumps(said, separators=(",", ":"))
+    return json.dumps(values, separators=(",", ":"))
 
 
 def _profile(m: Measured, noise_widths: float) -> Floats:

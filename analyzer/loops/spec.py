@@ -53,10 +53,11 @@ class LoopSpec:
     Tags are None if not stated, and after `tags.match` if missing in the export; `wanted_pv` is then
     the requested tag. `master` is the loop whose output is this loop's set point, `ratio_of` the one to
     whose PV it keeps a ratio, `split_of` the controller of whose split range it is a half, `override_with` the one
-    with which it shares a valve by a select; `beside` is the output of one of the latter two. `feedforward` is a loop
-    or tag that acts on OP in addition to the error, `feed` its tag if the export has it. `kp`, `ti`, `td` are as
-    stated, in `gain_unit`, `ti_unit` and `form`; `pv_lo`, `pv_hi` and `gap` in the PV's own unit, `op_lo`, `op_hi`,
-    the limits of OP and of its rate (per second) in the OP's. `kp` is 0 for integral action alone.
+    with which it shares a valve by a select; `partner_output` is the output of one of the latter two.
+    `feedforward` is a loop or tag that acts on OP in addition to the error, `feed` its tag if the export has it.
+    `kp`, `ti`, `td` are as stated, in `gain_unit`, `ti_unit` and `form`; `pv_lo`, `pv_hi` and `gap` in the PV's own
+    unit, `op_lo`, `op_hi`, the limits of OP and of its rate (per second) in the OP's. `kp` is 0 for integral action
+    alone.
     `upstream` is the loop (its PV) or tag of this loop's measured load, `load` its tag if the export has it.
     `in_ma` is True if OP looks like a current of 4 to 20 mA without a stated range.
     `gain_schedule` states a gain that depends on OP, PV or SP.
@@ -108,7 +109,7 @@ class LoopSpec:
     wanted_pv: str = ""
     valid_from_s: float | None = None
     earlier: tuple[LoopSpec, ...] = ()
-    beside: Output | None = None
+    partner_output: Output | None = None
     feed: str | None = None
     load: str | None = None
     in_ma: bool = False
@@ -116,7 +117,11 @@ class LoopSpec:
     @property
     def tags(self) -> tuple[str, ...]:
         """The known tags of the loop, including those with which it is judged."""
-        own = (*(getattr(self, role) for role in ROLES), self.beside.tag if self.beside else None, self.feed)
+        own = (
+            *(getattr(self, role) for role in ROLES),
+            self.partner_output.tag if self.partner_output else None,
+            self.feed,
+        )
         return tuple(dict.fromkeys(tag for tag in own if tag is not None))
 
     @property

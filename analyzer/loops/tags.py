@@ -47,7 +47,7 @@ def match(specs: Sequence[LoopSpec], tags: Iterable[str]) -> tuple[tuple[LoopSpe
     by_ending = loops_of(known)
     alone = tuple(_matched(spec, known, by_ending.get(spec.loop, {})) for spec in specs)
     by_loop = {spec.loop: spec for spec in alone}
-    matched = tuple(_with_tags_beside(spec, by_loop, known) for spec in alone)
+    matched = tuple(_with_partner_tags(spec, by_loop, known) for spec in alone)
     notes = list(by_place)
     alike = {spelling(tag): tag for tag in known}
     pairs = zip(specs, matched, strict=True)
@@ -72,8 +72,8 @@ def in_order(specs: Sequence[LoopSpec], tags: Sequence[str]) -> tuple[Sequence[L
         taken[k][role] = tag
     first = [f"{tag} is {specs[0].loop}'s {role.upper()}" for role, tag in taken[0].items()]
     more = " ..." if len(specs) > 1 else ""
-    said = f"no header: columns are taken in the order of loops.csv: {', '.join(first)}{more}"
-    return tuple(replace(s, **own) for s, own in zip(specs, taken, strict=True)), (said,)  # type: ignore[arg-type]
+    note = f"no header: columns are taken in the order of loops.csv: {', '.join(first)}{more}"
+    return tuple(replace(s, **own) for s, own in zip(specs, taken, strict=True)), (note,)  # type: ignore[arg-type]
 
 
 def _matched(spec: LoopSpec, known: Mapping[str, None], found: Mapping[str, str]) -> LoopSpec:
@@ -82,13 +82,15 @@ def _matched(spec: LoopSpec, known: Mapping[str, None], found: Mapping[str, str]
     return replace(spec, **present, wanted_pv=wanted["pv"])
 
 
-def _with_tags_beside(spec: LoopSpec, by_loop: Mapping[str, LoopSpec], known: Mapping[str, None]) -> LoopSpec:
+def _with_partner_tags(
+    spec: LoopSpec, by_loop: Mapping[str, LoopSpec], known: Mapping[str, None]
+) -> LoopSpec:
     """A loop with the tags of the loops with which it is judged or by which it is loaded, if the export has them."""
-    beside = spec.override_with or spec.split_of
-    other = by_loop.get(beside) if beside != spec.loop else None
+    partner = spec.override_with or spec.split_of
+    other = by_loop.get(partner) if partner != spec.loop else None
     feed, load = (_tag_of(name, by_loop, known) for name in (spec.feedforward, spec.upstream))
     output = Output(other.op, other.op_lo, other.op_hi) if other is not None and other.op else None
-    return replace(spec, beside=output, feed=feed, load=load) if output or feed or load else spec
+    return replace(spec, partner_output=output, feed=feed, load=load) if output or feed or load else spec
 
 
 def _tag_of(name: str, by_loop: Mapping[str, LoopSpec], known: Mapping[str, None]) -> str | None:
@@ -112,9 +114,9 @@ def _missing(before: LoopSpec, after: LoopSpec, alike: Mapping[str, str]) -> lis
     )
     stated = [(role, getattr(before, role)) for role in ROLES if role != "pv" and getattr(before, role)]
     lost = [(role, tag) for role, tag in stated if getattr(after, role) is None]
-    beside, feed = after.override_with or after.split_of, after.feedforward
-    if beside and after.beside is None:
-        notes.append(f"{after.loop}: no OP of {beside} in the export, judged alone")
+    partner, feed = after.override_with or after.split_of, after.feedforward
+    if partner and after.partner_output is None:
+        notes.append(f"{after.loop}: no OP of {partner} in the export, judged alone")
     if feed and after.feed is None:
         notes.append(f"{after.loop}: feedforward {feed} is neither a loop nor a tag of the export")
     if after.upstream and after.load is None:

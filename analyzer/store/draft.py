@@ -30,16 +30,16 @@ class Draft(Store):
         self._made: dict[tuple[str, str], bool] = {}
 
     def file(self, table: str, night: str) -> Path:
-        return self._beside(table, night) if (table, night) in self._made else super().file(table, night)
+        return self._draft_file(table, night) if (table, night) in self._made else super().file(table, night)
 
     def files(self, table: str) -> list[Path]:
         names = {p.stem for p in super().files(table)} | {n for t, n in self._made if t == table}
         return [self.file(table, n) for n in sorted(names) if self._made.get((table, n), True)]
 
     def write(self, table: str, night: str, rows: pa.Table | Iterable[pa.Table] | None) -> None:
-        made = rows is not None and write_table(rows, self._beside(table, night))
+        made = rows is not None and write_table(rows, self._draft_file(table, night))
         if not made:
-            self._beside(table, night).unlink(missing_ok=True)
+            self._draft_file(table, night).unlink(missing_ok=True)
         self._made[table, night] = made
 
     def keep(self) -> None:
@@ -47,10 +47,10 @@ class Draft(Store):
         nights."""
         order = [t.name for t in reversed(KEPT)]
         for table, night in sorted(self._made, key=lambda made: (order.index(made[0]), made[1])):
-            _moved(self._beside(table, night), super().file(table, night), self._made[table, night])
+            _moved(self._draft_file(table, night), super().file(table, night), self._made[table, night])
         self._made.clear()
 
-    def _beside(self, table: str, night: str) -> Path:
+    def _draft_file(self, table: str, night: str) -> Path:
         return self._folder / table / f"{night}.parquet"
 
 

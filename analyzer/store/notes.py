@@ -80,11 +80,11 @@ def new(
     loop: str, text: str, owner: str | None, hidden_until: str = "", state: str = "", due: str = ""
 ) -> Note:
     """A note with the present time. Raises InputError where the text is empty."""
-    told, by = " ".join(visible(text).split()), visible(user() if owner is None else owner)
-    if not told:
+    words, by = " ".join(visible(text).split()), visible(user() if owner is None else owner)
+    if not words:
         remedy = 'state it: triage note STORE LOOP "..."'
         raise InputError(f"an empty note on {loop}", "what was seen or done", remedy)
-    return Note(loop, time.time(), told, by, hidden_until, state, due)
+    return Note(loop, time.time(), words, by, hidden_until, state, due)
 
 
 def _note_lines(store: Path) -> list[str]:
@@ -117,8 +117,8 @@ def _parsed_note(line: str) -> Note | None:
         return None
     if not all(isinstance(x, str) for x in parts) or not 0.0 <= at_s <= LATEST_S:
         return None
-    loop, *told = parts
-    return Note(loop, at_s, *map(visible, told))
+    loop, *texts = parts
+    return Note(loop, at_s, *map(visible, texts))
 
 
 def last(notes: Mapping[str, tuple[Note, ...]], loop: str) -> Note | None:

@@ -157,12 +157,12 @@ class Store:
     ) -> list[dict[str, Any]]:
         """Rows of one night, of some loops or of all, as reported: in the table of nights the columns based on all
         nights come from beliefs, for loops that have some. Unknown columns are None."""
-        resting = [c.name for c in (*REPLACED_BY_BELIEF, *BELIEVED) if c.name in columns]
-        if table != "nights" or not resting or not self.file("beliefs", night).exists():
+        belief_columns = [c.name for c in (*REPLACED_BY_BELIEF, *BELIEVED) if c.name in columns]
+        if table != "nights" or not belief_columns or not self.file("beliefs", night).exists():
             return self.own_rows(table, night, columns, loops)
-        wanted = ["loop", "cause", *(c for c in resting if c != "cause")]
-        told = self.own_rows("beliefs", night, wanted)
-        by_loop = {r["loop"]: {c: r[c] for c in resting} for r in told if r["cause"] is not None}
+        wanted = ["loop", "cause", *(c for c in belief_columns if c != "cause")]
+        beliefs = self.own_rows("beliefs", night, wanted)
+        by_loop = {r["loop"]: {c: r[c] for c in belief_columns} for r in beliefs if r["cause"] is not None}
         alone = self.own_rows(table, night, [*columns, "loop"], loops)
         rows = [row | by_loop.get(row["loop"], {}) for row in alone]
         return [{c: row[c] for c in columns} for row in rows]
@@ -195,7 +195,7 @@ class Store:
     def set_aside_damaged(self, night: str) -> list[str]:
         """Rename the damaged tables of a night, so that it can be written again; return sentences on them. Raises
         NotNowError if one cannot be read now: it is kept unless it is known to be damaged."""
-        said = []
+        notes = []
         for table in KEPT:
             try:
                 for _ in self.parts_if_there(table.name, night):
@@ -204,8 +204,8 @@ class Store:
                 path = self.file(table.name, night)
                 aside = path.with_name(f"{path.name}.{secrets.token_hex(4)}.damaged")
                 path.rename(aside)
-                said.append(f"{error.seen}; set aside as {aside.name}, and written again")
-        return said
+                notes.append(f"{error.seen}; set aside as {aside.name}, and written again")
+        return notes
 
     def forget_explained(self, night: str, loops: Sequence[str] | None) -> None:
         """Delete the explanations of some loops of a night, of all if None, because their records were replaced."""

@@ -113,13 +113,13 @@ def _write_parts(parts: Iterable[pa.Table], schema: pa.Schema, sink: Any) -> Non
             file.write_table(part)
 
 
-BESIDE = b"beside"
+FURTHER_TABLES = b"beside"
 """Metadata of a chunk's piece of the table of nights: the chunk's other pieces."""
 
 
-def naming(table: pa.Table, beside: Iterable[str]) -> pa.Table:
+def naming(table: pa.Table, others: Iterable[str]) -> pa.Table:
     """A chunk's piece of the table of nights, with the names of the chunk's other pieces."""
-    return marked(table, BESIDE, " ".join(beside))
+    return marked(table, FURTHER_TABLES, " ".join(others))
 
 
 def marked(table: pa.Table, key: bytes, text: str) -> pa.Table:
@@ -129,7 +129,7 @@ def marked(table: pa.Table, key: bytes, text: str) -> pa.Table:
 
 def further_tables(path: Path) -> list[str]:
     """The tables of which a chunk has written further pieces; errors as of `read_stored`."""
-    return mark_of(path, BESIDE).split()
+    return mark_of(path, FURTHER_TABLES).split()
 
 
 def mark_of(path: Path, key: bytes) -> str:
@@ -167,7 +167,7 @@ def _of_loops(file: pq.ParquetFile, columns: list[str] | None, loops: Collection
     names = file.schema_arrow.names
     if "loop" not in names:
         return file.read(columns=columns)  # which raises
-    asked = [name for name in names if columns is None or name in columns]
+    requested = [name for name in names if columns is None or name in columns]
     at, found = names.index("loop"), [file.schema_arrow.empty_table()]
     first, last = min(loops, default=""), max(loops, default="")
     for group in range(file.num_row_groups):
@@ -175,8 +175,8 @@ def _of_loops(file: pq.ParquetFile, columns: list[str] | None, loops: Collection
         known = ends is not None and ends.has_min_max and isinstance(ends.min, str)
         near = not known or (ends.min <= last and ends.max >= first)
         if near and rows_of_loops(file.read_row_group(group, columns=["loop"]), loops).num_rows:
-            found.append(rows_of_loops(file.read_row_group(group, columns=[*asked, "loop"]), loops))
-    return pa.concat_tables([t.select(asked) for t in found]).unify_dictionaries()
+            found.append(rows_of_loops(file.read_row_group(group, columns=[*requested, "loop"]), loops))
+    return pa.concat_tables([t.select(requested) for t in found]).unify_dictionaries()
 
 
 def _require_right(path: Path, table: pa.Table, wanted: list[str] | None) -> None:

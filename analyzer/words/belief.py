@@ -27,7 +27,7 @@ NOT_YET = re.compile(
 IS = {Fault.BACKLASH: "backlash", Fault.STICTION: "stiction"}
 
 
-def says_repaired(text: str) -> bool:
+def reports_repair(text: str) -> bool:
     """Whether a note reports a repaired valve."""
     return bool(REPAIRED.search(text)) and not NOT_YET.search(text)
 
@@ -56,7 +56,7 @@ def wear_text(row: Row) -> str:
     return f"{text}; reaches {size:.2g} % {when}"
 
 
-def told(now: Belief, row: Row) -> dict[str, Any]:
+def reported_columns(now: Belief, row: Row) -> dict[str, Any]:
     """The columns of a loop's row based on all nights."""
     t = now.told
     pair = t.pair if t.action is Action.RETUNE else None
@@ -148,14 +148,14 @@ def _together(now: Belief, row: Row) -> str:
     nights = f"{now.cycle.nights} nights since {now.cycle.since}"
     if t.source is not None:
         return f"{cycle}: follows {t.source} in most of {nights}; fix that loop first"
-    beside = "; the valve is also worn" if t.fault in IS else ""
-    said = {
+    also_worn = "; the valve is also worn" if t.fault in IS else ""
+    texts = {
         Cause.VALVE: f": caused by the valve (from {nights})" if cycles else "",
         Cause.TUNING: f": tuned too tight (from {nights})",
-        Cause.LOAD: f": external disturbance (from {nights}){beside}",
+        Cause.LOAD: f": external disturbance (from {nights}){also_worn}",
         Cause.UNDECIDED: f"; cause undecided: {nights} do not agree",
     }
-    return cycle + said.get(t.cause, "")
+    return cycle + texts.get(t.cause, "")
 
 
 def news(before: Belief | None, now: Belief, row: Row) -> tuple[str, str]:

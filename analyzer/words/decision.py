@@ -12,7 +12,7 @@ from analyzer.words.orders import order
 from analyzer.words.units import number
 from identification.signals.field_indices import PUBLISHED, concluded
 
-TOLD = (
+SHOWN_COLUMNS = (
     *(
         "night",
         "status",
@@ -33,7 +33,7 @@ ABOVE_ACTION = (Cause.VALVE, Cause.TUNING, Cause.LOAD)
 
 def as_data(row: Row) -> Row:
     """A decision as plain data, with the action in words and the published indices."""
-    return {name: row[name] for name in TOLD} | {"do": _do(row), "field_indices": indices(row)}
+    return {name: row[name] for name in SHOWN_COLUMNS} | {"do": _do(row), "field_indices": indices(row)}
 
 
 def indices(row: Row) -> list[dict[str, Any]]:

@@ -16,7 +16,7 @@ from identification.experiments.find import Course, Experiment
 from identification.experiments.model import Pooled
 from identification.models import Estimate, Pid
 
-SAID = sentences("experiments")
+TEXTS = sentences("experiments")
 TITLES: Mapping[str, str] = {
     "gain": "gain",
     "slope_pct_per_s": "gain over time",
@@ -157,10 +157,10 @@ def left_open(of: ExperimentResults) -> tuple[str, ...]:
         return ()
     out = []
     if not any(m.backlash_identifiable for m in model.used):
-        out.append(SAID["play"])
+        out.append(TEXTS["play"])
     if any(m.experiment.course.closed for m in model.used):
-        out.append(SAID["closed"])
+        out.append(TEXTS["closed"])
     ops = [m.op for m in model.used]
     low, high = min(float(x.min()) for x in ops), max(float(x.max()) for x in ops)
-    out.append(SAID["range"].format(number(low), number(high)))
+    out.append(TEXTS["range"].format(number(low), number(high)))
     return tuple(out)

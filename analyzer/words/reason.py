@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from analyzer.lanes.lanes import SAID
+from analyzer.lanes.lanes import LANE_TEXTS
 from analyzer.loop.decisions import (
     Action,
     Cause,
@@ -35,9 +35,9 @@ MOST_NAMES = 5
 MOST_AMPLIFIED = 10.0
 """Amplification above which the number is not reported; ours: a model bent by its load reported 35 times for a loop
 that amplified by 0.55."""
-SAID_AT_ONCE = (Action.CHECK_SETTINGS, Action.NEEDS_DATA)
+ACTIONS_AT_ONCE = (Action.CHECK_SETTINGS, Action.NEEDS_DATA)
 """Actions whose words are in the list."""
-NightDecision = tuple[str, str]
+SignText = tuple[str, str]
 """Words for everybody, and figures for an expert, '' if the words contain them."""
 Chosen = tuple[Any, ...]
 """A sentence of texts.toml by its name, and its figures."""
@@ -56,7 +56,7 @@ def reason(found: Finding) -> str:
     known = (
         {Lane.MANUAL} if found.lack is MissingData.AUTOMATIC else set()
     )  # the missing data have been reported already
-    said = [SAID[lane](found) for lane in found.lanes if lane in SAID and lane not in known]
+    said = [LANE_TEXTS[lane](found) for lane in found.lanes if lane in LANE_TEXTS and lane not in known]
     text = joined(_whole(found), *said)
     changed = found.text("settings_changed")
     if not changed:
@@ -85,7 +85,7 @@ def _whole(found: Finding) -> str:
     names = ", ".join(found.moves[:MOST_NAMES]) + (" ..." if len(found.moves) > MOST_NAMES else "")
     moves = f"it also moves {names}: fix this one first" if names else None
     unusual = found.remedy.action is Action.RETUNE and found.cause in (Cause.LOAD, Cause.UNDECIDED)
-    at_once = unusual or found.remedy.action in SAID_AT_ONCE or found.lack is MissingData.OP_RANGE
+    at_once = unusual or found.remedy.action in ACTIONS_AT_ONCE or found.lack is MissingData.OP_RANGE
     more = found.remedy.text if at_once and found.remedy.text != lacking else None
     first, *others = _cause(found).split("; ")
     worn = valve_text(found) if found.cause is not Cause.VALVE and found.fault in sentences("width") else None
@@ -154,9 +154,9 @@ def joined(*clauses: str | None) -> str:
     return "; ".join(filter(None, kept))
 
 
-def sign_parts(sign: Sign) -> NightDecision:
+def sign_parts(sign: Sign) -> SignText:
     """A sign in words and figures."""
-    which, *figures = SAYS[sign.kind](*sign.figures)
+    which, *figures = SIGN_TEXTS[sign.kind](*sign.figures)
     said, shown = sentences("signs")[which], sentences("figures_of_signs").get(which, "")
     return said.format(*figures), shown.format(*figures)
 
@@ -214,7 +214,7 @@ def _of_below(loop: str, cause: str | None, tie: str) -> Chosen:
     return f"below_of_{own}_fault", "moves" if tie == "split" else "is the set point of", loop
 
 
-SAYS: Mapping[SignKind, Callable[..., Chosen]] = {
+SIGN_TEXTS: Mapping[SignKind, Callable[..., Chosen]] = {
     SignKind.EVIDENCE: _evidence,
     SignKind.WIDTH: lambda size: ("width", 100 * size),
     SignKind.AMPLIFICATION: _amplification,

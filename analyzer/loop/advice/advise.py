@@ -44,7 +44,7 @@ from tuning.limit_cycle import Cycle, confirm
 from tuning.recommend import WITHOUT_SETTINGS, Proposal, recommend
 from tuning.search import LoadedLoop, rounded
 
-SAID = sentences("settings")
+TEXTS = sentences("settings")
 """Sentences about settings that are given, or withheld."""
 
 
@@ -119,11 +119,11 @@ def advise(
         proposal = replace(proposal, action=Action.REPAIR_VALVE)
     elif proposal.action is Action.UNDECIDED:
         return _lacking(Requirement(MissingData.STEP_TEST, RequirementKind.STEP_TEST, (proposal.reason,)))
-    beside = None
+    comparison = None
     if proposed.loop is not None and proposed.load is not None:
         known = proposed.loop, proposed.load, held or proposal.new, oscillation.period_s, pv_span
-        beside = compared(*known, config.tuning, proposed.others, proposed.indistinguishable)
-    return replace(_as_advice(proposal, spec, pv_span), compared=beside)
+        comparison = compared(*known, config.tuning, proposed.others, proposed.indistinguishable)
+    return replace(_as_advice(proposal, spec, pv_span), compared=comparison)
 
 
 def advise_beyond_faults(
@@ -149,13 +149,13 @@ def advise_beyond_faults(
     return Advice(Action.RETUNE, reason, rounded(kp), rounded(ti))
 
 
-def _faster(found: FasterSettings | None, said: str) -> tuple[Pid | None, str]:
+def _faster(found: FasterSettings | None, name: str) -> tuple[Pid | None, str]:
     """New settings and their reason."""
     if found is None:
         return None, ""
     if found.change is None or found.travel is None:
-        return found.new, SAID["first_step"]
-    return found.new, SAID[said].format(found.times, 100.0 * found.change, 100.0 * found.travel)
+        return found.new, TEXTS["first_step"]
+    return found.new, TEXTS[name].format(found.times, 100.0 * found.change, 100.0 * found.travel)
 
 
 def _calmer(verdict: Verdict, config: Config) -> tuple[Pid | None, str]:
@@ -172,7 +172,7 @@ def _calmer(verdict: Verdict, config: Config) -> tuple[Pid | None, str]:
         return None, ""
     step = calmer_step(m.controller, m.observed, config.tuning)
     most = 100.0 * (config.tuning.tight_price - 1.0)
-    return (None, "") if step is None else (step.new, SAID["rings"].format(most))
+    return (None, "") if step is None else (step.new, TEXTS["rings"].format(most))
 
 
 def with_controller_note(
@@ -180,21 +180,21 @@ def with_controller_note(
 ) -> Assessment:
     """The assessment with a note on properties of the controller in the record that loops.csv does not state."""
     if found.scheduled_over is not None:
-        said = SAID["scheduled"].format(found.scheduled_over.over.upper())
+        note = TEXTS["scheduled"].format(found.scheduled_over.over.upper())
         if stated is not None and found.scheduled_over.edge is not None:
             columns = schedule_shown(found.scheduled_over, stated, spec, prepared.scale)
-            said = f"{said}; the record shows {columns}"
-        return replace(found, notes=(*found.notes, said))
+            note = f"{note}; the record shows {columns}"
+        return replace(found, notes=(*found.notes, note))
     if found.shown is None:
         return found
     span = prepared.scale.span
     if stated is None:
-        said = SAID["recorded"].format(
+        note = TEXTS["recorded"].format(
             of_controller(found.shown, spec, span) + intervals_of(found.shown, found.law, spec, span)
         )
     else:
-        said = SAID["beside"].format(corrected_columns(stated, found.shown, spec, span))
-    return replace(found, notes=(*found.notes, said))
+        note = TEXTS["beside"].format(corrected_columns(stated, found.shown, spec, span))
+    return replace(found, notes=(*found.notes, note))
 
 
 def on_recorded(advice: Advice, found: Assessment, spec: LoopSpec, pv_span: float) -> Advice:
@@ -202,7 +202,7 @@ def on_recorded(advice: Advice, found: Assessment, spec: LoopSpec, pv_span: floa
     if found.shown is None or advice.kp_new is None:
         return advice
     followed = of_controller(found.shown, spec, pv_span)
-    return replace(advice, reason=SAID["on_recorded"].format(followed, advice.reason))
+    return replace(advice, reason=TEXTS["on_recorded"].format(followed, advice.reason))
 
 
 def _unscaled(kept: Advice | None, needs: Requirement) -> Advice:
@@ -230,24 +230,24 @@ def withheld(
     if verdict.dead:
         return Advice(Action.REPAIR_VALVE)
     if found.outdated:
-        return Advice(Action.NONE, SAID["just_changed"])
+        return Advice(Action.NONE, TEXTS["just_changed"])
     if found.settings is not None and controller is not None:
         listed, followed = (of_controller(pid, spec, pv_span) for pid in (controller, found.settings))
         followed += intervals_of(found.settings, found.law, spec, pv_span)
         return Advice(
-            Action.CHECK_SETTINGS, SAID["differ"].format(listed, followed) + _slip(found, spec, pv_span)
+            Action.CHECK_SETTINGS, TEXTS["differ"].format(listed, followed) + _slip(found, spec, pv_span)
         )
     if found.needs is not None:
         return _lacking(found.needs)
     worn = verdict.fault in (Fault.BACKLASH, Fault.STICTION)
     if worn and verdict.cause in (Cause.LOAD, Cause.UNDECIDED):
-        return Advice(Action.REPAIR_VALVE, SAID["worn_beside"], due=Due.SHUTDOWN)
+        return Advice(Action.REPAIR_VALVE, TEXTS["worn_beside"], due=Due.SHUTDOWN)
     if verdict.cause in (Cause.NONE, Cause.LOAD):
         return Advice(WITHOUT_SETTINGS[verdict.cause])
     if counting(found.oscillations) is None:
         at_fault = verdict.cause is Cause.VALVE
         return (
-            Advice(Action.REPAIR_VALVE, SAID["calm"], due=Due.SHUTDOWN) if at_fault else Advice(Action.NONE)
+            Advice(Action.REPAIR_VALVE, TEXTS["calm"], due=Due.SHUTDOWN) if at_fault else Advice(Action.NONE)
         )
     if verdict.needs is not None:
         return _lacking(verdict.needs)
@@ -260,7 +260,7 @@ def _slip(found: Assessment, spec: LoopSpec, pv_span: float) -> str:
     """Unit or form in which the stated figures equal the recorded ones, '' if there is none."""
     changed = {} if found.settings is None else typing_error(spec, found.settings, pv_span)
     written = " and ".join(f"{column} {value}" for column, value in changed.items())
-    return SAID["slip"].format(written) if changed else ""
+    return TEXTS["slip"].format(written) if changed else ""
 
 
 def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> Advice | None:
@@ -270,10 +270,10 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
     if found.for_settings is not None:
         return _lacking(found.for_settings)
     if controller is None:
-        return _or_repair(found.verdict, Advice(Action.CHECK_SETTINGS, SAID["not_stated"]))
+        return _or_repair(found.verdict, Advice(Action.CHECK_SETTINGS, TEXTS["not_stated"]))
     if found.scheduled_over is not None:
-        said = SAID["scheduled"].format(found.scheduled_over.over.upper())
-        return _or_repair(found.verdict, Advice(Action.NONE, said))
+        reason = TEXTS["scheduled"].format(found.scheduled_over.over.upper())
+        return _or_repair(found.verdict, Advice(Action.NONE, reason))
     if found.judged_h < config.advice.least_h:
         return _lacking(
             Requirement(MissingData.LONGER, RequirementKind.HOURS, (config.advice.least_h, found.judged_h))
@@ -314,11 +314,11 @@ def propose(
 ) -> Proposed:
     """The tuning package's proposal on the model of a verdict, on its uncertainty, and on its residual load, in a
     whole record if that is given; if that is not the model which the verdict reports, its reason states this."""
-    sought_on = verdict.for_settings
-    found = _proposed(sought_on, controller, period_s, config, record)
-    if sought_on is verdict or not found.proposal.reason:
+    chosen = verdict.for_settings
+    found = _proposed(chosen, controller, period_s, config, record)
+    if chosen is verdict or not found.proposal.reason:
         return found
-    reason = f"{SAID['one_friction']} {found.proposal.reason}"
+    reason = f"{TEXTS['one_friction']} {found.proposal.reason}"
     return replace(found, proposal=replace(found.proposal, reason=reason))
 
 
@@ -332,12 +332,12 @@ def _proposed(
         return Proposed(recommend(loop, verdict.cause, limits=config.tuning))
     duration_s, dead_time_s = verdict.fit.p.duration_s, loop.process.dead_time_s
     if dead_time_s > LONGEST_DEAD_TIME * duration_s:
-        shown = SAID["beyond_record"].format(number(dead_time_s), duration_s / 3600.0)
+        shown = TEXTS["beyond_record"].format(number(dead_time_s), duration_s / 3600.0)
         return Proposed(Proposal(Action.UNDECIDED, shown))
     if verdict.cause is Cause.TUNING:
         return _for_tuning(verdict, loop, period_s, config, record)
     if not is_stable(loop):
-        return Proposed(Proposal(Action.UNDECIDED, SAID["unstable"]))
+        return Proposed(Proposal(Action.UNDECIDED, TEXTS["unstable"]))
     return _for_valve(verdict, loop, period_s, config, record)
 
 
@@ -369,29 +369,29 @@ def _for_valve(
 ) -> Proposed:
     """The proposal for a worn valve. The motion of a stem that jumps depends on the exact load, and a stretch has few
     of its cycles: its settings are tested under the load of the whole record."""
-    told_nat, least_nat = verdict.require_measured.evidence, config.advice.valve_nat
-    if told_nat < least_nat:
-        return Proposed(Proposal(Action.UNDECIDED, SAID["hardly_told"].format(told_nat, least_nat)))
-    sought, fit, others = tuning_model(verdict, loop.controller, config.advice)
-    rests = confirm(sought).cycle is None
-    if rests and period_s is None:
-        return Proposed(Proposal(Action.REPAIR_VALVE, SAID["calm"]))
+    evidence_nat, least_nat = verdict.require_measured.evidence, config.advice.valve_nat
+    if evidence_nat < least_nat:
+        return Proposed(Proposal(Action.UNDECIDED, TEXTS["hardly_told"].format(evidence_nat, least_nat)))
+    model, fit, others = tuning_model(verdict, loop.controller, config.advice)
+    at_rest = confirm(model).cycle is None
+    if at_rest and period_s is None:
+        return Proposed(Proposal(Action.REPAIR_VALVE, TEXTS["calm"]))
     load = load_of(fit, loop.controller)
     if period_s is not None and load.size >= config.tuning.least_steps:
-        apart = agreement(sought, fit, load).worst(config.advice)
-        if apart is not None and rests and math.isinf(integral_s(loop.controller)):
-            return Proposed(Proposal(Action.CHECK_SETTINGS, SAID["no_integral"]))
-        if apart is not None:
-            differs = SAID["off_by"].format(*apart) if apart[1] > 0.0 else SAID["no_cycle"]
-            return Proposed(Proposal(Action.UNDECIDED, SAID["disagrees"].format(differs)))
+        difference = agreement(model, fit, load).worst(config.advice)
+        if difference is not None and at_rest and math.isinf(integral_s(loop.controller)):
+            return Proposed(Proposal(Action.CHECK_SETTINGS, TEXTS["no_integral"]))
+        if difference is not None:
+            differs = TEXTS["off_by"].format(*difference) if difference[1] > 0.0 else TEXTS["no_cycle"]
+            return Proposed(Proposal(Action.UNDECIDED, TEXTS["disagrees"].format(differs)))
     none = period_s is None or loop.controller.kp == 0.0  # an integral alone rings before these
-    same = () if none else indistinguishable(fit, sought, period_s or 0.0)
+    same = () if none else indistinguishable(fit, model, period_s or 0.0)
     tested, alike = load, same
     if record is not None and not none and fit.valve.slip_jump > 0.0:
         tested = load_of_night(fit, loop.controller, record, period_s or 0.0)
-        alike = indistinguishable(fit, sought, period_s or 0.0, record)
-    found = recommend(sought, verdict.cause, others, tested, config.tuning, indistinguishable=alike)
-    return Proposed(found, sought, load, others, same)
+        alike = indistinguishable(fit, model, period_s or 0.0, record)
+    found = recommend(model, verdict.cause, others, tested, config.tuning, indistinguishable=alike)
+    return Proposed(found, model, load, others, same)
 
 
 def _as_advice(proposal: Proposal, spec: LoopSpec, pv_span: float) -> Advice:

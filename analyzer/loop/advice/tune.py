@@ -63,7 +63,7 @@ UNMODELLED_SPARSE = 0.13
 over error forecast, 24 loops with backlash of benchmarks/world every 10 s (seeds 603 to 606); 0.05 of 31 at 1
 s."""
 
-SAID = sentences("settings")
+TEXTS = sentences("settings")
 NO_MOVES = Requirement(None, RequirementKind.MOVING_PV)
 FORECAST = ("average_absolute_error", "stem_travel", "oscillation", "variability")
 """Reported figures of a forecast."""
@@ -171,7 +171,7 @@ def _cycle_lines(t: Tuning) -> list[str]:
         f"  describing function: {predicted}",
     ]
     if t.period_s is None and p is not None:
-        lines.append(SAID["no_such_cycle"])
+        lines.append(TEXTS["no_such_cycle"])
     return lines
 
 
@@ -179,7 +179,7 @@ def _forecast_lines(t: Tuning) -> list[str]:
     if t.proposal.new is None:
         return []
     if t.forecast is None:
-        return [SAID["no_forecast"]]
+        return [TEXTS["no_forecast"]]
     lines = [
         "forecast on the reconstructed load of the record (90 % intervals for the next record of such a load):"
     ]
@@ -241,20 +241,20 @@ def proposal(one: PlantLoop, decision: Decided, drawn: bool) -> TuningReport:
     row = decision.row
     head = decision_lines(row)
     try:
-        told = _routine(one, stated, decision, drawn)
+        report = _routine(one, stated, decision, drawn)
     except (InputError, NotAssessedError) as error:
         decides = row["status"] == Status.OK and not isinstance(error, InputError)
         if not known and not decides:
             raise
         return TuningReport([*head, *shown, f"no model from routine operation: {error}"], {}, row)
-    return replace(told, lines=[*head, *shown, *told.lines])
+    return replace(report, lines=[*head, *shown, *report.lines])
 
 
 def results_with_neighbours(one: PlantLoop) -> ExperimentResults | None:
     """Results of a loop's experiments, with its neighbours' OPs."""
     spec, plant, record = one.spec, one.plant, one.prepared.record
     series = plant.trends(spec.tags, one.night)
-    return experiment_results(spec, series, one.prepared, plant.config, beside=_neighbours(one, record))
+    return experiment_results(spec, series, one.prepared, plant.config, neighbours=_neighbours(one, record))
 
 
 def _neighbours(one: PlantLoop, record: LoopRecord) -> tuple[Floats, ...]:
@@ -293,18 +293,20 @@ def _routine(one: PlantLoop, stated: Pid | None, decision: Decided, drawn: bool)
     if cause not in AGAINST and action is not Action.RETUNE:
         left = [WHY[cause]] if action is WITHOUT_SETTINGS[cause] else []
         kind = "no_model_of_load" if cause is Cause.LOAD else "no_model"
-        return TuningReport([*text, *left, SAID[kind]], {}, row)
+        return TuningReport([*text, *left, TEXTS[kind]], {}, row)
     new = None
     if action is Action.RETUNE:
         new = controller_of(replace(spec, kp=row["kp_new"], ti=row["ti_new"]), prepared)
     kept = withheld(found, spec, stated, prepared.scale.span, config)
     tuning = tune(found, stated, config, kept, prepared, spec.type, (action, new))
     text += proposal_lines(tuning, spec, prepared.scale.span)
-    lines, files = _with_settings_beside(tuning, spec, prepared.scale.span, config, row["night"], text, drawn)
+    lines, files = _with_compared_settings(
+        tuning, spec, prepared.scale.span, config, row["night"], text, drawn
+    )
     return TuningReport(lines, files, row, tuning)
 
 
-def _with_settings_beside(
+def _with_compared_settings(
     t: Tuning, spec: LoopSpec, pv_span: float, config: Config, night: str, text: list[str], drawn: bool
 ) -> tuple[list[str], dict[str, bytes]]:
     """Text with the settings to choose between; pictures by file name and, among them, the page of settings."""
@@ -316,9 +318,9 @@ def _with_settings_beside(
     new = t.proposal.new
     bounded = new is not None or is_stable(t.model)  # else the identified loop is unstable
     known = t.model, t.load, new, period_s, pv_span, config.tuning, t.others
-    sought = new is not None or t.proposal.before is not None
-    found = compared(*known) if bounded and (sought or drawn) else None
-    if found is not None and sought:
+    is_compared = new is not None or t.proposal.before is not None
+    found = compared(*known) if bounded and (is_compared or drawn) else None
+    if found is not None and is_compared:
         text = [*text, *choices(found, spec)]
     if not drawn:
         return text, {}

@@ -46,11 +46,11 @@ def pv_that_jumps(record: LoopRecord, limits: RecorderLimits) -> Requirement | N
     """Requirement of a PV that is constant and then jumps, as behind a sticking valve, although the sensor causes it;
     None of any other, as of a PV of which the historian alone left out small changes."""
     measured = record.pv[~record.bad]
-    jump, stands = least_jump(measured, limits), float(np.mean(np.diff(measured) == 0.0))
+    jump, constant = least_jump(measured, limits), float(np.mean(np.diff(measured) == 0.0))
     if jump and responds_to_more(record):
         return None
     return (
-        Requirement(MissingData.FINER, RequirementKind.PV_AS_MEASURED, (100.0 * stands, jump))
+        Requirement(MissingData.FINER, RequirementKind.PV_AS_MEASURED, (100.0 * constant, jump))
         if jump > 0.0
         else None
     )

@@ -39,27 +39,27 @@ def refine_stick_slip(verdict: Verdict, period_s: float, config: Config) -> Verd
         return verdict
     problem = m.play.p
     blocks = replace(m.play, p=problem.of_rows.with_blocks(fine=False))
-    play = descend(blocks, free_width=True) if problem.blocks.fine or problem.blocks.steps > 1 else m.play
-    path = fit_irregular(play, generic_noise(), period_s, verdict.fault is not Fault.STICTION)
+    backlash = descend(blocks, free_width=True) if problem.blocks.fine or problem.blocks.steps > 1 else m.play
+    path = fit_irregular(backlash, generic_noise(), period_s, verdict.fault is not Fault.STICTION)
     if path is None:
         return verdict
-    jump = path_evidence(path, play)
+    jump = path_evidence(path, backlash)
     more = jump - max(m.jump, 0.0)
     new = verdict.fault is Fault.BACKLASH  # for other faults a jump is known, or nearly
     share = limits.jump_share if new else 0.0
     if more < max(limits.evidence_jump, share * (m.evidence + more)):
         return verdict
-    told = _with_path(m, path, jump, more)
-    fault = fault_of(told, limits)
-    law = _finely(refined(near_path(play, path)), m)
+    improved = _with_path(m, path, jump, more)
+    fault = fault_of(improved, limits)
+    law = _finely(refined(near_path(backlash, path)), m)
     best = max((x for x in (m.stick_slip, law) if x is not None), key=lambda fit: fit.log_likelihood)
-    slips = told.stick_slip
+    slips = improved.stick_slip
     if m.controller is not None and slips is not None:
         laws = (slips.valve._replace(tolerance=motion) for motion in (RESTS, HALTS))
         fits = (best, *(slips.moved(valve=law) for law in laws))
         best = closest(fits, m.controller, config.advice)
     steady = replace(verdict, measured=replace(m, stick_slip=best), fault=fault)
-    return replace(verdict, measured=told, fault=fault, steady=steady)
+    return replace(verdict, measured=improved, fault=fault, steady=steady)
 
 
 def _finely(fit: Fitted, m: Measured) -> Fitted:
@@ -70,5 +70,5 @@ def _finely(fit: Fitted, m: Measured) -> Fitted:
 def _with_path(m: Measured, path: SlipPath, jump: float, more: float) -> Measured:
     """The measures, with the path's stem and the friction and process of its fit."""
     fit = _finely(path.fit, m)
-    linear, play = (replace(x, p=fit.p) for x in (m.linear, m.play))
-    return replace(m, linear=linear, play=play, stick_slip=fit, jump=jump, evidence=m.evidence + more)
+    linear, backlash = (replace(x, p=fit.p) for x in (m.linear, m.play))
+    return replace(m, linear=linear, play=backlash, stick_slip=fit, jump=jump, evidence=m.evidence + more)

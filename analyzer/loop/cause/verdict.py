@@ -139,7 +139,7 @@ def shows_fault(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
 def agrees(m: Measured, limits: CauseLimits) -> bool:
     """Whether no single load explains the evidence of a calm loop: its stretches agree, or set point moves, which no
     load follows, suffice."""
-    return m.steady >= limits.steady or m.asked >= needed(m, limits, False)
+    return m.steady >= limits.steady or m.response_nat >= needed(m, limits, False)
 
 
 def quiet_signs(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
@@ -191,19 +191,19 @@ def jump_evidence(m: Measured, limits: CauseLimits) -> tuple[float, float]:
 
 
 def judge(
-    m: Measured, oscillation: Oscillation | None, limits: CauseLimits, beside: WornValve | None = None
+    m: Measured, oscillation: Oscillation | None, limits: CauseLimits, worn_valve: WornValve | None = None
 ) -> Verdict:
     """The cause of the cycle: that whose model is more likely than the others, and than a smooth load, by the penalty
-    of its constants. If a measure is unknown no cause is named. beside : the valve in the whole record,
+    of its constants. If a measure is unknown no cause is named. worn_valve : the valve in the whole record,
     None if it was not examined."""
     if oscillation is None:
-        return _quiet(m, limits, beside)
+        return _quiet(m, limits, worn_valve)
     if m.ringing is None or any(math.isnan(x) for x in (m.evidence, m.jump, m.size, m.kurtosis)):
         return replace(not_assessed(None), measured=m)
     if m.has_clock(limits) and m.evidence < limits.beside_evidence:
         return _has_clock(m, oscillation, limits)
     seen_as = Regularity(oscillation.rhythm.first, m.kurtosis, m.saturated >= limits.held, oscillation.cycles)
-    worn = _may_be_cause(m, m.ringing, limits, beside)
+    worn = _may_be_cause(m, m.ringing, limits, worn_valve)
     if m.ringing.is_tight(seen_as, m.evidence if worn else 0.0, limits):
         return _rings(m, m.ringing, limits)
     wide = m.size >= limits.least_size  # a narrower fault raises no doubt about a load
@@ -247,11 +247,11 @@ def _rings(m: Measured, ringing: Ringing, limits: CauseLimits) -> Verdict:
         Sign(Cause.TUNING, pct / 100.0, SignKind.RINGING, (ringing.ms, ringing.period_s)),
         Sign(Cause.TUNING, max(clear, WEAK), SignKind.SMOOTH_LOAD, (ringing.line_nat,)),
     )
-    told = replace(m, linear=as_fit(ringing.smooth, m.problem))
-    return Verdict(Cause.TUNING, confidence, Fault.NONE, signs, measured=told)
+    measured = replace(m, linear=as_fit(ringing.smooth, m.problem))
+    return Verdict(Cause.TUNING, confidence, Fault.NONE, signs, measured=measured)
 
 
-def _may_be_cause(m: Measured, ringing: Ringing, limits: CauseLimits, beside: WornValve | None) -> bool:
+def _may_be_cause(m: Measured, ringing: Ringing, limits: CauseLimits, worn_valve: WornValve | None) -> bool:
     """Whether a valve fault may be the cause of a cycle: PV shows it, it is not too small for OP's travel, and the
     loop's harmonic balance is not far from a limit cycle. A valve loses the same travel at each reversal, so more
     than half of the half-cycles must show it: a few may follow set point moves. Unless nearly all of them do, two
@@ -264,11 +264,11 @@ def _may_be_cause(m: Measured, ringing: Ringing, limits: CauseLimits, beside: Wo
     each = m.trials is not None and m.trials.agreeing >= limits.agreeing
     narrow = m.size < limits.least_size and not each
     doubted = ringing.is_periodic(limits) and not each and fault_of(m, limits) is not Fault.STICTION
-    if beside is None or not (narrow or doubted):
+    if worn_valve is None or not (narrow or doubted):
         return not narrow
     if ringing.valve_nat - max(ringing.line_nat, 0.0) >= limits.beside_evidence:
-        return beside.has_evidence  # OP of a tight loop travels several times its backlash
-    return not narrow and beside.is_seen
+        return worn_valve.has_evidence  # OP of a tight loop travels several times its backlash
+    return not narrow and worn_valve.is_seen
 
 
 def imbalance(m: Measured) -> float:
@@ -281,12 +281,14 @@ def imbalance(m: Measured) -> float:
     return abs(1.0 + response * describe(Backlash(m.play.valve.stickband), 0.5 * m.problem.cycle_range))
 
 
-def _quiet(m: Measured, limits: CauseLimits, beside: WornValve | None) -> Verdict:
+def _quiet(m: Measured, limits: CauseLimits, worn_valve: WornValve | None) -> Verdict:
     """The verdict on a loop that does not oscillate: a valve fault, if likelihood and size agree, or none."""
     signs = quiet_signs(m, limits)
     pct = combined(signs)
     is_valve = len(signs) >= limits.signs and pct >= limits.named_pct
-    is_valve = is_valve and (beside is None or (beside.is_likelier and not beside.is_recorded_by_exception))
+    is_valve = is_valve and (
+        worn_valve is None or (worn_valve.is_likelier and not worn_valve.is_recorded_by_exception)
+    )
     if not is_valve:
         pct = min(pct, 0.5 * limits.named_pct)
     confidence = {Cause.VALVE: pct, Cause.TUNING: 0.0, Cause.LOAD: 0.0}
@@ -359,16 +361,16 @@ def with_worn_valve(verdict: Verdict, worn: WornValve, others_s: Sequence[float]
     others_s : further periods of the error [s]."""
     m = verdict.measured
     if verdict.cause is Cause.UNDECIDED and m is not None and not worn.is_seen:
-        return _beside_another_cycle(verdict, m, worn, others_s)
+        return _fault_under_other_load(verdict, m, worn, others_s)
     # ringing is no line: the free noise model must show the backlash too
     rings_alone = verdict.cause is Cause.TUNING and m is not None and m.evidence <= 0.0
     if m is None or verdict.cause is Cause.VALVE or rings_alone or not worn.is_seen:
         return verdict
-    fault, told = worn.shown
-    return replace(verdict, fault=fault, measured=told)
+    fault, measured = worn.shown
+    return replace(verdict, fault=fault, measured=measured)
 
 
-def _beside_another_cycle(
+def _fault_under_other_load(
     verdict: Verdict, m: Measured, worn: WornValve, others_s: Sequence[float]
 ) -> Verdict:
     """The verdict on an undecided cycle. Its cause is the valve if a fault is identified together with a
@@ -376,9 +378,9 @@ def _beside_another_cycle(
     for other in (replace(worn, period_s=period_s) for period_s in others_s[:OTHERS]):
         if not other.is_seen:
             continue
-        fault, told = other.shown
+        fault, measured = other.shown
         lead = other.found.evidence
         confidence = _chances({Cause.VALVE: lead, Cause.TUNING: 0.0, Cause.LOAD: 0.0}, worn.limits)
         why = Sign(Cause.VALVE, 1.0, SignKind.LIKELIER, (str(Cause.VALVE), lead))
-        return Verdict(Cause.VALVE, confidence, fault, (why, *verdict.signs), measured=told)
+        return Verdict(Cause.VALVE, confidence, fault, (why, *verdict.signs), measured=measured)
     return verdict

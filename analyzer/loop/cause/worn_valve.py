@@ -78,10 +78,10 @@ class WornValve:
     def shown(self) -> tuple[Fault, Measured]:
         """The fault of the likeliest valve, and the measures with its fit."""
         linear, valve = self._fits()
-        told = replace(self.measured, linear=linear, play=valve)
+        measured = replace(self.measured, linear=linear, play=valve)
         if valve.valve.slip_jump < self.limits.least_jump * valve.valve.stickband:
-            return Fault.BACKLASH, told
-        return Fault.STICTION, replace(told, stick_slip=valve)
+            return Fault.BACKLASH, measured
+        return Fault.STICTION, replace(measured, stick_slip=valve)
 
     def _fits(self) -> tuple[Fitted, Fitted]:
         """Process alone and behind the faulty valve. If the cycle of OP crosses the backlash it is fitted in the
@@ -117,10 +117,10 @@ class WornValve:
     def _is_crossed(self) -> bool:
         """Whether OP crosses the backlash at least once in the record, the backlash is no small share of its range in
         a cycle, and the process gain has the controller's sign."""
-        m, play = self.measured, self.found.play
-        right_way = m.controller is None or m.controller.sign * play.gain > 0.0
-        width = play.valve.stickband
-        crossed = width <= self.limits.widest * play.p.op_range
+        m, backlash = self.measured, self.found.play
+        right_way = m.controller is None or m.controller.sign * backlash.gain > 0.0
+        width = backlash.valve.stickband
+        crossed = width <= self.limits.widest * backlash.p.op_range
         return right_way and crossed and width >= self.limits.beside_size * m.problem.reach
 
     @cached_property

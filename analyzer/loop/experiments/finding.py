@@ -16,7 +16,7 @@ from analyzer.words.experiments import in_a_clause, settings_text
 from identification.models import Pid
 from tuning.search import rounded
 
-SAID = sentences("experiments")
+TEXTS = sentences("experiments")
 
 
 def remedy_of(of: ExperimentResults, spec: LoopSpec, present: Pid | None) -> Remedy:
@@ -26,12 +26,12 @@ def remedy_of(of: ExperimentResults, spec: LoopSpec, present: Pid | None) -> Rem
     span, s = of.prepared.scale.span, of.settings
     ours, simc = (settings_text(pid, spec, span) for pid in (s.robust, s.simc))
     if present is None:
-        return Remedy(Action.CHECK_SETTINGS, SAID["not_stated"].format(ours, simc))
+        return Remedy(Action.CHECK_SETTINGS, TEXTS["not_stated"].format(ours, simc))
     new = chosen(of, present)
     if new is None:
-        return Remedy(Action.NONE, SAID["as_good"].format(ours, simc))
+        return Remedy(Action.NONE, TEXTS["as_good"].format(ours, simc))
     kp, ti = as_stated(new, spec, span)
-    return Remedy(Action.RETUNE, SAID["from_model"].format(s.robust_ms, simc), rounded(kp), rounded(ti))
+    return Remedy(Action.RETUNE, TEXTS["from_model"].format(s.robust_ms, simc), rounded(kp), rounded(ti))
 
 
 def _known(of: ExperimentResults) -> dict[str, Cell]:
@@ -78,7 +78,7 @@ def with_experiment(found: Finding, of: ExperimentResults, spec: LoopSpec, prese
     known = {**found.known, **_known(of), **(_witnessed(of, witness) if witness else {})}
     if found.width_pct is not None:  # the cycles determine the valve
         known["backlash_pct"] = found.known.get("backlash_pct")
-    told = replace(found, known=known)
+    extended = replace(found, known=known)
     if of.model is None or found.remedy.action not in OPEN:
-        return told
-    return replace(told, remedy=remedy_of(of, spec, present))
+        return extended
+    return replace(extended, remedy=remedy_of(of, spec, present))

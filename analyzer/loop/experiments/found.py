@@ -72,12 +72,12 @@ def manual_of(spec: LoopSpec, prepared: Prepared, series: Mapping[str, Series], 
     """True where OP is moved by an operator or a script, shape (n,): in manual; without a mode also where OP is
     constant at a limit for long."""
     record = prepared.record
-    stands = constant_stretches(
+    constant = constant_stretches(
         record.op, record.dt_s, config.quality.manual_s, config.quality.manual_samples
     )
     if spec.mode in series:
         return record.mask("manual")
-    return record.mask("manual") | (stands & record.mask("saturated"))
+    return record.mask("manual") | (constant & record.mask("saturated"))
 
 
 def on_even_clock(
@@ -108,24 +108,24 @@ def experiment_results(
     prepared: Prepared,
     config: Config,
     closed: bool = True,
-    beside: Sequence[Floats] = (),
+    neighbours: Sequence[Floats] = (),
 ) -> ExperimentResults | None:
     """Results of a loop's experiments; None if there are none.
 
-    closed : whether those in automatic are modelled too, which a night leaves to its routine; beside : OPs of
+    closed : whether those in automatic are modelled too, which a night leaves to its routine; neighbours : OPs of
     neighbours on the record's clock, shape (n,) each.
     """
     found = found_in(spec, prepared, series, config)
     if not found:
         return None
-    even = prepared if beside else on_even_clock(spec, series, prepared, config)
+    even = prepared if neighbours else on_even_clock(spec, series, prepared, config)
     if even is not prepared:
         found = found_in(spec, even, series, config)
     models, without_model, stated = [], [], controller_of(spec, even)
     wanted = [x for x in sorted(found, key=lambda x: -x.size) if closed or not x.course.closed]
     for x in wanted[: MOST if closed else MOST_A_NIGHT]:
         try:
-            models.append(_checked_sign(modelled(even.record, x, beside), stated))
+            models.append(_checked_sign(modelled(even.record, x, neighbours), stated))
         except NotAssessedError as error:
             without_model.append((x, str(error)))
         except (ArithmeticError, ValueError) as error:  # a fit that diverges costs nothing else of the loop
@@ -201,11 +201,11 @@ def constants_known(model: Pooled) -> Mapping[str, tuple[float, float]]:
 
 def with_constants(witness: str | None, model: Pooled) -> str:
     """A night's evidence about its valve, with the constants that experiments determine better, or these alone."""
-    said = json.loads(witness) if witness else {}
+    constants = json.loads(witness) if witness else {}
     for name, (value, deviation) in constants_known(model).items():
-        if name not in said or deviation < said[name][1]:
-            said[name] = [float(f"{value:.4g}"), float(f"{deviation:.4g}")]
-    return json.dumps(said, separators=(",", ":"))
+        if name not in constants or deviation < constants[name][1]:
+            constants[name] = [float(f"{value:.4g}"), float(f"{deviation:.4g}")]
+    return json.dumps(constants, separators=(",", ":"))
 
 
 def model_row(model: Pooled) -> dict[str, Cell]:
@@ -227,9 +227,11 @@ def as_rows(of: ExperimentResults) -> str:
     """The experiments as the store keeps them (JSON): span [s since 1970-01-01 UTC], course, moves, results of each,
     and its response in a few hundred points, PV in % of span."""
     record = of.prepared.record
-    told = {m.experiment: m for m in of.models}
+    by_experiment = {m.experiment: m for m in of.models}
     why = dict(of.without_model)
-    return json.dumps([_as_row(record, x, told.get(x), why.get(x)) for x in of.found], separators=(",", ":"))
+    return json.dumps(
+        [_as_row(record, x, by_experiment.get(x), why.get(x)) for x in of.found], separators=(",", ":")
+    )
 
 
 def _as_row(record: LoopRecord, x: Experiment, m: Modelled | None, why: str | None) -> dict[str, object]:

@@ -22,7 +22,7 @@ from identification.models import Backlash, Fopdt, Integrator
 if TYPE_CHECKING:
     from analyzer.night.nights import PlantLoop
 
-SAID = sentences("test_plan")
+TEXTS = sentences("test_plan")
 READ = (
     *(
         "loop",
@@ -80,7 +80,7 @@ def of_night(one: PlantLoop) -> Known | None:
     if isinstance(process, Integrator) and first is not None:
         lag_s = first.period_s
     gain = process.slope * lag_s
-    return Known(gain, lag_s, dead_s, width, isinstance(process, Integrator), SAID["routine"])
+    return Known(gain, lag_s, dead_s, width, isinstance(process, Integrator), TEXTS["routine"])
 
 
 def supposed(one: PlantLoop) -> Known:
@@ -89,7 +89,7 @@ def supposed(one: PlantLoop) -> Known:
     lag_s = record.duration_s / 50.0
     if controller is not None and math.isfinite(controller.ti_s) and controller.ti_s > 0.0:
         lag_s = controller.ti_s
-    return Known(None, lag_s, 0.0, source=SAID["supposed"])
+    return Known(None, lag_s, 0.0, source=TEXTS["supposed"])
 
 
 def known_of(one: PlantLoop, store: Path | None) -> Known:
@@ -126,31 +126,31 @@ def plan_lines(one: PlantLoop, store: Path | None) -> Iterator[str]:
     own = [scale.op_low + 0.01 * scale.op_span * x for x in plan.levels_pct]
     yield f"{spec.loop}: basis of the test: {known.source}"
     yield from _size_lines(plan, known)
-    yield SAID["levels"].format(" → ".join(number(x) for x in own), spec.op_unit, duration(plan.hold_s))
-    yield SAID["whole"].format(duration(plan.duration_s))
+    yield TEXTS["levels"].format(" → ".join(number(x) for x in own), spec.op_unit, duration(plan.hold_s))
+    yield TEXTS["whole"].format(duration(plan.duration_s))
     yield from _precision_lines(plan, known)
 
 
 def _size_lines(plan: Plan, known: Known) -> Iterator[str]:
-    yield SAID["step"].format(number(plan.step_pct))
-    yield SAID["noise"].format(number(plan.noise_pct), number(plan.wander_pct))
+    yield TEXTS["step"].format(number(plan.step_pct))
+    yield TEXTS["noise"].format(number(plan.noise_pct), number(plan.wander_pct))
     if known.width_pct > 0.0:
-        yield SAID["width"].format(number(known.width_pct), number(plan.step_pct / known.width_pct))
+        yield TEXTS["width"].format(number(known.width_pct), number(plan.step_pct / known.width_pct))
     if plan.bounded:
-        yield SAID["bounded"]
+        yield TEXTS["bounded"]
     if plan.answer_pct is None:
-        yield SAID["no_gain"]
+        yield TEXTS["no_gain"]
     else:
         most = plan.answer_pct if known.integrating else 2.0 * plan.answer_pct
-        yield SAID["answer"].format(number(plan.answer_pct), number(most))
+        yield TEXTS["answer"].format(number(plan.answer_pct), number(most))
     if known.integrating:
-        yield SAID["integrating"]
+        yield TEXTS["integrating"]
 
 
 def _precision_lines(plan: Plan, known: Known) -> Iterator[str]:
     if plan.gain_within is not None:
-        yield SAID["gain_within"].format(number(100.0 * plan.gain_within))
+        yield TEXTS["gain_within"].format(number(100.0 * plan.gain_within))
     if plan.play_within is not None:
-        yield SAID["play_within"].format(number(known.width_pct), number(100.0 * plan.play_within))
-    yield SAID["why"]
-    yield SAID["conditions"]
+        yield TEXTS["play_within"].format(number(known.width_pct), number(100.0 * plan.play_within))
+    yield TEXTS["why"]
+    yield TEXTS["conditions"]

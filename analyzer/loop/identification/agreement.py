@@ -25,7 +25,7 @@ from tuning.forecast import in_digits, loop_in_digits, run, settled
 
 LEAST = 0.5
 """A number of reversals [-] in place of none."""
-RESTS = 1e-9
+STILL = 1e-9
 """Move of a stem [% OP] that is rounding of the simulation."""
 
 
@@ -110,7 +110,7 @@ def closest(fits: Sequence[Fitted], controller: Pid, limits: AdviceLimits) -> Fi
 def reversals(stem: Floats) -> int:
     """Number of times at which a stem, shape (n,), moves on in the other direction."""
     moves = np.diff(stem)
-    signs = np.sign(moves[np.abs(moves) > RESTS])
+    signs = np.sign(moves[np.abs(moves) > STILL])
     return int(np.count_nonzero(signs[1:] != signs[:-1]))
 
 

@@ -77,12 +77,12 @@ def refined(fits: Candidates, best: Fitted, hopeless: bool) -> Candidates:
     a search for its fault is `hopeless`."""
     if best.p.blocks.factor == 1 or best.dead_time_s + best.p.half_block_s < best.p.dt_s:
         return fits
-    linear, play = (f.within(fine=True) for f in fits[:2])
+    linear, backlash = (f.within(fine=True) for f in fits[:2])
     stick = None if fits[2] is None else fits[2].within(fine=True)
     if not hopeless:
-        play = descend(play, free_width=best.p.blocks.position is None)
+        backlash = descend(backlash, free_width=best.p.blocks.position is None)
         stick = None if stick is None else descend(stick)
-    return descend(linear), play, stick
+    return descend(linear), backlash, stick
 
 
 def hopeful(problem: Problem, q: FitInputs) -> float:
@@ -90,25 +90,25 @@ def hopeful(problem: Problem, q: FitInputs) -> float:
     return q.limits.hopeless * q.limits.needed(judged_count(problem), bool(q.due.any()), False)
 
 
-def _is_searched(linear: Fitted, play: Fitted, q: FitInputs) -> bool:
+def _is_searched(linear: Fitted, backlash: Fitted, q: FitInputs) -> bool:
     """Whether the complete search for a valve fault is worthwhile: in a loop that oscillates always, because a stem
     that jumps by nearly its stickband resembles no backlash; in a calm one if backlash explains enough."""
-    if not q.calm or play.p.y.size < SHORT:
+    if not q.calm or backlash.p.y.size < SHORT:
         return True
-    return play.log_likelihood - linear.log_likelihood >= hopeful(play.p, q)
+    return backlash.log_likelihood - linear.log_likelihood >= hopeful(backlash.p, q)
 
 
 def _candidates(problem: Problem, q: FitInputs) -> Candidates:
     """The fits of one problem."""
     linear = fit_linear(problem, q.scale_s)
     short = q.calm and problem.y.size < SHORT
-    play = fit_backlash(linear, q.scale_s, hopeful(problem, q) if q.calm and not short else None)
-    if not _is_searched(linear, play, q):
-        return linear, play, None
-    gained = play.log_likelihood - linear.log_likelihood
-    wide = play.valve.stickband > 0.25 * problem.reach
+    backlash = fit_backlash(linear, q.scale_s, hopeful(problem, q) if q.calm and not short else None)
+    if not _is_searched(linear, backlash, q):
+        return linear, backlash, None
+    gained = backlash.log_likelihood - linear.log_likelihood
+    wide = backlash.valve.stickband > 0.25 * problem.reach
     sticks = short or not q.calm or (wide and gained >= q.limits.evidence)
-    return better_linear(linear, play), play, fit_stick_slip(play, q.scale_s) if sticks else None
+    return better_linear(linear, backlash), backlash, fit_stick_slip(backlash, q.scale_s) if sticks else None
 
 
 def _at_scans(problem: Problem, q: FitInputs, scans: Scans) -> Candidates | None:
@@ -117,9 +117,9 @@ def _at_scans(problem: Problem, q: FitInputs, scans: Scans) -> Candidates | None
     linear = fit_linear(problem, q.scale_s)
     rows = _likeliest((linear, fit_backlash(linear, q.scale_s), None))
     within = with_scans(settled(rows, scans), scans, SEARCHED).p
-    linear, play, stick = _candidates(within, q)
+    linear, backlash, stick = _candidates(within, q)
     stick = None if stick is None else settled(stick, scans)
-    found = settled(linear, scans), settled(play, scans), stick
+    found = settled(linear, scans), settled(backlash, scans), stick
     gained = _likeliest(found).log_likelihood - rows.log_likelihood
     return found if gained > -q.limits.evidence else None
 
@@ -130,13 +130,13 @@ def _likeliest(fits: Candidates) -> Fitted:
 
 def _compared(found: Candidates, q: FitInputs) -> tuple[Fitted, float, float]:
     """The better valve, its evidence over an ideal one, and that of the jump over backlash [nat]."""
-    linear, play, stick = found
-    if stick is None and not _is_searched(linear, play, q):
-        return play, play.log_likelihood - linear.log_likelihood, 0.0
-    best, jump = play, 0.0
+    linear, backlash, stick = found
+    if stick is None and not _is_searched(linear, backlash, q):
+        return backlash, backlash.log_likelihood - linear.log_likelihood, 0.0
+    best, jump = backlash, 0.0
     if stick is not None:
-        jump = evidence(stick, play) - max(play.log_likelihood - stick.log_likelihood, 0.0)
-        best = stick if jump > q.limits.evidence_jump else play
+        jump = evidence(stick, backlash) - max(backlash.log_likelihood - stick.log_likelihood, 0.0)
+        best = stick if jump > q.limits.evidence_jump else backlash
     gained = evidence(best, with_load_step(linear, q.due, best.ar))
     if gained > q.limits.evidence:
         gained = min(gained, evidence(best, with_second_lag(linear)))
@@ -147,8 +147,8 @@ def _stem_shown(problem: Problem, shown: Seen, q: FitInputs) -> Fits:
     """The same with a recorded stem: its fault is visible, and PV responds to the stem itself."""
     linear = fit_linear(problem, q.scale_s)
     behind = problem if problem.blocks.position is None else problem.with_blocks(op=problem.blocks.position)
-    play = descend(replace(fit_linear(behind, q.scale_s), p=problem).moved(valve=shown.play))
-    stick = None if shown.jumping is None else play.moved(valve=shown.jumping)
-    best = play if stick is None else stick
+    backlash = descend(replace(fit_linear(behind, q.scale_s), p=problem).moved(valve=shown.play))
+    stick = None if shown.jumping is None else backlash.moved(valve=shown.jumping)
+    best = backlash if stick is None else stick
     gained = evidence(best, with_load_step(linear, q.due, best.ar))
-    return linear, play, stick, best, gained, 0.0 if stick is None else math.inf
+    return linear, backlash, stick, best, gained, 0.0 if stick is None else math.inf

@@ -42,8 +42,8 @@ class Measured:
     number of moves of the better valve's stem; excited, whether set point moves drove the loop; trials, agreement of
     the stretches between OP reversals on the better valve, None with too few; kurtosis [-] of the band at the period,
     3 for noise, 1.5 for a constant size; steady [-], of a calm loop, agreement of the stretches between moves of the
-    stem on the better valve: their mean gain over its standard error, and asked, its gain while a response of PV to
-    set point moves is expected [nat]; ringing, the models of a cycle under a smooth load, None without a cycle;
+    stem on the better valve: their mean gain over its standard error, and response_nat, its gain while a response of
+    PV to set point moves is expected [nat]; ringing, the models of a cycle under a smooth load, None without a cycle;
     observed, the ringing seen in the error, None without a cycle; kept, how well the cycle keeps its phase; scale_s,
     the period or another time scale of the loop [s].
     """
@@ -63,7 +63,7 @@ class Measured:
     trials: Trials | None = None
     kurtosis: float = 3.0
     steady: float = 0.0
-    asked: float = 0.0
+    response_nat: float = 0.0
     ringing: Ringing | None = None
     observed: ObservedRinging | None = None
     kept: KeptPhase = UNKNOWN
@@ -98,13 +98,13 @@ def measure(
     controller = controller or recovered(record, scale)
     due = due_to_answer(record, problem, scale)
     question = FitInputs(scale, due, scans_of(record, problem, law), calm, limits)
-    linear, play, stick, best, gained, jump = fits_of(problem, question)
+    linear, backlash, stick, best, gained, jump = fits_of(problem, question)
     hopeless = calm and gained < hopeful(problem, question)
     amplification, stable = _amplification(linear.process, controller, scale)
-    fine_linear, fine_play, fine_stick = refined((linear, play, stick), best, hopeless)
+    fine_linear, fine_backlash, fine_stick = refined((linear, backlash, stick), best, hopeless)
     seen_alone = Measured(
         linear=fine_linear,
-        play=fine_play,
+        play=fine_backlash,
         stick_slip=fine_stick,
         evidence=gained,
         size=best.valve.stickband / max(problem.cycle_range, 1e-9),
@@ -136,8 +136,8 @@ def ringing_period(m: Measured, limits: CauseLimits) -> float | None:
 def _without_a_cycle(m: Measured, best: Fitted, linear: Fitted, due: Mask | None) -> Measured:
     """Further measures of the stretches between moves of the stem, and of PV's set point responses."""
     shown = trials_between_moves(best, linear)
-    asked = 0.0 if due is None else float(gains(best, linear)[due].sum())
-    return replace(m, steady=0.0 if shown is None else shown.steadiness, asked=asked)
+    response_nat = 0.0 if due is None else float(gains(best, linear)[due].sum())
+    return replace(m, steady=0.0 if shown is None else shown.steadiness, response_nat=response_nat)
 
 
 def _kurtosis(record: LoopRecord, error: Spectrum, scale_s: float) -> float:

@@ -55,8 +55,8 @@ def _ratio(record: LoopRecord, period_s: float) -> complex | None:
     if len(starts) < 3:
         return None
     k = np.arange(length)
-    wave = np.hanning(length) * np.exp(-2j * np.pi * k * record.dt_s / period_s)
-    lines = np.array([[_line(x[s : s + length], wave) for x in (record.error, record.op)] for s in starts])
+    window = np.hanning(length) * np.exp(-2j * np.pi * k * record.dt_s / period_s)
+    lines = np.array([[_line(x[s : s + length], window) for x in (record.error, record.op)] for s in starts])
     e, op = lines.T
     cross, auto = np.vdot(e, op), float(np.vdot(e, e).real)
     if auto <= 0.0 or abs(cross) ** 2 < COHERENT * auto * float(np.vdot(op, op).real):
@@ -64,7 +64,7 @@ def _ratio(record: LoopRecord, period_s: float) -> complex | None:
     return complex(cross / auto)
 
 
-def _line(x: Floats, wave: Complexes) -> complex:
+def _line(x: Floats, window: Complexes) -> complex:
     """The line of a block at a wave's frequency, without its mean and drift."""
     k = np.linspace(-1.0, 1.0, x.size)
-    return complex((x - x.mean() - k * (k @ x) / (k @ k)) @ wave)
+    return complex((x - x.mean() - k * (k @ x) / (k @ k)) @ window)

@@ -220,12 +220,12 @@ def _lasts(s: Spectrum, record: LoopRecord, o: Oscillation, limits: OscillationL
     moving = moves(record.sp)
     if record.sp_estimated or not moving.any() or moving.mean() > limits.programme_moves:
         return True
-    asked, _ = band_signal(spectrum(record.sp[len(record) - s.n :], record.dt_s), o.cycles)
-    if limits.sensitive * math.sqrt(2 * float(asked @ asked) / asked.size) < o.amplitude_pct:
+    set_point, _ = band_signal(spectrum(record.sp[len(record) - s.n :], record.dt_s), o.cycles)
+    if limits.sensitive * math.sqrt(2 * float(set_point @ set_point) / set_point.size) < o.amplitude_pct:
         return True
-    left, count = amplitude_at_rest(record.error, record.sp, record.usable, o.period_s / record.dt_s)
+    amplitude, count = amplitude_at_rest(record.error, record.sp, record.usable, o.period_s / record.dt_s)
     if count >= limits.rest_stretches:
-        return left >= limits.rest_share * o.amplitude_pct
+        return amplitude >= limits.rest_share * o.amplitude_pct
     begun = int(np.sum(moving[1:] & ~moving[:-1]))
     return begun * o.period_s < limits.moved_cycles * record.duration_s
 

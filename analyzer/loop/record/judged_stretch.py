@@ -119,15 +119,15 @@ def _factor(a: float, b: float) -> float:
 class Shown:
     """Evidence of a record about its controller, in percent and seconds.
 
-    other, settings that differ from the stated ones, None if they agree or the record is not sufficient; beside, the
-    stated ones with the controller's further terms, or the recorded ones if none are stated, None if the record shows
-    no more than is stated; scheduled_over, the signal, OP, PV or SP, that schedules the gain, so that the
-    stated gain is valid only in a part of its range, None if there is none; law, the record's own law with intervals,
-    where it is reported.
+    other, settings that differ from the stated ones, None if they agree or the record is not sufficient; detected,
+    the stated ones with the controller's further terms, or the recorded ones if none are stated, None if the record
+    shows no more than is stated; scheduled_over, the signal, OP, PV or SP, that schedules the gain, so that the stated
+    gain is valid only in a part of its range, None if there is none; law, the record's own law with intervals, where
+    it is reported.
     """
 
     other: Pid | None = None
-    beside: Pid | None = None
+    detected: Pid | None = None
     scheduled_over: ScheduledGain | None = None
     law: FreeLaw | None = None
 
@@ -145,7 +145,7 @@ def shown(record: LoopRecord, stated: Pid | None, scale_s: float, limits: Settin
         law = recorded(record, scale_s, limits)
         if law is not None and saturated and law.found.td_s:  # at the limits its slope is not seen
             law = None
-        return Shown(beside=None if law is None else law.found, law=law)
+        return Shown(detected=None if law is None else law.found, law=law)
     if saturated:
         return Shown()
     for part in (record.span(len(record) // 2, len(record)), record):
@@ -155,8 +155,8 @@ def shown(record: LoopRecord, stated: Pid | None, scale_s: float, limits: Settin
         if seen.agree:
             forms = other_forms(stated) if stated.scan_s >= record.dt_s else ()
             best = best_of(part, scale_s, (stated, *forms)) if forms else stated
-            beside = None if seen.found == stated else seen.found
-            return Shown(beside=beside) if best is stated else Shown(best)
+            detected = None if seen.found == stated else seen.found
+            return Shown(detected=detected) if best is stated else Shown(best)
         if _plainly(seen, stated, part, limits):
             over = gain_pieces(record, stated) or scheduled_over(part, scale_s, stated)
             if over is not None:

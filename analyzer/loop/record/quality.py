@@ -155,7 +155,7 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
     if spec.gap and spec.mode is None:
         manual = beyond_gap(masked.mask("manual"), masked.error, 100.0 * spec.gap / scale.span)
         masked = replace(masked, masks=MappingProxyType({**masked.masks, "manual": manual}))
-    other = spec.beside.tag if spec.beside is not None else None
+    other = spec.partner_output.tag if spec.partner_output is not None else None
     shared = _shared(masked, spec, _signal(series, other, clock, dt, limits), limits)
     if shared is not None:
         saturated = masked.mask("saturated") & ~shared.idle  # an idle loop has no limit
@@ -182,9 +182,11 @@ def _shared(
     record: LoopRecord, spec: LoopSpec, other: tuple[Floats, Mask], limits: QualityLimits
 ) -> Shared | None:
     """The loop's part of a shared valve; other, the other controller's output in its own unit."""
-    if spec.beside is None or spec.op is None or other[1].all():
+    if spec.partner_output is None or spec.op is None or other[1].all():
         return None
-    output = 100.0 * (other[0] - spec.beside.low) / (spec.beside.high - spec.beside.low)
+    output = (
+        100.0 * (other[0] - spec.partner_output.low) / (spec.partner_output.high - spec.partner_output.low)
+    )
     found = selected if spec.override_with else half
     return found(record, output, other[1], limits)
 
@@ -225,8 +227,8 @@ def op_in_range(op: Floats, q: QualityLimits) -> bool:
     if low < -q.outside_pct or high > 100 + q.outside_pct:
         return False
     resting = float((np.minimum(np.abs(op), np.abs(op - 100)) <= q.on_limit_pct).mean())
-    beside = high <= q.limit_pct or low >= 100 - q.limit_pct
-    return not beside or low == high or resting >= q.resting_share
+    near_limit = high <= q.limit_pct or low >= 100 - q.limit_pct
+    return not near_limit or low == high or resting >= q.resting_share
 
 
 def _masked(
@@ -237,8 +239,8 @@ def _masked(
     stale = constant_stretches(record.pv, record.dt_s, q.stale_s, q.stale_samples) & ~gap
     ranged = op_known and op_in_range(op, q)
     saturated = (op <= q.limit_pct) | (op >= 100 - q.limit_pct) if ranged else none
-    stands = stale.any() and (not op_known or float(np.ptp(op[stale])) == 0.0)
-    if stands and not _driven_to_limit(record, stale, saturated, q):
+    held = stale.any() and (not op_known or float(np.ptp(op[stale])) == 0.0)
+    if held and not _driven_to_limit(record, stale, saturated, q):
         stale = none
     by_script = mode is None and op_known and moved_by_script(record)
     if by_script:  # OP at 0 before and after a test is at no limit
@@ -274,8 +276,8 @@ def moved_by_script(record: LoopRecord) -> bool:
     """Whether an operator or a script moves OP over the whole record: no SP is recorded, and OP, mostly constant,
     does not respond to PV."""
     op = record.op
-    stands = record.sp_estimated and float(np.mean(np.diff(op) != 0.0)) < MOVING
-    if not stands or not by_hand(record, np.ones(op.size, dtype=bool)):
+    constant = record.sp_estimated and float(np.mean(np.diff(op) != 0.0)) < MOVING
+    if not constant or not by_hand(record, np.ones(op.size, dtype=bool)):
         return False
     return feedback_share(op, record.pv) < LIMITS.controller.feedback
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analyzer.words.belief import news, says_repaired, told
+from analyzer.words.belief import news, reported_columns, reports_repair
 from tests.analyzer.belief.nights_of_a_loop import CALM, LOAD, WORN, followed, row, witness
 
 TUNING = {
@@ -36,7 +36,7 @@ def test_a_follower_stays_one_on_a_night_that_does_not_show_it() -> None:
     rows = [row(k, FOLLOWS) for k in range(5)] + [row(5, WORN, witness=witness(1.0, 20.0))]
     last = followed(rows)[-1].told
     assert (last.cause, last.fault, last.source, last.action) == ("load", "none", "S", "see source loop")
-    assert "follows S in most of 6 nights" in told(followed(rows)[-1], rows[-1])["reason"]
+    assert "follows S in most of 6 nights" in reported_columns(followed(rows)[-1], rows[-1])["reason"]
 
 
 def test_undecided_nights_with_the_same_tendency_decide_together() -> None:
@@ -129,4 +129,4 @@ def test_a_worn_valve_is_reported_as_a_change_once() -> None:
 )
 def test_notes_that_say_a_repair_is_done(text: str, is_done: bool) -> None:
     """A repair counts if the note says that it is done, and does not count if the note says that it is planned."""
-    assert says_repaired(text) is is_done
+    assert reports_repair(text) is is_done

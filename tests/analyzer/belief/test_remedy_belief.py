@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analyzer.words.belief import news, told
+from analyzer.words.belief import news, reported_columns
 from tests.analyzer.belief.nights_of_a_loop import CALM, WORN, followed, row, witness
 
 
@@ -35,7 +35,7 @@ def test_settings_settle_on_the_third_night_and_stay() -> None:
 def test_the_spread_between_nights_is_shown_with_the_settings() -> None:
     """The advice states the range that the nights advise and the night whose pair is kept."""
     rows = [row(k, WORN, ti_new=x, witness=witness(2.0, 60.0)) for k, x in enumerate((400.0, 500.0, 450.0))]
-    advice = told(followed(rows)[-1], rows[-1])["advice"]
+    advice = reported_columns(followed(rows)[-1], rows[-1])["advice"]
     assert advice == "slower 3 nights advise Kp 0.8 to 0.8 and Ti 400 to 500 s; that of 2026-03-04 is kept."
 
 

@@ -76,4 +76,4 @@ def test_a_draft_names_position_and_mode() -> None:
     assert row.sure
     assert (row.spec.pv, row.spec.op, row.spec.sp) == ("T9", "T10", "T8")
     assert (row.spec.position, row.spec.mode) == ("T11", "M")
-    assert "is constant only in one value of M" in row.says
+    assert "is constant only in one value of M" in row.evidence

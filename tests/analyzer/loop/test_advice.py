@@ -332,7 +332,7 @@ def test_a_loop_without_a_cycle_stores_no_width_from_single_stretches(pipe):
     """
     m = pipe.verdict.require_measured
     tried = m.play.moved(valve=m.play.valve._replace(sliding=0.25 * m.play.valve.stickband))
-    single = replace(m, stick_slip=tried, steady=0.0, asked=0.0)
+    single = replace(m, stick_slip=tried, steady=0.0, response_nat=0.0)
     calm = replace(pipe.verdict, measured=single, steady=None)
     evidence = json.loads(witness(calm, False, prepared(simulate(PIPE, 6.0)), CONFIG) or "")
     assert "slope" in evidence

@@ -111,11 +111,11 @@ def test_terms_that_loops_csv_does_not_state_are_found():
     within 10 %.
     """
     limits = Config().settings
-    terms = shown(recorded(PI, top=53.0), PI, 320.0, limits).beside
+    terms = shown(recorded(PI, top=53.0), PI, 320.0, limits).detected
     assert terms is not None
     assert terms == replace(PI, op_hi=terms.op_hi)
     assert terms.op_hi == pytest.approx(53.0)
-    alone = shown(recorded(PI), None, 320.0, limits).beside
+    alone = shown(recorded(PI), None, 320.0, limits).detected
     assert alone is not None
     assert (alone.kp, alone.ti_s) == pytest.approx((2.0, 80.0), rel=0.1)
 

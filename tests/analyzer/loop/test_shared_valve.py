@@ -146,8 +146,8 @@ def test_partners_are_found_among_loops_and_tags() -> None:
     ]
     tags = ["FIC1.PV", "FIC1.OP", "PIC1.PV", "PIC1.OP", "weather", "TIC1.PV", "TIC1.OP"]
     (flow, pressure, lone), notes = match(specs, tags)
-    assert flow.beside == Output("PIC1.OP", 4.0, 20.0)
-    assert (pressure.feed, flow.feed, lone.beside) == ("weather", None, None)
+    assert flow.partner_output == Output("PIC1.OP", 4.0, 20.0)
+    assert (pressure.feed, flow.feed, lone.partner_output) == ("weather", None, None)
     assert set(flow.tags) == {"FIC1.PV", "FIC1.OP", "PIC1.OP"}
     assert "TIC1: no OP of nobody in the export, judged alone" in notes
     assert "FIC1: feedforward FIC9 is neither a loop nor a tag of the export" in notes

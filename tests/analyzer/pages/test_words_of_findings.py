@@ -21,7 +21,7 @@ from analyzer.loop.decisions import (
 from analyzer.plantwide.structure import Tie
 from analyzer.store.rows import finding_of, night_row, piece_row
 from analyzer.words import sentences
-from analyzer.words.reason import SAYS, sign_in_full
+from analyzer.words.reason import SIGN_TEXTS, sign_in_full
 
 SIGNS = (
     Sign(Cause.VALVE, 0.9, SignKind.EVIDENCE, (41.3, 0.75, 12)),
@@ -67,7 +67,7 @@ FOUND = Finding(
 
 def test_each_kind_has_its_words() -> None:
     """Each kind of sign and each kind of need has its sentences."""
-    assert set(SAYS) == set(SignKind)
+    assert set(SIGN_TEXTS) == set(SignKind)
     assert set(sentences("needs")) == set(RequirementKind)
 
 
@@ -97,7 +97,7 @@ def test_every_sentence_of_a_sign_exists_and_is_used() -> None:
     assert set(BOTH_WAYS) == set(SignKind)
     signs = [Sign(Cause.LOAD, 0.5, kind, each) for kind, figures in BOTH_WAYS.items() for each in figures]
     assert not [text for text in map(sign_in_full, signs) if not text or "{" in text]
-    used = {SAYS[s.kind](*s.figures)[0] for s in signs}
+    used = {SIGN_TEXTS[s.kind](*s.figures)[0] for s in signs}
     assert used == set(sentences("signs"))
     assert used > set(sentences("figures_of_signs"))
 
