@@ -21,7 +21,13 @@ import pyarrow.parquet as pq
 from analyzer.config import PlantLimits
 from analyzer.loop.decisions import Cause, Finding, Status
 from analyzer.plantwide.night import trace
-from analyzer.plantwide.oscillation_lines import BESIDE, REACH, OscillationLines, waves_in, waves_table
+from analyzer.plantwide.oscillation_lines import (
+    EXTRA_LINES,
+    REACH,
+    OscillationLines,
+    oscillation_table,
+    oscillations_in,
+)
 from proofs.common import command, parser_of, publish, table
 
 DAY_S = 86_400.0
@@ -35,8 +41,8 @@ GROUPED = 0.1
 def shape(rng: np.random.Generator, period: float) -> tuple[int, np.ndarray, np.ndarray]:
     """First line, noise and an independent oscillation near a period, shape (m,) each."""
     line = DAY_S / period
-    first = max(int(line / REACH) - BESIDE, 0)
-    at = np.arange(first, int(line * REACH) + BESIDE)
+    first = max(int(line / REACH) - EXTRA_LINES, 0)
+    at = np.arange(first, int(line * REACH) + EXTRA_LINES)
     noise = 0.05 * (rng.standard_normal(at.size) + 1j * rng.standard_normal(at.size))
     width = max(0.01 * line, 1.0)
     own = rng.standard_normal(at.size) + 1j * rng.standard_normal(at.size)
@@ -95,7 +101,7 @@ def measured(path: Path) -> tuple[float, float, float, int, int]:
     del table, lines
     begun = time.perf_counter()
     alone = {name: Finding(name, "", Status.OK, cause=Cause.LOAD) for name in names}
-    found = trace(waves_in([pq.read_table(path)]), alone, PlantLimits())
+    found = trace(oscillations_in([pq.read_table(path)]), alone, PlantLimits())
     took = time.perf_counter() - begun
     return floor, took, peak_mb(), count, len(found)
 
@@ -103,7 +109,7 @@ def measured(path: Path) -> tuple[float, float, float, int, int]:
 def row(loops: int, folder: Path) -> list[str]:
     """One size: generated here, measured in its own process."""
     path = folder / f"{loops}.parquet"
-    pq.write_table(waves_table(plant(loops)), path, compression="zstd")
+    pq.write_table(oscillation_table(plant(loops)), path, compression="zstd")
     alone = [sys.executable, "-m", "benchmarks.groups", "--alone", str(path)]
     printed = subprocess.run(alone, capture_output=True, text=True, check=True).stdout.split()
     floor, took, memory = map(float, printed[:3])

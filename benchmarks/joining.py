@@ -26,7 +26,7 @@ from analyzer.loops.tags import match, read_loops
 from analyzer.night.chunk import Task, work
 from analyzer.night.finish import finish_night
 from analyzer.night.nights import Plant, nights_of
-from analyzer.plantwide.oscillation_lines import waves_in, waves_table
+from analyzer.plantwide.oscillation_lines import oscillation_table, oscillations_in
 from analyzer.plantwide.structure import moves_in, moves_table
 from analyzer.store.draft import drafted
 from analyzer.store.store import Store
@@ -64,15 +64,15 @@ def repeat(small: Store, of: str, big: Store, night: str, loops: int) -> None:
         for name in (*further_tables(small.part(of, "nights", keys[key])), "nights"):
             held = read_stored(small.part(of, name, keys[key])).slice(0)
             if name == "waves":
-                waves = (
+                oscillations = (
                     replace(
                         w,
                         lines=w.lines * turns[w.first : w.first + w.lines.size],
                         trend=np.roll(w.trend, moved),
                     )
-                    for w in waves_in([held])
+                    for w in oscillations_in([held])
                 )
-                held = waves_table(list(waves))
+                held = oscillation_table(list(oscillations))
             elif name == "moves":
                 rolled = (
                     {r: np.roll(getattr(m, r), moved) for r in ("sp", "pv", "op")} for m in moves_in(held)

@@ -56,7 +56,7 @@ def assessed(x: Recorded, config: Config) -> tuple[Finding, tuple[Any, ...]] | N
         found, _ = assess_loop(spec, prepare(spec, series, config.quality), config, advising=False)
     except TriageError:
         return None
-    return concluded(found, Advice(Action.NONE), spec, "2026-03-02", config.advice), found.waves
+    return concluded(found, Advice(Action.NONE), spec, "2026-03-02", config.advice), found.oscillation_lines
 
 
 def reached(truth: Mapping[str, Truth]) -> dict[str, set[str]]:

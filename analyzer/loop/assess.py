@@ -66,12 +66,12 @@ class Assessment:
     loop; start_s, duration_s of the record [s]; night, the figures of the whole span; hours, of each clock hour;
     oscillations; verdict; settings, the controller's if they differ from the stated ones; shown, the stated
     controller with further terms found in the record, or the recorded one if none is stated; scheduled_over and law,
-    as in Shown; harris index (1: minimum variance) if known; moves of the set point; waves, its data for the
-    plant-wide analysis; trend, thinned; notes, sentences about the data; needs, the missing data for whether the loop
-    oscillates, None if this is known; close_s, first and last time [s] of the last ten periods; for_settings, the
-    missing data for new settings regardless of the cause, None if there are none; judged_h, good hours in automatic
-    on which oscillations and verdict are based: of the stretch that is judged (judged_stretch.py), whose settings are
-    `outdated` if they were changed since; op_scaled and shared as in Prepared.
+    as in Shown; harris index (1: minimum variance) if known; moves of the set point; oscillation_lines, its data for
+    the plant-wide analysis; trend, thinned; notes, sentences about the data; needs, the missing data for whether the
+    loop oscillates, None if this is known; close_s, first and last time [s] of the last ten periods; for_settings,
+    the missing data for new settings regardless of the cause, None if there are none; judged_h, good hours in
+    automatic on which oscillations and verdict are based: of the stretch that is judged (judged_stretch.py), whose
+    settings are `outdated` if they were changed since; op_scaled and shared as in Prepared.
     """
 
     loop: str
@@ -87,7 +87,7 @@ class Assessment:
     law: FreeLaw | None = None
     harris: float | None = None
     moves: tuple[Move, ...] = ()
-    waves: tuple[OscillationLines, ...] = ()
+    oscillation_lines: tuple[OscillationLines, ...] = ()
     trend: Mapping[str, np.ndarray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     needs: Requirement | None = None
@@ -300,10 +300,9 @@ def assess(
 ) -> Assessment:
     """Assess one loop. Raises LacksError, a NotAssessedError, if the record is not sufficient.
 
-    Figures, hours, waves and trend are of the whole record; oscillations and verdict are of the judged
-    stretch.
-    The controller has the stated settings [%, s], those in force at the record's end; kind is the loop's type (flow,
-    level, ...), empty if not stated; earlier, settings in force earlier in the record, oldest first.
+    Figures, hours, oscillation lines and trend are of the whole record; oscillations and verdict are of the judged
+    stretch. The controller has the stated settings [%, s], those in force at the record's end; kind is the loop's
+    type (flow, level, ...), empty if not stated; earlier, settings in force earlier in the record, oldest first.
     """
     lacking = unassessable(prepared.record, config)
     if lacking is not None:
@@ -338,7 +337,7 @@ def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: C
         law=judged.shown.law,
         harris=harris_index(record.error, record.usable, record.dt_s, dead_time) if dead_time else None,
         moves=moves(record, night.noise_band_pct or 0.0, config.figures),
-        waves=error_lines_of(record.tag, judged.of_all, end_s, config.plant),
+        oscillation_lines=error_lines_of(record.tag, judged.of_all, end_s, config.plant),
         trend=thinned(record, FINE_BUCKETS if counting(found) else BUCKETS, close),
         notes=prepared.notes,
         needs=aliasing_requirement(

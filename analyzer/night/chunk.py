@@ -52,7 +52,7 @@ from analyzer.loops.changes import TuningChange, in_force, settings_from
 from analyzer.loops.spec import LoopSpec, controller_columns
 from analyzer.night.nights import Night, Plant, cut
 from analyzer.pages import compared as settings_pages
-from analyzer.plantwide.oscillation_lines import waves_table
+from analyzer.plantwide.oscillation_lines import oscillation_table
 from analyzer.plantwide.structure import Moves, moves_of, moves_table
 from analyzer.store.rows import hour_rows, piece_row
 from analyzer.store.store import Store
@@ -312,7 +312,7 @@ def _write_pieces(task: Task, night: str, kept: Rows) -> None:
     made = {
         "hours": rows_table([row for a in kept.found for row in hour_rows(a, night)], HOURS),
         "trends": pa.concat_tables(trends).unify_dictionaries() if trends else None,
-        "waves": waves_table([wave for a in kept.found for wave in a.waves]),
+        "waves": oscillation_table([oscillation for a in kept.found for oscillation in a.oscillation_lines]),
         "moves": moves_table(kept.moves),
         "compared": rows_table(kept.compared, SETTINGS),
         "nights": rows_table([piece_row(found) for found in kept.nights], NIGHTS),

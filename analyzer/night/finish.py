@@ -24,7 +24,7 @@ from analyzer.plantwide import cascade
 from analyzer.plantwide import night as plantwide
 from analyzer.plantwide.cascade import linked, reassign_sources
 from analyzer.plantwide.night import traced_night
-from analyzer.plantwide.oscillation_lines import waves_in
+from analyzer.plantwide.oscillation_lines import oscillations_in
 from analyzer.plantwide.structure import links_of, moves_in
 from analyzer.store.rows import TYPED, finding_of, night_row
 from analyzer.store.store import Store
@@ -78,8 +78,8 @@ def finish_night(
     other = [r for r in other if r["group"] not in gone]
     first = 1 + max((int(r["group"]) for r in other), default=0)
     with TemporaryFile() as lines:
-        waves = waves_in(held.tables("waves"), lines)
-        traced, found = traced_night(fresh, waves, config.plant, first)
+        oscillations = oscillations_in(held.tables("waves"), lines)
+        traced, found = traced_night(fresh, oscillations, config.plant, first)
     links = links_of([m for t in held.tables("moves") for m in moves_in(t)], config.plant)
     loops = linked(traced, links, config.plant)
     old = {} if replace else _worth_held(store, night)

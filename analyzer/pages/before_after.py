@@ -50,8 +50,8 @@ def outcome(found: LoopComparison) -> str:
     reasons = "; ".join(found.reasons) or "no hourly figures on both sides"
     text: str = words.texts("outcomes")[reached]["said"].format(
         better=words.enumerated([c.measure.short_title.lower() for c in won]),
-        gained=words.enumerated([_priced(c) for c in won]),
-        lost=words.enumerated([_priced(c) for c in lost]),
+        gained=words.enumerated([_figure_text(c) for c in won]),
+        lost=words.enumerated([_figure_text(c) for c in lost]),
         reasons=reasons,
     )
     if found.reasons and reached is not Grade.INCOMPARABLE:
@@ -63,7 +63,7 @@ def outcome(found: LoopComparison) -> str:
     return text
 
 
-def _priced(change: Change) -> str:
+def _figure_text(change: Change) -> str:
     """A figure's name, with its own change if it is simulated."""
     name = change.measure.short_title.lower()
     return name if change.parts is None else f"{name} ({words.signed(_percent(change.parts.change.value))} %)"
@@ -73,7 +73,7 @@ def _percent(log_ratio: float) -> float:
     return 100.0 * math.expm1(log_ratio)
 
 
-def _told(part: LogRatio) -> parts.Cell:
+def _part_cell(part: LogRatio) -> parts.Cell:
     """A part in percent with its 90 % interval."""
     low, high = (words.signed(_percent(end)) for end in part.interval(NINETY))
     value = _percent(part.value)
@@ -126,7 +126,7 @@ def _outcome_tiles(cases: Sequence[ChangeCase]) -> parts.Tiles:
     return parts.Tiles(((str(len(cases)), "changes compared", ""), *shown))
 
 
-def _row(change: Change, found: LoopComparison, first: bool) -> tuple[words.NightDecision, ...]:
+def _row(change: Change, found: LoopComparison, first: bool) -> tuple[words.CellContent, ...]:
     """A figure before and after; the interval is in percent of before, in the figure's unit if that is zero; the
     remark on a loop is in its first row."""
     d, ends, unit = change.found, change.interval_pct, change.measure.unit
@@ -139,7 +139,7 @@ def _row(change: Change, found: LoopComparison, first: bool) -> tuple[words.Nigh
         *(found.loop, change.measure.title, unit, d.before, d.after),
         parts.Cell(words.signed(change.value_pct), change.value_pct),
         *(interval, d.low, d.high),
-        *(("–",) * 4 if of is None else map(_told, (of.change, of.load, of.left, of.promised))),
+        *(("–",) * 4 if of is None else map(_part_cell, (of.change, of.load, of.left, of.promised))),
         parts.Cell(change.verdict.value, kind=_colour(change, found)),
         ("; ".join(found.reasons) or follows) if first else "",
     )
@@ -173,7 +173,7 @@ def _settings_typed(case: ChangeCase) -> str:
     return f"Kp {kp}, Ti {ti} ({row['form'] or 'ideal'} form, Kp in {gain}, Ti in {row['ti_unit'] or 's'})"
 
 
-def _in_short(case: ChangeCase) -> tuple[words.NightDecision, ...]:
+def _in_short(case: ChangeCase) -> tuple[words.CellContent, ...]:
     """A loop in one row: the new settings, the four changes, and the conclusion."""
     by_name = {c.measure.name: c for c in case.found.primary}
     kind = words.texts("outcomes")[grade(case.found)]["tone"]
@@ -192,7 +192,7 @@ def _change_cell(change: Change | None, found: LoopComparison) -> parts.Cell:
         return parts.Cell("–")
     colour = _colour(change, found)
     if change.parts is not None:
-        return replace(_told(change.parts.change), kind=colour)
+        return replace(_part_cell(change.parts.change), kind=colour)
     if change.interval_pct is None:
         return parts.Cell("–")
     low, high = map(words.signed, change.interval_pct)
@@ -207,17 +207,18 @@ def changes_in_short(cases: Sequence[ChangeCase]) -> parts.Table:
     return words.page_table("changes", map(_in_short, cases), columns=(*first, *four, last))
 
 
-def _parts_told(found: LoopComparison) -> parts.Listing | None:
+def _change_parts(found: LoopComparison) -> parts.Listing | None:
     """Components of each simulated figure's difference, one line each; None without a simulation."""
-    told = words.texts("parts_told")["line"]
+    text = words.texts("parts_told")["line"]
     lines = []
     for c in found.primary:
         if c.parts is not None:
             four = (
-                _told(part).text for part in (c.parts.change, c.parts.load, c.parts.left, c.parts.promised)
+                _part_cell(part).text
+                for part in (c.parts.change, c.parts.load, c.parts.left, c.parts.promised)
             )
             names = ("change", "load", "left", "promised")
-            line = told.format(measured=words.signed(c.value_pct), **dict(zip(names, four, strict=True)))
+            line = text.format(measured=words.signed(c.value_pct), **dict(zip(names, four, strict=True)))
             lines.append((f"{c.measure.title}:", line))
     return parts.Listing(tuple(lines)) if lines else None
 
@@ -236,7 +237,7 @@ def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> parts.
     blocks: tuple[parts.Block, ...] = parts.without_none(
         words.lead(outcome(found)),
         facts,
-        _parts_told(found),
+        _change_parts(found),
         words.listing(wear) if wear else None,
         _trend(case, number_),
     )
@@ -315,8 +316,8 @@ def changes_page(
     comparable = [c for c in cases if grade(c.found) is not Grade.INCOMPARABLE]
     charts = (average_chart(comparable), per_loop_chart(comparable)) if len(comparable) > 1 else ()
     limits = cases[0].found.limits if cases else LIMITS
-    said = {"m": limits, "error": 100 * (1 - limits.confidence), "share": 100 * limits.usable_share}
-    method = parts.Text(tuple(text.format(**said) for text in words.texts("method").values()))
+    values = {"m": limits, "error": 100 * (1 - limits.confidence), "share": 100 * limits.usable_share}
+    method = parts.Text(tuple(text.format(**values) for text in words.texts("method").values()))
     sections = parts.without_none(
         parts.section("In short", seen, _outcome_tiles(cases), changes_in_short(cases), lost),
         parts.section("In pictures", *charts),

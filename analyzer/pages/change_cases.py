@@ -135,7 +135,7 @@ def _reference(
     if not row["area"]:
         return None
     touched = {c.loop for c in changes}
-    beside = store.own_rows("nights", nights[-1], ["loop", "area", "status"])
-    alike = [r["loop"] for r in beside if r["area"] == row["area"] and r["loop"] not in touched]
+    rows = store.own_rows("nights", nights[-1], ["loop", "area", "status"])
+    alike = [r["loop"] for r in rows if r["area"] == row["area"] and r["loop"] not in touched]
     held = read_hours(store, alike[:MOST_CONTROLS], nights)
     return reference(list(held.values()), *spans, limits)

@@ -13,7 +13,7 @@ import numpy as np
 from analyzer.loop.advice.settings_side_by_side import SPREAD, Comparison
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated, derivative_as_stated, unit_ratio
-from analyzer.pages.words import NightDecision, number, page_table, signed, texts
+from analyzer.pages.words import CellContent, number, page_table, signed, texts
 from analyzer.words.units import duration, gain_unit
 from identification.models import Integrator, Pid
 from identification.simulation.closed_loop import scan_step
@@ -61,10 +61,17 @@ def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
     now, new = c.tried[0], next((t for t in c.tried if t.name == RECOMMENDED), None)
     if new is None:
         offers = "; ".join(
-            _offers(c, [f"{n}: {_priced(c, n)}" for n in OFFERED if n in c.shown], "a repaired valve", unit)
+            _offers(
+                c,
+                [f"{n}: {_gains_and_losses(c, n)}" for n in OFFERED if n in c.shown],
+                "a repaired valve",
+                unit,
+            )
         )
-        said = "No settings are recommended: on all loops that the data allow, none is better without a cost."
-        return f"{said} {f'To choose between: {offers}.' if offers else ''}"
+        sentence = (
+            "No settings are recommended: on all loops that the data allow, none is better without a cost."
+        )
+        return f"{sentence} {f'To choose between: {offers}.' if offers else ''}"
     scale, ratio = c.pv_span / 100.0, _times(new, now)
     travel, error = (
         f"{number(a)} to {number(b)}"
@@ -84,8 +91,8 @@ def choices(c: Comparison, spec: LoopSpec) -> list[str]:
     """The settings from which an engineer may choose, one line each, and the effect of a repair."""
     named = [t.name for t in c.tried if t.name in (RECOMMENDED, *OFFERED) and t.name in c.everywhere]
     unit = spec.pv_unit or "PV"
-    told = [f"{name}: {_typed(c, name, spec)}: {_priced(c, name)}" for name in named]
-    lines = _offers(c, told, REPAIRED, unit)
+    offered = [f"{name}: {_typed(c, name, spec)}: {_gains_and_losses(c, name)}" for name in named]
+    lines = _offers(c, offered, REPAIRED, unit)
     return ["to choose between, on all possible loops:", *(f"  {x}" for x in lines)] if lines else []
 
 
@@ -115,7 +122,7 @@ def _td(c: Comparison, pid: Pid, spec: LoopSpec) -> str:
     return f"Td {number(td)} {'s' if spec.ti_unit == 's' else 'min'}"
 
 
-def _priced(c: Comparison, name: str) -> str:
+def _gains_and_losses(c: Comparison, name: str) -> str:
     """Gains and losses of settings, on the worst of all loops consistent with the data, and on a load step."""
     found = c.everywhere[name]
     travel, error = map(_against_now_pct, (found.worst_travel, found.worst_error))
@@ -138,8 +145,8 @@ def _times(t: Tried, now: Tried) -> float | None:
 
 def table(c: Comparison, spec: LoopSpec, unit: str) -> parts.Table:
     """The settings with their effects under the load."""
-    said, lasts = texts("settings_tried"), duration(c.load.size * scan_step(c.loop))
-    note = said["note"].format(lasts=lasts) + said["derivative"] * (c.loop.controller.td_s > 0.0)
+    labels, lasts = texts("settings_tried"), duration(c.load.size * scan_step(c.loop))
+    note = labels["note"].format(lasts=lasts) + labels["derivative"] * (c.loop.controller.td_s > 0.0)
     return page_table(
         "settings",
         (_tried_row(t, c, spec, unit) for t in parts.without_none(*c.tried, c.repaired)),
@@ -147,7 +154,7 @@ def table(c: Comparison, spec: LoopSpec, unit: str) -> parts.Table:
     )
 
 
-def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[NightDecision, ...]:
+def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[CellContent, ...]:
     scale, now, (kp, ti) = c.pv_span / 100.0, c.tried[0], as_stated(t.controller, spec, c.pv_span)
     found = c.everywhere.get(t.name) if t is not now else None
     worst = "" if found is None else ", ".join(map(_against_now_pct, (found.worst_travel, found.worst_error)))
@@ -296,18 +303,18 @@ def model(c: Comparison, spec: LoopSpec, unit: str) -> str:
 def settings_page(loop: str, night: str, c: Comparison, spec: LoopSpec) -> parts.Page:
     """The settings page of a loop."""
     known = spec.pv_lo is not None and spec.pv_hi is not None
-    unit, said = (spec.pv_unit or "own unit") if known else "%", texts("settings_tried")
+    unit, labels = (spec.pv_unit or "own unit") if known else "%", texts("settings_tried")
     meant = texts("settings") | (
         texts("settings_of_integrators") if isinstance(c.loop.process, Integrator) else {}
     )
     first = (parts.Text((opening(c, spec, unit),), "lead"), panels(c, unit), table(c, spec, unit))
-    tried = parts.WhatIf("try", said["title"], model(c, spec, unit), c.load, said["caption"])
+    tried = parts.WhatIf("try", labels["title"], model(c, spec, unit), c.load, labels["caption"])
     named = parts.Listing(
         tuple((f"{t.name}:", meant[t.name]) for t in parts.without_none(*c.tried, c.repaired))
     )
     sections = (
         parts.Section("Settings compared", parts.without_none(*first, trade_off_plot(c, unit), field(c))),
-        parts.Section("Try settings", (parts.Text((said["hint"],)), tried)),
+        parts.Section("Try settings", (parts.Text((labels["hint"],)), tried)),
         parts.Section("What the settings are, for experts", (named,), closed=True),
     )
     subtitle = f"settings compared and simulated on night {night}"

@@ -46,7 +46,7 @@ def grouped(store: Store, night: str | None = None, top: int | None = None) -> t
 def group_row(g: GroupView) -> dict[str, Any]:
     """Listed columns of a group, candidates by their names and members unchanged."""
     source = g.source
-    told = {
+    values = {
         "group": g.number,
         "group_period_s": g.period_s,
         "loops": float(len(g.rows)),
@@ -60,7 +60,7 @@ def group_row(g: GroupView) -> dict[str, Any]:
         "members": [r["loop"] for r in g.rows],
         "sentence": sentence(g),
     }
-    return row_of(told, GROUP_LIST)
+    return row_of(values, GROUP_LIST)
 
 
 def rendered_groups(groups: Sequence[GroupView], night: str, form: str) -> str:
@@ -71,7 +71,7 @@ def rendered_groups(groups: Sequence[GroupView], night: str, form: str) -> str:
         return csv_text(names(GROUP_LIST), cells).rstrip("\n")
     if form == "json":
         return json.dumps(rows, indent=1)
-    shown = [list(map(visible, _told(g, "unseen", "undecided"))) for g in groups]
+    shown = [list(map(visible, _group_texts(g, "unseen", "undecided"))) for g in groups]
     if form == "table":
         return _as_table(shown, night)
     heads = [column.title for column in words.page_columns("list-of-groups")]
@@ -97,7 +97,7 @@ def _as_table(shown: Sequence[Sequence[str]], night: str) -> str:
     return "\n".join(line.rstrip() for line in capture.get().rstrip().splitlines())
 
 
-def _told(g: GroupView, unseen: str, undecided: str) -> tuple[str, ...]:
+def _group_texts(g: GroupView, unseen: str, undecided: str) -> tuple[str, ...]:
     """A row of a group: number, loops, period, the source or `unseen`, the action there or `undecided`, the
     improvement for the others, and their names."""
     others = ", ".join(r["loop"] for r in g.rows if r is not g.source)
@@ -130,7 +130,7 @@ def morning_table(groups: Sequence[GroupView], linked: bool) -> parts.Table:
     rows = []
     for g in groups:
         href = f"group-{g.number}.html" if linked else ""
-        _, *texts = _told(g, "not clear", "undecided: look at the candidates")
+        _, *texts = _group_texts(g, "not clear", "undecided: look at the candidates")
         figures = (len(g.rows), g.period_s, None, None, g.gain_pct, None)
         rows.append(
             (parts.Cell(f"group {g.number}", kind="strong", href=href), *map(parts.Cell, texts, figures))
@@ -141,7 +141,7 @@ def morning_table(groups: Sequence[GroupView], linked: bool) -> parts.Table:
 def _members_table(g: GroupView, night: ShownNight) -> parts.Table:
     """The members with their lags and gains, the most likely source first."""
 
-    def own(row: Row) -> dict[str, words.NightDecision]:
+    def own(row: Row) -> dict[str, words.CellContent]:
         pct, cause = row["source_pct"], g.loops[row["loop"]]["cause"]
         confidence = parts.Cell(f"{pct:.0f}" if pct >= 1 else "under 1", pct)
         return {"source_pct": confidence, "cause": words.cause_cell(cause)}
@@ -183,13 +183,13 @@ def member_section(g: GroupView, loop: str, trends: Mapping[str, Thinned]) -> pa
     """The part of a member's page: its place in the group, its trend above the source's."""
     row = next(r for r in g.rows if r["loop"] == loop)
     source = g.source
-    said = [f"{sentence(g)}."]
+    notes = [f"{sentence(g)}."]
     if source is not None and source["loop"] != loop and row["role"] == GroupRole.FOLLOWER:
         late = f", {row['lag_s']:.0f} s later" if row["lag_s"] is not None else ""
-        said.append(f"{loop} follows {source['loop']} with a coherence of {row['coherence']:.2f}{late}.")
+        notes.append(f"{loop} follows {source['loop']} with a coherence of {row['coherence']:.2f}{late}.")
     beneath = [loop, *[r["loop"] for r in g.rows if r["loop"] != loop][:1]]
     return parts.Section(
-        "Moves with other loops", parts.without_none(parts.Text(tuple(said)), aligned(g, trends, beneath))
+        "Moves with other loops", parts.without_none(parts.Text(tuple(notes)), aligned(g, trends, beneath))
     )
 
 

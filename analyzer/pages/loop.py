@@ -18,7 +18,7 @@ from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES, Fault, Status
 from analyzer.pages import loop_pictures, words
 from analyzer.pages.experiments import experiments_section
-from analyzer.pages.reading import BESIDE, Thinned
+from analyzer.pages.reading import SIDE_BY_SIDE, Thinned
 from analyzer.pages.words import Row, duration, keys, known_figures, lead, number, page_table, stamp, titled
 from analyzer.words.belief import wear_text
 from analyzer.words.decision import indices
@@ -105,7 +105,7 @@ def _links(
         yield "Its group", f"group-{row['group']}.html"
     if row["source_loop"]:
         pair = ",".join(quote(name, safe="") for name in (row["source_loop"], row["loop"]))
-        yield f"Compare with {row['source_loop']}", f"{BESIDE}.html#{pair}"
+        yield f"Compare with {row['source_loop']}", f"{SIDE_BY_SIDE}.html#{pair}"
 
 
 def _first_section(row: Row, thin: Thinned | None) -> parts.Section:
@@ -173,9 +173,9 @@ def _explained_section(found: Row | None, row: Row) -> parts.Section | None:
     if found is None:
         return None
     together = night_note(row, found["verdict"], found["block"])
-    said = (f"{title(found['verdict']).capitalize()}: {found['reason']}", check(found))
+    reasons = (f"{title(found['verdict']).capitalize()}: {found['reason']}", check(found))
     return parts.Section(
-        "Physics missing in the baseline model", (parts.Text((*said, together) if together else said),)
+        "Physics missing in the baseline model", (parts.Text((*reasons, together) if together else reasons),)
     )
 
 
@@ -253,7 +253,7 @@ def _of_settings(found: parts.Page | None) -> parts.Section | None:
 
 def _indices(row: Row) -> parts.Section | None:
     """The published indices, the conclusion of each publication, and the project's own conclusion."""
-    told, width = words.texts("field_indices"), row["backlash_pct"] or row["stickband_pct"]
+    labels, width = words.texts("field_indices"), row["backlash_pct"] or row["stickband_pct"]
     fault = row["valve_fault"] or row["cause"] or "not assessed"
     ours = {
         "valve": fault,
@@ -265,8 +265,8 @@ def _indices(row: Row) -> parts.Section | None:
     }
     rows = []
     for found in indices(row):
-        index = told[found["index"]]
-        sees = told["sees"][index["of"]]
+        index = labels[found["index"]]
+        sees = labels["sees"][index["of"]]
         concludes = sees if isinstance(sees, str) else sees[str(found["finds"]).lower()]
         rows.append((index["name"], ", ".join(map(number, found["values"])), concludes, ours[index["of"]]))
     if not rows:
@@ -280,7 +280,7 @@ def _figures(row: Row) -> parts.Facts:
     for name in keys("figures-of-a-night"):
         if row[name] is not None:
             term, text = titled(name, number(row[name]) + mark(row, name))
-            own = "" if name in LEVELS else words.beside(BY_NAME[name].unit, row[name], scale)
+            own = "" if name in LEVELS else words.in_loop_unit(BY_NAME[name].unit, row[name], scale)
             facts.append((term, text + own))
     return parts.Facts(tuple(facts))
 
@@ -296,10 +296,10 @@ def nights_section(rows: Sequence[Row]) -> parts.Section:
     if rows[-1]["certain_since"]:
         alone = [(json.loads(r["witness"] or "{}").get("width") or [None])[0] for r in rows]
         certain = [r["width_pct"] if r["certain_since"] else None for r in rows]
-        told = [{**r, "alone": a, "certain": c} for r, a, c in zip(rows, alone, certain, strict=True)]
+        marked = [{**r, "alone": a, "certain": c} for r, a, c in zip(rows, alone, certain, strict=True)]
         lines = (
-            _by_night(told, "alone", joined=False),
-            _by_night(told, "certain", "nights together", kind="op"),
+            _by_night(marked, "alone", joined=False),
+            _by_night(marked, "certain", "nights together", kind="op"),
         )
         plots.append(_over_nights("widths", "Width of the valve's fault", "% of OP", 1.0, day, *lines))
     shown = parts.without_none(*plots)
@@ -308,7 +308,7 @@ def nights_section(rows: Sequence[Row]) -> parts.Section:
     return parts.Section("Over the nights", parts.without_none(drawn, table))
 
 
-def _night_cells(row: Row) -> tuple[words.NightDecision, ...]:
+def _night_cells(row: Row) -> tuple[words.CellContent, ...]:
     """One night's cells; the last gives the reason if the loop was not assessed."""
     lost = {} if row["status"] == Status.OK else {"action": f"{row['status']}: {row['reason']}"}
     return words.cells(row, "history", **lost)

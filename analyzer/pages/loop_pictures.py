@@ -28,7 +28,7 @@ LEAST_BUCKETS = 2.5
 """Minimum buckets per period in a decimated trend [-]; below 2 it is aliased (Nyquist)."""
 SHOWN_PERIODS = 8.0
 """Length of the autocorrelation shown [periods]."""
-STANDS = "OP moves, the stem does not"
+STEM_AT_REST = "OP moves, the stem does not"
 Course = tuple[Floats, Floats, slice]
 """A line's horizontal and vertical values, shape (n,) each, and the part of it in which the stem is at rest."""
 
@@ -60,10 +60,10 @@ def trend_block(
     caption, least = CAPTION.format(step=f"{step:.3g} s"), (LEAST_PCT * scale.span / 100.0, LEAST_PCT)
     shaded = thin.spans(thin.manual | thin.frozen)
     if shaded:
-        said = [
+        causes = [
             text for text, mask in (("in manual", thin.manual), ("PV constant", thin.frozen)) if mask.any()
         ]
-        caption = f"Shaded: {' or '.join(said)}. {caption}"
+        caption = f"Shaded: {' or '.join(causes)}. {caption}"
     signals, seen = tuple(bands), tuple(marks)
     return Trend(name, title, thin.time_s, thin.gap, signals, panels, seen, caption, shaded, opening, least)
 
@@ -86,8 +86,8 @@ def pv_over_op(thin: Thinned, row: Row) -> Plot:
     """PV over OP, for the ten periods if the night has them."""
     scale, close = pv_scale_of(row), close_span(row, thin)
     part = thin.between(*close) if close else thin
-    told = ~(part.gap | part.frozen)
-    pv, op = scale.of(part.middle("pv")[told]), part.middle("op")[told]
+    usable = ~(part.gap | part.frozen)
+    pv, op = scale.of(part.middle("pv")[usable]), part.middle("op")[usable]
     line = Line("PV over OP", op, pv, joined=close is not None)
     caption = (
         "A cloud along a line: an ideal valve. An ellipse or a parallelogram: lag, backlash or stick-slip."
@@ -99,8 +99,8 @@ def pv_over_op(thin: Thinned, row: Row) -> Plot:
 
 def rhythm_plots(thin: Thinned, period_s: float | None) -> tuple[Plot | Text, ...]:
     """Autocorrelation and spectrum of the error, or a sentence on why the trend cannot show them."""
-    told = ~(thin.gap | thin.frozen)
-    if thin.time_s.size < LEAST_SAMPLES or int(told.sum()) < LEAST_SAMPLES:
+    usable = ~(thin.gap | thin.frozen)
+    if thin.time_s.size < LEAST_SAMPLES or int(usable.sum()) < LEAST_SAMPLES:
         return (Text(("Too few samples for autocorrelation and spectrum.",), "note"),)
     step = float(np.median(np.diff(thin.time_s)))
     if period_s is not None and period_s < LEAST_BUCKETS * step:
@@ -108,7 +108,7 @@ def rhythm_plots(thin: Thinned, period_s: float | None) -> tuple[Plot | Text, ..
         return (Text((text,), "note"),)
     # linear where nothing is known
     grid = np.arange(thin.time_s[0], thin.time_s[-1] + 0.5 * step, step)
-    error = np.interp(grid, thin.time_s[told], (thin.middle("sp") - thin.middle("pv"))[told])
+    error = np.interp(grid, thin.time_s[usable], (thin.middle("sp") - thin.middle("pv"))[usable])
     error -= error.mean()
     return _correlation(error, step, period_s), _spectrum_plot(error, step, period_s)
 
@@ -159,9 +159,9 @@ def turn_panels(row: Row, scale: PvScale) -> Panels | None:
         Plot("turns-pv", "PV since OP's reversal", minutes, pv, pv_lines, reach=(0.0, 0.0)),
         Plot("turns-plane", f"PV over OP{delay}", "OP [%]", pv, plane, reach=reach),
     )
-    said = texts("half_cycles").get(row["cause"], "Half-cycles, superimposed.")
+    caption = texts("half_cycles").get(row["cause"], "Half-cycles, superimposed.")
     title = f"The last {len(kept['halves'])} half-cycles, from each OP reversal (falling ones inverted)"
-    return Panels("turns", title, plots, said)
+    return Panels("turns", title, plots, caption)
 
 
 def _half_cycle(kept: Row, scale: PvScale, step_s: float) -> tuple[Course, Course, Course]:
@@ -178,7 +178,7 @@ def _half_cycle(kept: Row, scale: PvScale, step_s: float) -> tuple[Course, Cours
 
 def _laid_over(paths: Sequence[Course]) -> tuple[Line, ...]:
     """Superimposed paths, with the part of the stem at rest on top."""
-    stuck = [Line(STANDS, x[part], y[part], kind="stuck") for x, y, part in paths if x[part].size > 1]
+    stuck = [Line(STEM_AT_REST, x[part], y[part], kind="stuck") for x, y, part in paths if x[part].size > 1]
     return (*(Line("since the reversal", x, y) for x, y, _ in paths), *stuck)
 
 

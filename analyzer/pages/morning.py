@@ -15,7 +15,7 @@ from analyzer.loop.decisions import CAUSES, Action, Cause, Status, counts
 from analyzer.pages import words, work
 from analyzer.pages.groups import morning_table
 from analyzer.pages.loop_pictures import close_span, sparkline
-from analyzer.pages.reading import BESIDE, ShownNight, needs_a_look, oscillates, read_nights
+from analyzer.pages.reading import SIDE_BY_SIDE, ShownNight, needs_a_look, oscillates, read_nights
 from analyzer.pages.summary import first_things, since
 from analyzer.plantwide.view import GroupView
 from analyzer.store.store import Store
@@ -53,7 +53,7 @@ FOLLOWER = "\u2514 "
 LINKS = (
     ("Hand-over to maintenance", f"{work.MAINTENANCE}.html"),
     ("Work list", f"{work.WORK}.html"),
-    ("Loops side by side", f"{BESIDE}.html"),
+    ("Loops side by side", f"{SIDE_BY_SIDE}.html"),
     ("All loops as CSV", "csv/index-ranking.csv"),
 )
 
@@ -67,7 +67,7 @@ def worst_table(night: ShownNight) -> Table:
     """The loops that need action, worst first, followers below the loop that moves them."""
     here, by = {r["loop"] for r in night.worst}, cost_column(night.rows)
 
-    def own(row: words.Row) -> dict[str, words.NightDecision]:
+    def own(row: words.Row) -> dict[str, words.CellContent]:
         name, trend = night.link(row["loop"]), night.trends.get(row["loop"])
         drawn = None if trend is None else sparkline(trend, close_span(row, trend))
         changed = row["kp_new"] is not None or row["ti_new"] is not None
@@ -92,7 +92,7 @@ def ranking(night: ShownNight) -> Table:
     shown = declared if by in words.keys("ranking") else (*declared[:4], words.heading(by), *declared[4:])
     figures = [c.key for c in shown if c.numeric]
 
-    def own(row: words.Row) -> Mapping[str, words.NightDecision]:
+    def own(row: words.Row) -> Mapping[str, words.CellContent]:
         return {name: words.marked_cell(row, name) for name in figures} | {
             "cause": words.cause_cell(row["cause"])
         }
@@ -142,7 +142,7 @@ def score(rows: Sequence[words.Row]) -> float | None:
     return 100.0 * sum(w for w, good in weights if good) / total if total > 0 else None
 
 
-def _area(name: str, rows: Sequence[words.Row]) -> tuple[words.NightDecision, ...]:
+def _area(name: str, rows: Sequence[words.Row]) -> tuple[words.CellContent, ...]:
     assessed = [r for r in rows if r["status"] == Status.OK]
     worst = sorted((r for r in assessed if r["cause"] != Cause.NONE), key=lambda r: -(r[SIGNIFICANCE] or 0.0))
     numbers = [len(rows), len(assessed)]

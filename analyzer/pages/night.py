@@ -13,8 +13,8 @@ from analyzer.pages.groups import GROUP_LOOPS
 from analyzer.pages.loop_pictures import trend_block
 from analyzer.pages.morning import HISTORY
 from analyzer.pages.reading import (
-    BESIDE,
     NIGHT_COLUMNS,
+    SIDE_BY_SIDE,
     USUAL_NIGHTS,
     ShownNight,
     Thinned,
@@ -22,7 +22,7 @@ from analyzer.pages.reading import (
     read_night,
     read_nights,
     read_trends,
-    told_of,
+    remembered_columns,
 )
 from analyzer.pages.words import ALL_LOOPS, pv_scale_of
 from analyzer.plantwide.view import GroupView, read_groups
@@ -91,7 +91,7 @@ def side_by_side(store: Store, night: ShownNight) -> Page:
     )
     caption = "Each loop in its own unit. Zoom or move one, and all follow; the address keeps the choice."
     section = Section("Side by side", (Beside("beside", "Loops, up to six", blocks, caption),))
-    return Page(BESIDE, "Loops side by side", f"the night of {night.name}", (section,), (ALL_LOOPS,))
+    return Page(SIDE_BY_SIDE, "Loops side by side", f"the night of {night.name}", (section,), (ALL_LOOPS,))
 
 
 def _loop_pages(
@@ -114,9 +114,9 @@ def _loop_pages(
         found = explained.get(tag)
         drawn, settings = (loads(text or "") for text in (found and found.get("page"), compared.get(tag)))
         group = by_number.get(own[-1]["group"] or "")
-        said = [n.as_line(night.zone) for n in night.notes.get(tag, ())]
+        notes = [n.as_line(night.zone) for n in night.notes.get(tag, ())]
         part = None if group is None else groups.member_section(group, tag, around)
-        about = loop.loop_page(own, trends.get(tag), found, drawn, part, said, settings)
+        about = loop.loop_page(own, trends.get(tag), found, drawn, part, notes, settings)
         yield about
         for more in (settings, drawn):
             if more is not None:
@@ -128,11 +128,11 @@ def dated_pages(store: Store, name: str | None, written: Callable[[str], bool]) 
     `written` reports that their page is newer than their results."""
     last = name or store.require()
     nights = [n for n in store.nights() if n <= last][-DATED:]
-    sums, told = morning.read_sums(store, last), lru_cache(USUAL_NIGHTS)(told_of)
+    sums, read_earlier = morning.read_sums(store, last), lru_cache(USUAL_NIGHTS)(remembered_columns)
     for night in nights:
         if night in nights[-2:] or not written(night):
             # loops' pages are those of the latest night
-            shown = replace(read_night(store, night, DATED_LOOPS, told=told), paged=())
+            shown = replace(read_night(store, night, DATED_LOOPS, read_earlier=read_earlier), paged=())
             own = [s for s in sums if s.name <= night]
             found = morning.morning_page(shown, read_groups(store, night), own)
             links, choices = (*nights_around(nights, night), LATEST), nights_to_choose(nights, night)

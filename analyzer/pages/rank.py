@@ -25,12 +25,12 @@ from reports.pages import Column
 from reports.plain import csv_text, table
 from reports.texts import visible
 
-BELIEFS_TOLD = tuple(c for c in BELIEVED if c.name not in ("constants", "state", "news_tone"))
+BELIEF_COLUMNS = tuple(c for c in BELIEVED if c.name not in ("constants", "state", "news_tone"))
 """Columns that beliefs add to a list."""
-LANE_FIGURES = tuple(n for n in FIGURE.values() if n not in names((*RANKING, *BELIEFS_TOLD)))
+LANE_FIGURES = tuple(n for n in FIGURE.values() if n not in names((*RANKING, *BELIEF_COLUMNS)))
 """Figures of lanes that are not in the list."""
-SORTABLE = (*names(RANKING), "importance", LOSS, *LANE_FIGURES, *names(BELIEFS_TOLD))
-KEPT = names((*RANKING, *LISTED, *BELIEFS_TOLD))
+SORTABLE = (*names(RANKING), "importance", LOSS, *LANE_FIGURES, *names(BELIEF_COLUMNS))
+KEPT = names((*RANKING, *LISTED, *BELIEF_COLUMNS))
 LIST_COLUMNS = (*KEPT, *names(NOTED))
 """Columns of CSV and JSON: the contract's, then the units of the settings, and the full advice."""
 MOST_NAMES = 10
@@ -94,10 +94,10 @@ def _noted(row: dict[str, Any], known: Mapping[str, tuple[notes.Note, ...]]) -> 
     """A row with the newest note of its loop; non-finite numbers become unknown."""
     row = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in row.items()}
     found = notes.last(known, row["loop"])
-    said, until = (
+    text, until = (
         (None, None) if found is None else (found.as_line(row["timezone"]), found.hidden_until or None)
     )
-    return {**row, "note": said, "hidden_until": until}
+    return {**row, "note": text, "hidden_until": until}
 
 
 def hidden_loops(rows: Sequence[Row], night: str) -> tuple[str, ...]:

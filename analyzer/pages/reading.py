@@ -18,7 +18,7 @@ from analyzer.lanes.lanes import FIGURE
 from analyzer.loop.cost import LOSS, cost, cost_column
 from analyzer.loop.decisions import Cause, Status, counts
 from analyzer.pages.rank import worst_first
-from analyzer.pages.words import NightDecision, cells, keys, page_table
+from analyzer.pages.words import CellContent, cells, keys, page_table
 from analyzer.store import notes
 from analyzer.store.notes import Note, is_hidden, last
 from analyzer.store.store import Store
@@ -30,7 +30,7 @@ from reports.texts import slug
 USUAL_NIGHTS = 15
 """Earlier nights that give the usual values of a loop [nights]: two weeks, and the night before."""
 
-BESIDE = "side-by-side"
+SIDE_BY_SIDE = "side-by-side"
 """Name of the page with loops below each other; the address after # lists them."""
 AROUND_D = 2
 """Nights are named by the date of their middle and are up to 36 h long: so many more days are read [d]."""
@@ -209,14 +209,14 @@ class ShownNight:
         self,
         declared: str,
         rows: Iterable[Row],
-        own: Callable[[Row], Mapping[str, NightDecision]] = lambda row: {},
+        own: Callable[[Row], Mapping[str, CellContent]] = lambda row: {},
         **stated: Any,
     ) -> Table:
         """A table of loops as declared in tables.toml, except for `stated` properties: each row's own cells, a link
         to the loop's page, and otherwise values of the store."""
         shown = stated.get("columns", declared)
-        told = (cells(row, shown, **{"loop": self.link(row["loop"]), **own(row)}) for row in rows)
-        return page_table(declared, told, **stated)
+        shown_rows = (cells(row, shown, **{"loop": self.link(row["loop"]), **own(row)}) for row in rows)
+        return page_table(declared, shown_rows, **stated)
 
 
 def oscillates(row: Row | None) -> bool:
@@ -252,7 +252,7 @@ def followers_under(rows: Sequence[Row]) -> list[Row]:
     return out + [r for rest in under.values() for r in rest]
 
 
-def told_of(store: Store, night: str) -> list[dict[str, Any]]:
+def remembered_columns(store: Store, night: str) -> list[dict[str, Any]]:
     """Columns of a night that the pages of later nights read."""
     return read_nights(store, [night], REMEMBERED)
 
@@ -262,16 +262,16 @@ def read_night(
     name: str | None,
     top: int,
     drawn: bool = True,
-    told: Callable[[Store, str], list[dict[str, Any]]] = told_of,
+    read_earlier: Callable[[Store, str], list[dict[str, Any]]] = remembered_columns,
 ) -> ShownNight:
-    """Data of the morning page of a night, with trends of the worst loops if they are drawn; `told` reads earlier
-    nights and may cache them for several pages."""
+    """Data of the morning page of a night, with trends of the worst loops if they are drawn; `read_earlier` reads
+    earlier nights and may cache them for several pages."""
     nights = store.nights()
     night = name or store.require()
     store.read("nights", night, ["loop"])
     earlier = [n for n in nights if n < night]
     rows = worst_first(read_nights(store, [night], NIGHT_COLUMNS))
-    remembered = by_loop([r for n in earlier[-USUAL_NIGHTS:] for r in told(store, n)])
+    remembered = by_loop([r for n in earlier[-USUAL_NIGHTS:] for r in read_earlier(store, n)])
     remembered = {loop: own for loop, own in remembered.items() if own[-1]["night"] == earlier[-1]}
     known = notes.read_notes(store.path)
     most = largest_loss(rows)

@@ -36,7 +36,7 @@ def listed(names: Sequence[str]) -> str:
 def first_things(rows: Sequence[words.Row], groups: Sequence[GroupView] = ()) -> tuple[str, ...]:
     """At most three sentences, the largest improvement first; or one that there is nothing to do."""
     by_loop, by = {r["loop"]: r for r in rows}, cost_column(rows)
-    told: set[str] = set()
+    named: set[str] = set()
     found: list[tuple[float, str]] = []
     for group in groups:
         source = by_loop.get(group.source["loop"]) if group.source else None
@@ -44,14 +44,14 @@ def first_things(rows: Sequence[words.Row], groups: Sequence[GroupView] = ()) ->
         if source is None or not others:
             continue
         members = [source["loop"], *others]
-        told |= set(members)
+        named |= set(members)
         found.append((sum(cost(by_loop[m], by) for m in members), _of_group(source, others)))
-    left = sorted((r for r in rows if r["loop"] not in told), key=lambda r: (-cost(r, by), r["loop"]))
+    remaining = sorted((r for r in rows if r["loop"] not in named), key=lambda r: (-cost(r, by), r["loop"]))
     for work in orders.texts("work"):
-        mine = [r for r in left if orders.kind_of_work(r) == work]
+        mine = [r for r in remaining if orders.kind_of_work(r) == work]
         if mine:  # a repair at the next shutdown is not for tonight
             worth = 0.0 if work == Due.SHUTDOWN else sum(cost(r, by) for r in mine)
-            found.append((worth, orders.asked(work, mine, listed([r["loop"] for r in mine]))))
+            found.append((worth, orders.work_sentence(work, mine, listed([r["loop"] for r in mine]))))
     ordered = sorted(found, key=lambda pair: -pair[0])
     return tuple(text for _, text in ordered[:SENTENCES]) or (CALM,)
 
@@ -94,27 +94,27 @@ def _lane_news(nights: Sequence[words.Row]) -> words.Row:
 
 def _inside(nights: Sequence[words.Row], lane: Lane) -> list[bool]:
     """Whether a loop was in a lane in each night; an inferred lane must be reported in several consecutive nights."""
-    told = [lane in lanes_in(row) for row in nights]
+    inside = [lane in lanes_in(row) for row in nights]
     if lane is not Lane.SLUGGISH:
-        return told
-    states = told[:1]
-    for k in range(1, len(told)):
-        last = told[max(k + 1 - LANE_NIGHTS, 0) : k + 1]
-        states.append(told[k] if len(set(last)) == 1 else states[-1])
+        return inside
+    states = inside[:1]
+    for k in range(1, len(inside)):
+        last = inside[max(k + 1 - LANE_NIGHTS, 0) : k + 1]
+        states.append(inside[k] if len(set(last)) == 1 else states[-1])
     return states
 
 
 def news_lines(night: ShownNight) -> list[str]:
     """Changes since the previous night, one line per loop, deteriorations first."""
     order = {"worse": 0, "unclear": 1, "better": 2}
-    told = sorted((order[row["news_tone"]], row["loop"], row["news"]) for row in _news(night))
-    return [f"{loop} {text}" for _, loop, text in told]
+    news = sorted((order[row["news_tone"]], row["loop"], row["news"]) for row in _news(night))
+    return [f"{loop} {text}" for _, loop, text in news]
 
 
 def news_table(night: ShownNight, tones: Sequence[str], name: str, title: str) -> Table:
     """Loops with changes of the given colours."""
 
-    def own(row: words.Row) -> dict[str, words.NightDecision]:
+    def own(row: words.Row) -> dict[str, words.CellContent]:
         before, now = (words.cell(r, SIGNIFICANCE) for r in (night.earlier[row["loop"]][-1], row))
         news = Cell(row["news"], kind=row["news_tone"])
         return {"news": news, "before": before, "now": now, "action": Cell(action_text(row))}
@@ -159,13 +159,13 @@ def summary_page(store: Store, name: str | None = None) -> Page:
     night = read_night(store, name, SUMMARY_LOOPS, drawn=False)
     seen = [r for r in night.rows if r["loop"] not in night.hidden]
     first = words.listing(first_things(seen, read_groups(store, night.name)))
-    left, lines, most = sum(map(needs_a_look, seen)) - len(night.worst), news_lines(night), NEWS
+    not_listed, lines, most = sum(map(needs_a_look, seen)) - len(night.worst), news_lines(night), NEWS
     news = [*lines[:most], f"{len(lines) - most} more"] if len(lines) > most else lines
-    told = words.listing(news) if news else Text(("Nothing new.",))
+    news_block = words.listing(news) if news else Text(("Nothing new.",))
     sections = without_none(
         Section("First", (first, Text((_counts(night),)))),
-        section(f"Since {night.before_name}", told) if night.before_name else None,
-        Section("Loops worth a look", (_worst(night, left) if night.worst else Text(("None.",)),)),
+        section(f"Since {night.before_name}", news_block) if night.before_name else None,
+        Section("Loops worth a look", (_worst(night, not_listed) if night.worst else Text(("None.",)),)),
     )
     return Page("summary", f"Loops in the morning of {night.name}", "", sections)
 
@@ -173,7 +173,7 @@ def summary_page(store: Store, name: str | None = None) -> Page:
 def _worst(night: ShownNight, left: int) -> Table:
     """The worst loops with their actions, and the number of those left out; their notes if there are any."""
 
-    def own(row: words.Row) -> dict[str, words.NightDecision]:
+    def own(row: words.Row) -> dict[str, words.CellContent]:
         return {"loop": Cell(row["loop"], kind="strong"), "do": _do(row), "note": night.note(row["loop"])}
 
     noted = any(night.note(r["loop"]) for r in night.worst)

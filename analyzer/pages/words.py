@@ -19,7 +19,7 @@ from reports.pages import Cell, Column, Facts, Floats, Listing, Table, Text
 
 __all__ = ["Row", "duration", "number", "stamp"]  # words that are chosen elsewhere
 
-NightDecision = Cell | str | float | None
+CellContent = Cell | str | float | None
 """Content of a table cell: a text or a number alone makes a cell."""
 ROOM = "analyzer.pages"
 """Package with the tables and texts of pages."""
@@ -82,19 +82,20 @@ def keys(*tables: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(c.key for table in tables for c in page_columns(table)))
 
 
-def page_table(declared: str, rows: Iterable[Iterable[NightDecision]], **own: Any) -> Table:
+def page_table(declared: str, rows: Iterable[Iterable[CellContent]], **own: Any) -> Table:
     """A table of a page with its rows, as declared in tables.toml, except for its `own` properties."""
     stated = {
         k: tuple(v) if isinstance(v, list) else v for k, v in toml_of(ROOM, "tables.toml")[declared].items()
     }
-    told = tuple(tuple(map(_as_cell, row)) for row in rows)
+    cell_rows = tuple(tuple(map(_as_cell, row)) for row in rows)
     return Table(
-        **{"name": declared, "title": "", **stated, "columns": page_columns(declared), "rows": told} | own
+        **{"name": declared, "title": "", **stated, "columns": page_columns(declared), "rows": cell_rows}
+        | own
     )
 
 
-def _as_cell(told: NightDecision) -> Cell:
-    return told if isinstance(told, Cell) else Cell(told) if isinstance(told, str) else plain_cell(told)
+def _as_cell(value: CellContent) -> Cell:
+    return value if isinstance(value, Cell) else Cell(value) if isinstance(value, str) else plain_cell(value)
 
 
 def lead(*clauses: str) -> Text:
@@ -135,7 +136,7 @@ def cell(row: Row, name: str) -> Cell:
     return Cell(f"{text} stem" if of_stem else text, value)
 
 
-def cells(row: Row, columns: str | Iterable[Column], **own: NightDecision) -> tuple[NightDecision, ...]:
+def cells(row: Row, columns: str | Iterable[Column], **own: CellContent) -> tuple[CellContent, ...]:
     """A row of a table by the keys of its columns: its `own` cells, otherwise values of the store."""
     shown = page_columns(columns) if isinstance(columns, str) else columns
     return tuple(own[c.key] if c.key in own else cell(row, c.key) for c in shown)
@@ -184,7 +185,7 @@ def pv_scale_of(row: Row) -> PvScale:
     return PvScale(low, high - low, row["pv_unit"] or "")
 
 
-def beside(name_unit: str, value: float | None, scale: PvScale) -> str:
+def in_loop_unit(name_unit: str, value: float | None, scale: PvScale) -> str:
     """A figure in % of span converted to the loop's own unit, in brackets; '' if that adds nothing."""
     if value is None or name_unit != PERCENT or not scale.unit or scale is PLAIN:
         return ""

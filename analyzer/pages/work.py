@@ -11,7 +11,7 @@ import numpy as np
 from analyzer.history.plant_clock import stamp
 from analyzer.loop.decisions import Action, Cause, Fault, Status
 from analyzer.pages.reading import ShownNight, by_loop, oscillates, read_nights
-from analyzer.pages.words import ALL_LOOPS, NightDecision, Row, cause_cell, with_noun
+from analyzer.pages.words import ALL_LOOPS, CellContent, Row, cause_cell, with_noun
 from analyzer.store.notes import FINISHED, Work, work_on
 from analyzer.store.store import Store
 from analyzer.words.belief import wear_text
@@ -55,7 +55,7 @@ def faulty(night: ShownNight) -> Table:
     return night.table("valves", rows, _of_valve)
 
 
-def _of_valve(row: Row) -> dict[str, NightDecision]:
+def _of_valve(row: Row) -> dict[str, CellContent]:
     """Columns of a valve that are not in the store, and space for findings."""
     fault = "" if row["valve_fault"] in (None, Fault.NONE) else row["valve_fault"]
     known = {"width": fault_width(row), "test": valve_test(row), "found": ""}
@@ -97,12 +97,12 @@ class Sides:
 
 def sides(rows: Sequence[Row], day: str) -> Sides:
     """A loop's assessed nights, oldest first, split by the day of the work, which is in neither part."""
-    told = [r for r in rows if r["status"] == Status.OK]
-    before = [r for r in told if r["night"] < day][-BEFORE_WORK:]
-    return Sides(before, [r for r in told if r["night"] > day])
+    assessed = [r for r in rows if r["status"] == Status.OK]
+    before = [r for r in assessed if r["night"] < day][-BEFORE_WORK:]
+    return Sides(before, [r for r in assessed if r["night"] > day])
 
 
-def said_since(work: Work, both: Sides) -> str:
+def result_since(work: Work, both: Sides) -> str:
     """Result of a piece of work from the nights after it; empty for unfinished work."""
     if work.state not in FINISHED:
         return ""
@@ -144,7 +144,7 @@ def work_page(store: Store, night: ShownNight) -> Page:
     history = by_loop(read_nights(store, names, READ, works))
     parted = {k: sides(history.get(k, ()), stamp(w.since_s, night.zone)[:10]) for k, w in works.items()}
 
-    def own(row: Row) -> dict[str, NightDecision]:
+    def own(row: Row) -> dict[str, CellContent]:
         """A piece of work in the list, and its result from the nights after it."""
         work, finished = works[row["loop"]], works[row["loop"]].state in FINISHED
         late = bool(work.due) and work.due < night.name and not finished
@@ -154,7 +154,7 @@ def work_page(store: Store, night: ShownNight) -> Page:
             "due": Cell(work.due, kind="worse" if late else ""),
             "note": f"{work.note.text} ({stamp(work.note.time_s, night.zone)[:10]})",
             "cause": cause_cell(row["cause"]),
-            "since": said_since(work, parted[row["loop"]]),
+            "since": result_since(work, parted[row["loop"]]),
         }
 
     def urgency(row: Row) -> tuple[bool, str, float, str]:

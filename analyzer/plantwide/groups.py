@@ -22,7 +22,7 @@ HINTS = 4
 """Number of loops with a hint of an oscillation from which it counts if no loop shows it alone:
 proofs/plant_wide.py."""
 HEARD = 6  # Clearest loops of a group that a further loop has to predict [loops]
-ASKED = 12  # Loops of a group that are tested for the loops they move with, the most coherent first
+MOST_TESTED = 12  # Loops of a group that are tested for the loops they move with, the most coherent first
 SHIFTS = 12  # Largest number of shifts of the lines that estimate chance coherence
 HARMONIC = 0.03  # Logarithm by which a period may differ from a whole part of another one to be its harmonic
 NEAR_PERIOD = 0.25
@@ -34,40 +34,42 @@ class Group:
     """Loops with a common oscillation, each with its oscillation and its coherence with that of the leader [-]; the
     leader is the first, the others follow by coherence."""
 
-    waves: Mapping[str, OscillationLines]
+    oscillations: Mapping[str, OscillationLines]
     coherence: Mapping[str, float]
 
     @property
     def period_s(self) -> float:
         """Its period [s]."""
-        return next(iter(self.waves.values())).period_s
+        return next(iter(self.oscillations.values())).period_s
 
     @property
     def loops(self) -> tuple[str, ...]:
         """Names of its loops."""
-        return tuple(self.waves)
+        return tuple(self.oscillations)
 
-    def with_lacking(self, waves: Mapping[str, OscillationLines], coherence: Mapping[str, float]) -> Group:
+    def with_lacking(
+        self, oscillations: Mapping[str, OscillationLines], coherence: Mapping[str, float]
+    ) -> Group:
         """The group with additional loops."""
-        lacking = [loop for loop in waves if loop not in self.waves]
-        more = {loop: waves[loop] for loop in lacking}, {loop: coherence[loop] for loop in lacking}
-        return Group({**self.waves, **more[0]}, {**self.coherence, **more[1]})
+        lacking = [loop for loop in oscillations if loop not in self.oscillations]
+        more = {loop: oscillations[loop] for loop in lacking}, {loop: coherence[loop] for loop in lacking}
+        return Group({**self.oscillations, **more[0]}, {**self.coherence, **more[1]})
 
 
 class _Neighbours:
     """Oscillations of one clock by rising frequency, and which are coherent; each is computed once."""
 
-    def __init__(self, waves: Sequence[OscillationLines], limits: PlantLimits) -> None:
-        self.waves = sorted(waves, key=lambda w: w.line)
+    def __init__(self, oscillations: Sequence[OscillationLines], limits: PlantLimits) -> None:
+        self.oscillations = sorted(oscillations, key=lambda w: w.line)
         self._limits = limits
-        lines = [tapered(w.lines).astype(np.complex64) for w in self.waves]
+        lines = [tapered(w.lines).astype(np.complex64) for w in self.oscillations]
         count = np.array([x.size for x in lines], dtype=np.int64)
         offset = np.concatenate(([0], np.cumsum(count)[:-1])).astype(np.int64)
-        first = np.array([w.first + 1 for w in self.waves], dtype=np.int64)
+        first = np.array([w.first + 1 for w in self.oscillations], dtype=np.int64)
         self._packed: tuple[np.ndarray, Whole, Whole, Whole] = np.concatenate(lines), offset, first, count
-        self._log_line = np.log(np.array([w.line for w in self.waves]))
-        self._loop = np.array([w.loop for w in self.waves])
-        self._own_noise = 1.0 / np.maximum([w.prominence for w in self.waves], 1.0)
+        self._log_line = np.log(np.array([w.line for w in self.oscillations]))
+        self._loop = np.array([w.loop for w in self.oscillations])
+        self._own_noise = 1.0 / np.maximum([w.prominence for w in self.oscillations], 1.0)
         self._known: dict[int, dict[int, float]] = {}
 
     def near(self, line: float, reach: float) -> Whole:
@@ -86,7 +88,7 @@ class _Neighbours:
         joined = self.moving_with(one)
         inside = {self._loop[j] for j in (one, *joined)}
         seen: dict[int, list[float]] = {}
-        for j in list(joined)[:ASKED]:
+        for j in list(joined)[:MOST_TESTED]:
             for k, level in self.moving_with(j).items():
                 if self._loop[k] not in inside:
                     seen.setdefault(k, []).append(level)
@@ -96,14 +98,14 @@ class _Neighbours:
     def _one_a_loop(self, levels: Iterable[tuple[int, float]]) -> dict[int, float]:
         best: dict[str, tuple[int, float]] = {}
         for k, level in sorted(levels, key=lambda t: -t[1]):
-            best.setdefault(self.waves[k].loop, (k, level))
+            best.setdefault(self.oscillations[k].loop, (k, level))
         return dict(best.values())
 
     def _coherent_with(self, one: int) -> Iterable[tuple[int, float]]:
-        limits, wave = self._limits, self.waves[one]
-        near = self.near(wave.line, limits.same_period)
-        near = near[self._loop[near] != wave.loop]
-        low, high, width = band(wave.line)
+        limits, oscillation = self._limits, self.oscillations[one]
+        near = self.near(oscillation.line, limits.same_period)
+        near = near[self._loop[near] != oscillation.loop]
+        low, high, width = band(oscillation.line)
         strict, loose = (
             max(limits.coherent, chance_coherence(high - low, width, c))
             for c in (limits.chance, limits.chance_in_step)
@@ -115,20 +117,20 @@ class _Neighbours:
         over = found / np.maximum(self._by_chance(one, near), 1e-9)
         kept = over >= limits.over_chance
         near, found, over = near[kept], found[kept], over[kept]
-        drifts = self._drifts(wave, [self.waves[j] for j in near])
+        drifts = self._drifts(oscillation, [self.oscillations[j] for j in near])
         sure = (found >= strict) & (drifts <= limits.drift)
         sure |= (over >= limits.over_chance_in_step) & (drifts <= limits.drift_in_step)
         return zip(near[sure].tolist(), found[sure].tolist(), strict=True)
 
     def _coherences(self, one: int, others: Whole, shift: int = 0) -> Floats:
-        span = np.array(band(self.waves[one].line), dtype=np.int64)
+        span = np.array(band(self.oscillations[one].line), dtype=np.int64)
         return np.asarray(coherences(*self._packed, one, others, span, shift))
 
     def _by_chance(self, one: int, others: Whole) -> Floats:
         """The largest coherence of shifted lines, which have only the shape of their band in common, shape (k,)."""
         if not others.size:
             return np.zeros(0)
-        low, high, _ = band(self.waves[one].line)
+        low, high, _ = band(self.oscillations[one].line)
         far = max((high - low) // 2, 4)
         shifts = np.unique(np.linspace(3, far, SHIFTS // 2).astype(int))
         found = [self._coherences(one, others, int(sign * s)) for s in shifts for sign in (-1, 1)]
@@ -144,53 +146,57 @@ class _Neighbours:
         return np.abs(drift(x, np.array(y)))
 
 
-def groups_of(waves: Sequence[OscillationLines], limits: PlantLimits) -> list[Group]:
+def groups_of(oscillations: Sequence[OscillationLines], limits: PlantLimits) -> list[Group]:
     """Groups of loops with a common oscillation from all oscillations of a night, larger groups first; none of a
     single loop."""
-    known = [w for w in on_one_clock(waves) if w.line >= limits.follow_cycles and np.any(w.lines)]
+    known = [w for w in on_one_clock(oscillations) if w.line >= limits.follow_cycles and np.any(w.lines)]
     if not known:
         return []
-    beside = _Neighbours(known, limits)
-    merged = (_with_foresight(g, beside, limits) for g in _merged(_led(beside, limits), limits))
-    return sorted(merged, key=lambda g: (-len(g.waves), g.loops))
+    neighbours = _Neighbours(known, limits)
+    merged = (_with_foresight(g, neighbours, limits) for g in _merged(_led(neighbours, limits), limits))
+    return sorted(merged, key=lambda g: (-len(g.oscillations), g.loops))
 
 
-def _shows(wave: OscillationLines, limits: PlantLimits) -> bool:
+def _shows(oscillation: OscillationLines, limits: PlantLimits) -> bool:
     """Whether an oscillation is found, or indicated, in its loop alone."""
-    return wave.own or wave.prominence >= limits.hint_prominence
+    return oscillation.own or oscillation.prominence >= limits.hint_prominence
 
 
-def _led(beside: _Neighbours, limits: PlantLimits) -> list[Group]:
+def _led(neighbours: _Neighbours, limits: PlantLimits) -> list[Group]:
     """Groups around the clearest oscillations, in that order."""
-    leading = [i for i, w in enumerate(beside.waves) if _shows(w, limits)]
-    order = sorted(leading, key=lambda i: (not beside.waves[i].own, -beside.waves[i].prominence))
+    leading = [i for i, w in enumerate(neighbours.oscillations) if _shows(w, limits)]
+    order = sorted(
+        leading, key=lambda i: (not neighbours.oscillations[i].own, -neighbours.oscillations[i].prominence)
+    )
     taken: set[int] = set()
     found: list[Group] = []
     for i in order:
         if i in taken:
             continue
-        levels = {i: 1.0} | beside.moving_with(i) | beside.second_ring(i)
-        waves = {beside.waves[j].loop: beside.waves[j] for j in levels}
-        if len(waves) > 1 and _is_wave(list(waves.values()), limits):
+        levels = {i: 1.0} | neighbours.moving_with(i) | neighbours.second_ring(i)
+        oscillations = {neighbours.oscillations[j].loop: neighbours.oscillations[j] for j in levels}
+        if len(oscillations) > 1 and _is_oscillation(list(oscillations.values()), limits):
             taken.update(levels)
-            found.append(Group(waves, {beside.waves[j].loop: level for j, level in levels.items()}))
+            found.append(
+                Group(oscillations, {neighbours.oscillations[j].loop: level for j, level in levels.items()})
+            )
     return found
 
 
-def _is_wave(waves: Sequence[OscillationLines], limits: PlantLimits) -> bool:
+def _is_oscillation(oscillations: Sequence[OscillationLines], limits: PlantLimits) -> bool:
     """Whether the common signal is an oscillation, and not the load of neighbours: one loop shows it alone, or
     several indicate it."""
-    hints = sum(w.prominence >= limits.hint_prominence for w in waves)
-    return hints >= HINTS or any(w.own for w in waves)
+    hints = sum(w.prominence >= limits.hint_prominence for w in oscillations)
+    return hints >= HINTS or any(w.own for w in oscillations)
 
 
 def _merged(groups: Sequence[Group], limits: PlantLimits) -> list[Group]:
     """Merge groups of one period with mostly the same loops, and groups at harmonics of others."""
     kept: list[Group] = []
-    for group in sorted(groups, key=lambda g: (-g.period_s, -len(g.waves))):
+    for group in sorted(groups, key=lambda g: (-g.period_s, -len(g.oscillations))):
         for k, other in enumerate(kept):
             if _is_same(group, other, limits) or _is_group_of_harmonics(group, other, limits):
-                kept[k] = other.with_lacking(group.waves, group.coherence)
+                kept[k] = other.with_lacking(group.oscillations, group.coherence)
                 break
         else:
             kept.append(group)
@@ -201,8 +207,8 @@ def _is_same(one: Group, other: Group, limits: PlantLimits) -> bool:
     """Whether two groups have one period and most of the smaller one's loops in common."""
     if abs(math.log(one.period_s / other.period_s)) > limits.same_period:
         return False
-    shared = one.waves.keys() & other.waves.keys()
-    return 2 * len(shared) > min(len(one.waves), len(other.waves))
+    shared = one.oscillations.keys() & other.oscillations.keys()
+    return 2 * len(shared) > min(len(one.oscillations), len(other.oscillations))
 
 
 def _is_group_of_harmonics(one: Group, other: Group, limits: PlantLimits) -> bool:
@@ -210,17 +216,24 @@ def _is_group_of_harmonics(one: Group, other: Group, limits: PlantLimits) -> boo
     ratio = other.period_s / one.period_s
     if round(ratio) < 2 or abs(math.log(ratio / round(ratio))) > HARMONIC:
         return False
-    return any(w.harmonic == round(ratio) and loop in other.waves for loop, w in one.waves.items())
+    return any(
+        w.harmonic == round(ratio) and loop in other.oscillations for loop, w in one.oscillations.items()
+    )
 
 
-def _with_foresight(group: Group, beside: _Neighbours, limits: PlantLimits) -> Group:
+def _with_foresight(group: Group, neighbours: _Neighbours, limits: PlantLimits) -> Group:
     """A group with further loops that are not coherent enough but predict it: a source with irregular stick-slip
     moves others by the part of it that their filters pass."""
-    clearest = sorted(group.waves.values(), key=lambda w: -w.prominence)[:HEARD]
-    near = (beside.waves[k] for k in beside.near(next(iter(group.waves.values())).line, NEAR_PERIOD))
-    asked = [w for w in near if w.loop not in group.waves and w.harmonic == 1 and _shows(w, limits)]
+    clearest = sorted(group.oscillations.values(), key=lambda w: -w.prominence)[:HEARD]
+    near = (
+        neighbours.oscillations[k]
+        for k in neighbours.near(next(iter(group.oscillations.values())).line, NEAR_PERIOD)
+    )
+    tested = [w for w in near if w.loop not in group.oscillations and w.harmonic == 1 and _shows(w, limits)]
     best: dict[str, tuple[float, OscillationLines]] = {}
-    for wave, level in zip(asked, median_granger_f(asked, clearest), strict=True):
-        if level >= limits.foresight and level > best.get(wave.loop, (0.0, wave))[0]:
-            best[wave.loop] = level, wave
-    return group.with_lacking({loop: wave for loop, (_, wave) in best.items()}, dict.fromkeys(best, 0.0))
+    for oscillation, level in zip(tested, median_granger_f(tested, clearest), strict=True):
+        if level >= limits.foresight and level > best.get(oscillation.loop, (0.0, oscillation))[0]:
+            best[oscillation.loop] = level, oscillation
+    return group.with_lacking(
+        {loop: oscillation for loop, (_, oscillation) in best.items()}, dict.fromkeys(best, 0.0)
+    )

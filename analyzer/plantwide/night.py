@@ -48,24 +48,24 @@ Loops = Mapping[str, Finding]
 
 
 def traced_night(
-    loops: Loops, waves: Sequence[OscillationLines], limits: PlantLimits, first: int = 1
+    loops: Loops, oscillations: Sequence[OscillationLines], limits: PlantLimits, first: int = 1
 ) -> tuple[dict[str, Finding], list[dict[str, Any]]]:
     """Result of the plant-wide pass: the loops, with followers and their sources changed, and rows of groups.
 
-    loops : by name, each with its own verdict; waves : of all loops; first : number of the first group.
+    loops : by name, each with its own verdict; oscillations : of all loops; first : number of the first group.
     """
     assessed = {k: f for k, f in loops.items() if f.status is Status.OK}
-    traced = trace(waves, assessed, limits)
-    told = [t for t in traced if any(k in loops and loops[k].oscillates for k in t.group.loops)]
-    found = followers_of(told)
+    traced = trace(oscillations, assessed, limits)
+    reported = [t for t in traced if any(k in loops and loops[k].oscillates for k in t.group.loops)]
+    found = followers_of(reported)
     sources = {loop: source for loop, (source, _) in found.items()}
-    groups = [r for k, t in enumerate(told, first) for r in group_rows(k, t, sources, loops, limits)]
+    groups = [r for k, t in enumerate(reported, first) for r in group_rows(k, t, sources, loops, limits)]
     done = dict(loops)
     for loop, source in sources.items():
         lead = done[source.loop]
         done[source.loop] = replace(lead, moves=tuple(sorted((*lead.moves, loop))))
-    for loop, (source, wave) in found.items():
-        done[loop] = _follower(done[loop], source, wave, limits)
+    for loop, (source, oscillation) in found.items():
+        done[loop] = _follower(done[loop], source, oscillation, limits)
     own = own_groups(groups)
     return {k: replace(f, group=own.get(k)) for k, f in done.items()}, groups
 
@@ -98,22 +98,22 @@ def following(
     )
 
 
-def _follower(own: Finding, root: SourceLoop, wave: OscillationLines, limits: PlantLimits) -> Finding:
+def _follower(own: Finding, root: SourceLoop, oscillation: OscillationLines, limits: PlantLimits) -> Finding:
     """A loop as a follower; unchanged if it does not oscillate, not even with its part of the common oscillation."""
     seen = SignKind.FOLLOWS, (root.loop, root.lag_s, root.coherence)
-    told = following(own, root, swing_of(own, root, wave, limits), seen, limits)
-    return told if told.oscillates else own
+    follower = following(own, root, swing_of(own, root, oscillation, limits), seen, limits)
+    return follower if follower.oscillates else own
 
 
 def swing_of(
-    own: Finding, root: SourceLoop, wave: OscillationLines, limits: PlantLimits
+    own: Finding, root: SourceLoop, oscillation: OscillationLines, limits: PlantLimits
 ) -> OscillationFigures | None:
     """Oscillation of a follower: its part, if it has none of its own and the part is a fair share of the error."""
-    if own.oscillates or wave.share < limits.weak_share:
+    if own.oscillates or oscillation.share < limits.weak_share:
         return own.swing
-    share, amplitude = wave.oscillating_pct, wave.amplitude_pct
+    share, amplitude = oscillation.oscillating_pct, oscillation.amplitude_pct
     hours = own.number("usable_h") * share / 100.0
-    return OscillationFigures(amplitude * root.coherence * hours, share, wave.period_s, amplitude)
+    return OscillationFigures(amplitude * root.coherence * hours, share, oscillation.period_s, amplitude)
 
 
 def likely(found: Traced, limits: PlantLimits) -> list[str]:
@@ -142,11 +142,11 @@ def group_rows(
     known = {c.loop: c for c in found.candidates}
     itself = SourceLoop("", 1.0, 0.0, 0.0)
     out = []
-    for loop, wave in found.group.waves.items():
+    for loop, oscillation in found.group.oscillations.items():
         if loop not in loops:
             continue
         link, candidate = found.links.get(loop, itself), known.get(loop, Candidate(loop, {}, 0.0))
-        share, error = min(wave.share, 1.0), loops[loop].known.get("average_absolute_error_pct")
+        share, error = min(oscillation.share, 1.0), loops[loop].known.get("average_absolute_error_pct")
         gone = 1.0 - math.sqrt(max(1.0 - share, 0.0))  # part of the error due to the oscillation
         signs = json.dumps({k: round(v, 3) for k, v in candidate.signs.items()}) if loop in known else None
         row = {
@@ -159,7 +159,7 @@ def group_rows(
             "parent": found.parents.get(loop),
             "coherence": link.coherence,
             "lag_s": link.lag_s,
-            "wave_amplitude_pct": wave.amplitude_pct,
+            "wave_amplitude_pct": oscillation.amplitude_pct,
             "wave_share_pct": 100.0 * share,
             "gain_pct": error * gone if isinstance(error, float) else None,
             "group_signs": signs,
@@ -214,15 +214,15 @@ def may_follow(own: Finding, other: Finding, level: float, limits: PlantLimits) 
 
 def _traced(group: Group, peers: Loops, limits: PlantLimits) -> Traced | None:
     """A group with its candidates and followers; None if no verdict of its loops is known."""
-    lags = Lags(group.waves)
+    lags = Lags(group.oscillations)
     candidates = candidates_of(lags, peers, limits)
     if not candidates:
         return None
     best = candidates[0]
     links = _links_to_source(group, best, lags, limits)
-    asked = links.keys() & peers.keys() if best.confidence_pct >= limits.source_pct else ()
+    tested = links.keys() & peers.keys() if best.confidence_pct >= limits.source_pct else ()
     lead = peers[best.loop]
-    followers = frozenset(k for k in asked if may_follow(peers[k], lead, links[k].coherence, limits))
+    followers = frozenset(k for k in tested if may_follow(peers[k], lead, links[k].coherence, limits))
     return Traced(group, candidates, links, _parents(best.loop, lags, limits), followers)
 
 
@@ -242,8 +242,8 @@ def _parents(source: str, lags: Lags, limits: PlantLimits) -> dict[str, str]:
 
     Coherence decreases along the path, because each loop adds its own noise; in large groups all follow the source.
     """
-    others = [loop for loop in lags.waves if loop != source]
-    if len(lags.waves) > MOST_IN_TREE:
+    others = [loop for loop in lags.oscillations if loop != source]
+    if len(lags.oscillations) > MOST_IN_TREE:
         return dict.fromkeys(others, source)
     best = {loop: (lags.between(source, loop).coherence, source) for loop in others}
     out: dict[str, str] = {}
@@ -257,9 +257,9 @@ def _parents(source: str, lags: Lags, limits: PlantLimits) -> dict[str, str]:
     return out
 
 
-def trace(waves: Sequence[OscillationLines], peers: Loops, limits: PlantLimits) -> list[Traced]:
+def trace(oscillations: Sequence[OscillationLines], peers: Loops, limits: PlantLimits) -> list[Traced]:
     """The groups of a night, traced to their sources, those of more loops first."""
-    found = (_traced(g, peers, limits) for g in groups_of(waves, limits))
+    found = (_traced(g, peers, limits) for g in groups_of(oscillations, limits))
     return [t for t in found if t is not None]
 
 
@@ -269,14 +269,14 @@ def followers_of(found: Sequence[Traced]) -> dict[str, tuple[SourceLoop, Oscilla
     A loop that leads one group does not follow in another where its oscillation is smaller.
     """
     out: dict[str, tuple[SourceLoop, OscillationLines]] = {}
-    leads = {t.source: t.group.waves[t.source].amplitude_pct for t in found if t.followers}
+    leads = {t.source: t.group.oscillations[t.source].amplitude_pct for t in found if t.followers}
     for t in found:
-        waves = t.group.waves
+        oscillations = t.group.oscillations
         for loop in t.followers:
-            size = waves[loop].amplitude_pct
+            size = oscillations[loop].amplitude_pct
             if leads.get(loop, 0.0) < size and (loop not in out or size > out[loop][1].amplitude_pct):
-                out[loop] = t.links[loop], waves[loop]
-    return {loop: (_rooted(loop, out), wave) for loop, (_, wave) in out.items()}
+                out[loop] = t.links[loop], oscillations[loop]
+    return {loop: (_rooted(loop, out), oscillation) for loop, (_, oscillation) in out.items()}
 
 
 def _rooted(loop: str, found: Mapping[str, tuple[SourceLoop, OscillationLines]]) -> SourceLoop:

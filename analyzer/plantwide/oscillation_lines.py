@@ -19,7 +19,8 @@ from analyzer.loop.oscillation.detection import Oscillations, peaks
 from identification.record import Floats
 from identification.signals.spectrum import Complex, Spectrum, locked_harmonic, peak_prominence
 
-WAVES = 8  # Periods of a loop that are compared with those of others, at most: more were never shared
+MOST_OSCILLATIONS = 8
+"""Periods of a loop that are compared with those of others, at most: more were never shared."""
 
 REACH = 1.35
 """Factor to either side of a period's frequency up to which lines are kept, for neighbours whose period
@@ -35,7 +36,7 @@ COVERED = 0.8  # Share of the common span that a record has to cover for a compa
 
 FINE = 8
 """Samples of the envelope for each line."""
-BESIDE = 6
+EXTRA_LINES = 6
 """Additional lines on either side."""
 HARMONICS = (2, 3)
 """Harmonics that are used; ours: higher ones are below the noise."""
@@ -99,7 +100,7 @@ def _centred(s: Spectrum, line: float) -> float:
     return s.duration_s / float(power @ at / power.sum())
 
 
-def _thinned_wave(error: Floats, dt_s: float, start_s: float, period_s: float) -> tuple[float, int, Floats]:
+def _thinned_error(error: Floats, dt_s: float, start_s: float, period_s: float) -> tuple[float, int, Floats]:
     """Step [s], number of the first step and means of an error at 12 to 24 steps per period, the last ones.
 
     Steps are the sample interval times a power of two and begin at whole multiples of themselves, so that those of
@@ -120,17 +121,17 @@ def in_steps(x: Floats, first: int, few: int) -> tuple[int, Floats]:
 
 
 def _cut(
-    s: Spectrum, power: Floats, loop: str, start_s: float, error: Floats, asked: tuple[float, int, bool]
+    s: Spectrum, power: Floats, loop: str, start_s: float, error: Floats, wanted: tuple[float, int, bool]
 ) -> OscillationLines | None:
     """The lines near one period of a loop's error, None if the spectrum has too few.
 
-    power : of all lines; asked : period [s], harmonic and whether the loop alone shows the oscillation.
+    power : of all lines; wanted : period [s], harmonic and whether the loop alone shows the oscillation.
     """
-    period_s, harmonic, own = asked
+    period_s, harmonic, own = wanted
     line = s.duration_s / period_s
-    low = max(math.floor(line / REACH) - BESIDE, 0)
-    high = min(math.ceil(line * REACH) + BESIDE, s.lines.size - 1)
-    if line * 1.1 > s.lines.size - 1 or high - low < 2 * BESIDE:
+    low = max(math.floor(line / REACH) - EXTRA_LINES, 0)
+    high = min(math.ceil(line * REACH) + EXTRA_LINES, s.lines.size - 1)
+    if line * 1.1 > s.lines.size - 1 or high - low < 2 * EXTRA_LINES:
         return None
     near = slice(math.floor(line / APART), math.ceil(line * APART) + 1)
     above = float(power[max(math.ceil(line / (2 * APART)), 1) :].sum())
@@ -146,7 +147,7 @@ def _cut(
         float(power[near].sum()) / above if above > 0 else 0.0,
         math.hypot(*(locked_harmonic(s, period_s, m) for m in HARMONICS)),
         (s.lines[low : high + 1] * (2.0 / s.n)).astype(np.complex64),
-        *_thinned_wave(error, s.dt_s, start_s, period_s),
+        *_thinned_error(error, s.dt_s, start_s, period_s),
     )
 
 
@@ -171,22 +172,22 @@ def error_lines_of(
         period = _centred(s, float(b.line[k]))
         if all(abs(math.log(period / p)) > math.log(APART) for p, *_ in wanted):
             wanted.append((period, 1, False))
-        if len(wanted) >= WAVES:
+        if len(wanted) >= MOST_OSCILLATIONS:
             break
     error, power = irfft(s.lines, s.n), s.lines.real**2 + s.lines.imag**2
-    cut = (_cut(s, power, loop, end_s - s.duration_s, error, asked) for asked in wanted)
+    cut = (_cut(s, power, loop, end_s - s.duration_s, error, one) for one in wanted)
     return tuple(w for w in cut if w is not None)
 
 
 SCALARS = [f.name for f in fields(OscillationLines) if f.name not in ("lines", "trend")]
 
 
-def waves_table(waves: Sequence[OscillationLines]) -> pa.Table:
+def oscillation_table(oscillations: Sequence[OscillationLines]) -> pa.Table:
     """One row per oscillation."""
-    columns = {name: [getattr(w, name) for w in waves] for name in SCALARS}
-    real = [w.lines.real.astype(np.float32) for w in waves]
-    imag = [w.lines.imag.astype(np.float32) for w in waves]
-    trend = [w.trend.astype(np.float32) for w in waves]
+    columns = {name: [getattr(w, name) for w in oscillations] for name in SCALARS}
+    real = [w.lines.real.astype(np.float32) for w in oscillations]
+    imag = [w.lines.imag.astype(np.float32) for w in oscillations]
+    trend = [w.trend.astype(np.float32) for w in oscillations]
     return pa.table({**columns, "real": real, "imag": imag, "trend": trend})
 
 
@@ -209,7 +210,7 @@ class Laid:
         return self[:] if dtype is None else self[:].astype(dtype)
 
 
-def waves_in(tables: Iterable[pa.Table], file: BinaryIO | None = None) -> list[OscillationLines]:
+def oscillations_in(tables: Iterable[pa.Table], file: BinaryIO | None = None) -> list[OscillationLines]:
     """The oscillations of some tables; with a file their lines and trends stay in it, to save memory."""
     found = []
     for table in tables:
@@ -222,39 +223,46 @@ def waves_in(tables: Iterable[pa.Table], file: BinaryIO | None = None) -> list[O
     return found
 
 
-def on_one_clock(waves: Sequence[OscillationLines]) -> list[OscillationLines]:
+def on_one_clock(oscillations: Sequence[OscillationLines]) -> list[OscillationLines]:
     """The comparable oscillations, all over the span of most of them."""
-    if not waves:
+    if not oscillations:
         return []
-    counted = Counter((w.start_s, w.duration_s) for w in waves)
+    counted = Counter((w.start_s, w.duration_s) for w in oscillations)
     span = max(counted, key=lambda span: (counted[span], span[1]))
-    moved = (_on_span(w, span) for w in waves)
+    moved = (_on_span(w, span) for w in oscillations)
     return [w for w in moved if w is not None]
 
 
-def _on_span(wave: OscillationLines, span: tuple[float, float]) -> OscillationLines | None:
+def _on_span(oscillation: OscillationLines, span: tuple[float, float]) -> OscillationLines | None:
     """The lines of an oscillation over another span, start and duration [s]; None if its record covers too little of
     it."""
     start, length = span
-    if abs(wave.start_s - start) + abs(wave.duration_s - length) <= SAME * wave.period_s:
-        return wave
-    begin, end = max(start, wave.start_s), min(start + length, wave.start_s + wave.duration_s)
+    if abs(oscillation.start_s - start) + abs(oscillation.duration_s - length) <= SAME * oscillation.period_s:
+        return oscillation
+    begin, end = (
+        max(start, oscillation.start_s),
+        min(start + length, oscillation.start_s + oscillation.duration_s),
+    )
     if end - begin < COVERED * length:
         return None
-    count = wave.lines.size
+    count = oscillation.lines.size
     size = next_fast_len(FINE * count)
     padded = np.zeros(size, dtype=np.complex128)
-    padded[:count] = wave.lines
+    padded[:count] = oscillation.lines
     envelope = ifft(padded) * size  # of the lines from wave.first on
-    fresh = next_fast_len(max(math.ceil(FINE * count * length / wave.duration_s), 16))
+    fresh = next_fast_len(max(math.ceil(FINE * count * length / oscillation.duration_s), 16))
     t = start + np.arange(fresh) * (length / fresh)
-    at = (t - wave.start_s) / wave.duration_s * size
+    at = (t - oscillation.start_s) / oscillation.duration_s * size
     inside = (at >= 0) & (at <= size - 1)
     real = np.interp(at, np.arange(size), envelope.real)
     imag = np.interp(at, np.arange(size), envelope.imag)
     z = np.where(inside, real + 1j * imag, 0.0)
-    low = math.ceil(wave.first * length / wave.duration_s)
-    turns = wave.first * (t - wave.start_s) / wave.duration_s - low * (t - start) / length
+    low = math.ceil(oscillation.first * length / oscillation.duration_s)
+    turns = (
+        oscillation.first * (t - oscillation.start_s) / oscillation.duration_s - low * (t - start) / length
+    )
     lines = fft(z * np.exp(2j * np.pi * turns)) / fresh
-    most = max(math.floor((wave.first + count) * length / wave.duration_s) - low, 1)
-    return replace(wave, start_s=start, duration_s=length, first=low, lines=lines[:most].astype(np.complex64))
+    most = max(math.floor((oscillation.first + count) * length / oscillation.duration_s) - low, 1)
+    return replace(
+        oscillation, start_s=start, duration_s=length, first=low, lines=lines[:most].astype(np.complex64)
+    )

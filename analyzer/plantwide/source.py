@@ -48,7 +48,7 @@ class Candidate:
 
 
 def _first_guess(
-    waves: Sequence[OscillationLines], peers: Mapping[str, Finding], most: int
+    oscillations: Sequence[OscillationLines], peers: Mapping[str, Finding], most: int
 ) -> list[OscillationLines]:
     """The oscillations of the most likely candidates, up to a number."""
 
@@ -57,7 +57,7 @@ def _first_guess(
         valve = own.cause is Cause.VALVE
         return -(own.number("evidence") if valve else _tuning_share(own)), -w.prominence
 
-    known = [w for w in waves if w.loop in peers]
+    known = [w for w in oscillations if w.loop in peers]
     by_verdict, by_clearness = sorted(known, key=rank), sorted(known, key=lambda w: -w.prominence)
     chosen = {w.loop: w for w in (*by_verdict[: most // 2], *by_clearness)}
     return list(chosen.values())[:most]
@@ -92,53 +92,53 @@ def candidates_of(lags: Lags, peers: Mapping[str, Finding], limits: PlantLimits)
 
     lags : of the group's oscillations, on one clock; peers : verdicts by loop; a loop without one is no candidate.
     """
-    waves = _first_guess(list(lags.waves.values()), peers, CANDIDATES)
-    if not waves:
+    oscillations = _first_guess(list(lags.oscillations.values()), peers, CANDIDATES)
+    if not oscillations:
         return ()
-    signs = _signs_by_name(waves, [peers[w.loop] for w in waves], lags, limits)
+    signs = _signs_by_name(oscillations, [peers[w.loop] for w in oscillations], lags, limits)
     valves = any(s["valve"] > 0 for s in signs)
     seen = 1.0 - (limits.unseen_beside_valve_pct if valves else limits.unseen_pct) / 100.0
     odds = np.array([sum(getattr(limits, f"sign_{k}") * v for k, v in s.items()) for s in signs])
     chance = np.exp(odds - odds.max())
     pct = 100.0 * seen * chance / chance.sum()
-    found = [Candidate(w.loop, s, float(p)) for w, s, p in zip(waves, signs, pct, strict=True)]
+    found = [Candidate(w.loop, s, float(p)) for w, s, p in zip(oscillations, signs, pct, strict=True)]
     return tuple(sorted(found, key=lambda c: (-c.confidence_pct, c.loop)))
 
 
 def _signs_by_name(
-    waves: Sequence[OscillationLines], peers: Sequence[Finding], lags: Lags, limits: PlantLimits
+    oscillations: Sequence[OscillationLines], peers: Sequence[Finding], lags: Lags, limits: PlantLimits
 ) -> list[dict[str, float]]:
     """The criteria of each candidate by name."""
-    first, shared = _leads([w.loop for w in waves], lags, limits)
+    first, shared = _leads([w.loop for w in oscillations], lags, limits)
     own = [p.number("evidence") if p.cause is Cause.VALVE else 0.0 for p in peers]
     most = math.log1p(MUCH_EVIDENCE)
     columns: dict[str, Sequence[float] | Floats] = {
         "valve": [min(math.log1p(max(x, 0.0)) / most, 1.0) for x in own],
         "best_valve": _relative(np.array(own)),
         "tuning": [(p.cause is Cause.TUNING) * _tuning_share(p) for p in peers],
-        "oscillates": [w.own and w.harmonic == 1 for w in waves],
+        "oscillates": [w.own and w.harmonic == 1 for w in oscillations],
         "first": first,
-        "foresees": prediction_balance(waves),
+        "foresees": prediction_balance(oscillations),
         "central": _relative(shared),
-        "clear": _relative(np.log(np.maximum([w.prominence for w in waves], 1.0))),
-        "share": [min(w.share, 1.0) for w in waves],
-        "nonlinear": _relative(np.array([w.nonlinearity for w in waves])),
+        "clear": _relative(np.log(np.maximum([w.prominence for w in oscillations], 1.0))),
+        "share": [min(w.share, 1.0) for w in oscillations],
+        "nonlinear": _relative(np.array([w.nonlinearity for w in oscillations])),
     }
-    return [{name: float(x[i]) for name, x in columns.items()} for i in range(len(waves))]
+    return [{name: float(x[i]) for name, x in columns.items()} for i in range(len(oscillations))]
 
 
 class Lags:
     """Lags between pairs of loops; each is computed once."""
 
-    def __init__(self, waves: Mapping[str, OscillationLines]) -> None:
-        self.waves = waves
+    def __init__(self, oscillations: Mapping[str, OscillationLines]) -> None:
+        self.oscillations = oscillations
         self._known: dict[tuple[str, str], Delay] = {}
 
     def between(self, one: str, other: str) -> Delay:
         """Lag of the second loop's oscillation behind the first one's."""
         pair = one, other
         if pair not in self._known:
-            self._known[pair] = _lag(self.waves[one], self.waves[other])
+            self._known[pair] = _lag(self.oscillations[one], self.oscillations[other])
         return self._known[pair]
 
 
@@ -152,12 +152,14 @@ def _lag(one: OscillationLines, other: OscillationLines) -> Delay:
     return lag(x, y, one.duration_s, max(LAG_PERIODS * one.period_s, LAG_LEAST_S))
 
 
-def _foreseeing(waves: Sequence[OscillationLines], asked: int | None = None) -> tuple[list[int], Floats]:
+def _foreseeing(
+    oscillations: Sequence[OscillationLines], leading: int | None = None
+) -> tuple[list[int], Floats]:
     """Oscillations whose trends have common steps, and Granger's F of each on each, or of the pairs of the first
-    `asked` with the later ones, shape (k, k); none if fewer than two have them, or over too few steps."""
-    step = max((w.step_s for w in waves if w.trend.size), default=0.0)
+    `leading` with the later ones, shape (k, k); none if fewer than two have them, or over too few steps."""
+    step = max((w.step_s for w in oscillations if w.trend.size), default=0.0)
     found: list[tuple[int, int, Floats]] = []
-    for i, w in enumerate(waves):
+    for i, w in enumerate(oscillations):
         few = round(step / w.step_s) if w.trend.size else 0
         if few < 1 or abs(few * w.step_s / step - 1.0) > 1e-6:
             continue
@@ -168,13 +170,13 @@ def _foreseeing(waves: Sequence[OscillationLines], asked: int | None = None) -> 
         return [], np.zeros((0, 0))
     trends = np.array([x[begin - first : end - first] for _, first, x in found], float)
     known = [i for i, *_ in found]
-    return known, granger_f(trends, FORESEEN, asked and sum(i < asked for i in known))
+    return known, granger_f(trends, FORESEEN, leading and sum(i < leading for i in known))
 
 
-def prediction_balance(waves: Sequence[OscillationLines]) -> Floats:
+def prediction_balance(oscillations: Sequence[OscillationLines]) -> Floats:
     """Mean over the others of how much better each predicts them than they predict it (-1 to 1), by Granger's F."""
-    out = np.zeros(len(waves))
-    known, f = _foreseeing(waves)
+    out = np.zeros(len(oscillations))
+    known, f = _foreseeing(oscillations)
     if not known:
         return out
     clear = np.maximum(f, f.T) >= LEAST_F

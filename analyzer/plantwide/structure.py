@@ -100,17 +100,17 @@ def links_of(moves: Sequence[Moves], limits: PlantLimits) -> dict[str, Link]:
 
 def _best(moves: Sequence[Moves], role: str, tie: Tie, least: float) -> dict[str, Link]:
     """The loop whose signal agrees best with each set point, by at least `least` [-]."""
-    asked = [m for m in moves if m.sp.size]
+    slaves = [m for m in moves if m.sp.size]
     given = [m for m in moves if getattr(m, role).size]
-    if not asked or not given:
+    if not slaves or not given:
         return {}
     begin = min(m.first for m in moves)
     size = max(m.first - begin + max(m.sp.size, m.pv.size, m.op.size) for m in moves)
     signals = _on_one_clock(given, role, begin, size)
     names = np.array([m.loop for m in given])
     out = {}
-    for k in range(0, len(asked), ROWS):
-        part = asked[k : k + ROWS]
+    for k in range(0, len(slaves), ROWS):
+        part = slaves[k : k + ROWS]
         level = np.abs(_on_one_clock(part, "sp", begin, size) @ signals.T)
         level[np.array([m.loop for m in part])[:, None] == names[None]] = 0.0
         for m, row in zip(part, level, strict=True):

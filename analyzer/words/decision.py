@@ -55,8 +55,8 @@ def decided(data: Mapping[str, Any]) -> str:
     if row is None:
         return ""
     cause = row["cause"] or "not reported"
-    said = f"The night of {row['night']} found: cause {cause}{_fault(row)}; {row['reason'] or 'no reason'}."
-    return f"{said} Action: {row['action'] or 'none'}{_due(row)}. {_sentence(row['do'])}".strip()
+    text = f"The night of {row['night']} found: cause {cause}{_fault(row)}; {row['reason'] or 'no reason'}."
+    return f"{text} Action: {row['action'] or 'none'}{_due(row)}. {_sentence(row['do'])}".strip()
 
 
 def decision_lines(row: Row) -> list[str]:

@@ -58,22 +58,22 @@ def estimate_text(name: str, e: Estimate) -> str:
 
 def model_text(model: Pooled) -> str:
     """A model in one clause, with 90 % intervals."""
-    e, said = model.estimates, []
+    e, texts = model.estimates, []
     size = e.get("gain") or e["slope_pct_per_s"]
     name = "gain" if "gain" in e else "gain over time"
-    said.append(f"{name} {number(size.value)} ({number(size.low)} to {number(size.high)}) {size.unit}")
+    texts.append(f"{name} {number(size.value)} ({number(size.low)} to {number(size.high)}) {size.unit}")
     if "second_lag_s" in e:
-        said.append(f"lags {duration(e['time_constant_s'].value)} and {duration(e['second_lag_s'].value)}")
+        texts.append(f"lags {duration(e['time_constant_s'].value)} and {duration(e['second_lag_s'].value)}")
     elif "lags_s" in e:
         lag = e["lags_s"]
-        said.append(f"time constant {duration(lag.value)} ({number(lag.low)} to {number(lag.high)} s)")
+        texts.append(f"time constant {duration(lag.value)} ({number(lag.low)} to {number(lag.high)} s)")
     if model.kind is Kind.INVERSE:
-        said.append(f"inverse response {duration(e['zero_s'].value)}")
+        texts.append(f"inverse response {duration(e['zero_s'].value)}")
     dead = e["dead_time_s"]
-    said.append(f"dead time {duration(dead.value)} ({number(dead.low)} to {number(dead.high)} s)")
+    texts.append(f"dead time {duration(dead.value)} ({number(dead.low)} to {number(dead.high)} s)")
     if "backlash_pct" in e:
-        said.append(f"backlash {number(e['backlash_pct'].value)} % of OP")
-    return ", ".join(said)
+        texts.append(f"backlash {number(e['backlash_pct'].value)} % of OP")
+    return ", ".join(texts)
 
 
 def in_a_clause(of: ExperimentResults) -> str:

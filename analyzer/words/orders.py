@@ -105,15 +105,15 @@ def order(row: Row) -> tuple[tuple[str, str], ...]:
     """Lead and text of three lines, '' for an empty one; none for a night without advice."""
     if not row["action"]:
         return ()
-    said = {name: row.get(name) or "" for name in ("loop", "advice", "reason")}
-    said |= {"form": row.get("form") or "ideal", "period": duration(row.get("period_s"))}
-    said |= {"source": row.get("source_loop") or "the loop that it follows"}
-    said |= {"lack": texts("lacks")[row.get("lack") or ""].format(**said)}
+    values = {name: row.get(name) or "" for name in ("loop", "advice", "reason")}
+    values |= {"form": row.get("form") or "ideal", "period": duration(row.get("period_s"))}
+    values |= {"source": row.get("source_loop") or "the loop that it follows"}
+    values |= {"lack": texts("lacks")[row.get("lack") or ""].format(**values)}
     if row["action"] == Action.REPAIR_VALVE:
-        said |= dict(zip(("step", "answer"), stroke(row), strict=True))
+        values |= dict(zip(("step", "answer"), stroke(row), strict=True))
     if row["action"] == Action.RETUNE:
-        said |= {"settings": changed_settings(row), "expected": _expected(row)}
-    parts = {part: text.format(**said) for part, text in texts("orders")[case_of(row)].items()}
+        values |= {"settings": changed_settings(row), "expected": _expected(row)}
+    parts = {part: text.format(**values) for part, text in texts("orders")[case_of(row)].items()}
     return ("Do", parts["do"]), ("Look for", parts["look"] or parts.get("else", "")), ("Then", parts["after"])
 
 
@@ -127,10 +127,10 @@ def kind_of_work(row: Row) -> str:
     return kind if kind in texts("work") else ""
 
 
-def asked(work: str, rows: Sequence[Row], names: str) -> str:
+def work_sentence(work: str, rows: Sequence[Row], names: str) -> str:
     """The sentence on a kind of work for some loops, listed in `names`."""
     sticks = sum(r["valve_fault"] == Fault.STICTION for r in rows)
     kinds = {len(rows): "has stiction", 0: "has backlash"}
-    said, period = texts("work")[work], duration(rows[0]["period_s"])
-    text = said["one"] if len(rows) == 1 else said.get("several", said["one"])
+    variants, period = texts("work")[work], duration(rows[0]["period_s"])
+    text = variants["one"] if len(rows) == 1 else variants.get("several", variants["one"])
     return str(text.format(names=names, fault=kinds.get(sticks, "has stiction or backlash"), period=period))

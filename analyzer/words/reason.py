@@ -56,8 +56,8 @@ def reason(found: Finding) -> str:
     known = (
         {Lane.MANUAL} if found.lack is MissingData.AUTOMATIC else set()
     )  # the missing data have been reported already
-    said = [LANE_TEXTS[lane](found) for lane in found.lanes if lane in LANE_TEXTS and lane not in known]
-    text = joined(_whole(found), *said)
+    clauses = [LANE_TEXTS[lane](found) for lane in found.lanes if lane in LANE_TEXTS and lane not in known]
+    text = joined(_whole(found), *clauses)
     changed = found.text("settings_changed")
     if not changed:
         return text
@@ -149,16 +149,16 @@ def below_first(below: Finding, tie: str = "master") -> str:
 
 def joined(*clauses: str | None) -> str:
     """Clauses joined by semicolons, without empty ones; a full stop at the end of a clause is removed."""
-    said = ((clause or "").strip() for clause in clauses)
-    kept = (text if text[-2:] == ".." else text.removesuffix(".").strip() for text in said)
+    texts = ((clause or "").strip() for clause in clauses)
+    kept = (text if text[-2:] == ".." else text.removesuffix(".").strip() for text in texts)
     return "; ".join(filter(None, kept))
 
 
 def sign_parts(sign: Sign) -> SignText:
     """A sign in words and figures."""
     which, *figures = SIGN_TEXTS[sign.kind](*sign.figures)
-    said, shown = sentences("signs")[which], sentences("figures_of_signs").get(which, "")
-    return said.format(*figures), shown.format(*figures)
+    text, figures_text = sentences("signs")[which], sentences("figures_of_signs").get(which, "")
+    return text.format(*figures), figures_text.format(*figures)
 
 
 def sign_text(sign: Sign) -> str:
@@ -176,8 +176,8 @@ def as_stored(sign: Sign) -> dict[str, Any]:
     """A sign as stored; only those of a cycle have a name."""
     text, figures = sign_parts(sign)
     name = "" if sign.kind in UNNAMED else sign.kind
-    told = {"points_to": sign.points_to, "strength": sign.strength}
-    return told | {"text": text, "name": name, "figures": figures}
+    stored = {"points_to": sign.points_to, "strength": sign.strength}
+    return stored | {"text": text, "name": name, "figures": figures}
 
 
 def _evidence(nat: float, agreeing: float = 0.0, count: int | None = None) -> Chosen:

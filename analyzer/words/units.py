@@ -105,11 +105,11 @@ def intervals_of(pid: Pid, law: FreeLaw | None, spec: LoopSpec, pv_span: float) 
         return ""
     kps = [replace(law.found, kp=x) for x in (law.kp.low, law.kp.high)]
     tis = [replace(law.found, ti_s=x) for x in (law.ti_s.low, law.ti_s.high)]
-    said = []
+    intervals = []
     for at, (name, pids) in enumerate((("Kp", kps), ("Ti", tis))):
         low, high = sorted(as_stated(pid, spec, pv_span)[at] for pid in pids)
-        said += [f"{name} {number(low)} to {number(high)}"] if low < high else []
-    return f" (90 % intervals: {', '.join(said)})" if said else ""
+        intervals += [f"{name} {number(low)} to {number(high)}"] if low < high else []
+    return f" (90 % intervals: {', '.join(intervals)})" if intervals else ""
 
 
 def corrected_columns(stated: Pid, shown: Pid, spec: LoopSpec, pv_span: float) -> str:

@@ -121,9 +121,9 @@ class Shown:
 
     other, settings that differ from the stated ones, None if they agree or the record is not sufficient; detected,
     the stated ones with the controller's further terms, or the recorded ones if none are stated, None if the record
-    shows no more than is stated; scheduled_over, the signal, OP, PV or SP, that schedules the gain, so that the stated
-    gain is valid only in a part of its range, None if there is none; law, the record's own law with intervals, where
-    it is reported.
+    shows no more than is stated; scheduled_over, the signal, OP, PV or SP, that schedules the gain, so that the
+    stated gain is valid only in a part of its range, None if there is none; law, the record's own law with intervals,
+    where it is reported.
     """
 
     other: Pid | None = None

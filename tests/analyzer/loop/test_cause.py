@@ -286,7 +286,7 @@ def traced(*found: Assessment) -> dict[str, str]:
     for a in found:
         m = a.verdict.measured
         peers[a.loop] = peer(a.verdict.cause, m.evidence if m else 0.0, a.verdict.confidence["tuning"])
-    oscillations = [w for a in found for w in a.waves]
+    oscillations = [w for a in found for w in a.oscillation_lines]
     followers = followers_of(trace(oscillations, peers, CONFIG.plant))
     return {loop: source.loop for loop, (source, _) in followers.items()}
 

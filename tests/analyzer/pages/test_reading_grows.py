@@ -11,7 +11,7 @@ import pytest
 
 from analyzer.columns import NIGHTS
 from analyzer.pages import night as night_pages
-from analyzer.pages.reading import told_of
+from analyzer.pages.reading import remembered_columns
 from analyzer.store.store import Store
 from analyzer.store.table import read_stored, rows_table, write_table
 
@@ -48,9 +48,9 @@ def test_pages_of_many_nights_read_each_night_before_them_once(
 
     def counted(store: Store, night: str) -> list[dict[str, object]]:
         read[night] += 1
-        return told_of(store, night)
+        return remembered_columns(store, night)
 
-    monkeypatch.setattr(night_pages, "told_of", counted)
+    monkeypatch.setattr(night_pages, "remembered_columns", counted)
     pages = list(night_pages.dated_pages(store, None, lambda _: False))
     assert [page.name for page in pages] == [f"morning-2026-03-0{k}" for k in range(2, 9)]
     assert read == {f"2026-03-0{k}": 1 for k in range(2, 8)}

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from analyzer.cli import main
 from analyzer.pages.reading import read_night
-from analyzer.pages.work import said_since, sides, work_page
+from analyzer.pages.work import result_since, sides, work_page
 from analyzer.store import notes
 from analyzer.store.notes import Note, work_on
 from analyzer.store.store import Store
@@ -79,12 +79,12 @@ def test_the_nights_since_are_compared_with_those_before() -> None:
         "2026-03-05",
         "2026-03-06",
     ]
-    text = said_since(done, both)
+    text = result_since(done, both)
     assert (
         text == "2 nights: no longer oscillates, average absolute error \u221250 %, valve travel \u221250 %"
     )
-    assert said_since(work_on([Note("A", 1.0, "seen")]), both) == ""
-    assert said_since(done, sides(rows[:3], "2026-03-04")) == "no night since"
+    assert result_since(work_on([Note("A", 1.0, "seen")]), both) == ""
+    assert result_since(done, sides(rows[:3], "2026-03-04")) == "no night since"
 
 
 def test_the_page_lists_open_work_before_finished_work_with_its_gain(store: Store) -> None:

@@ -13,7 +13,12 @@ from analyzer.loop.decisions import Cause, Finding
 from analyzer.loop.oscillation.detection import detect
 from analyzer.plantwide.groups import Group, groups_of
 from analyzer.plantwide.night import Traced, followers_of, may_follow, trace
-from analyzer.plantwide.oscillation_lines import OscillationLines, error_lines_of, waves_in, waves_table
+from analyzer.plantwide.oscillation_lines import (
+    OscillationLines,
+    error_lines_of,
+    oscillation_table,
+    oscillations_in,
+)
 from proofs.plant import CONFIG, START_S, peer, record
 
 HOURS_8 = 28_800
@@ -205,7 +210,7 @@ def test_harmonics_of_one_source_are_one_group():
 def test_oscillations_are_unchanged_by_the_store():
     """Oscillations that are written as a table and read back have exactly the same lines."""
     oscillations = [*loop("A", oscillation(12)), *loop("B", oscillation(13, period=70.0), seed=2)]
-    back = waves_in([waves_table(oscillations)])
+    back = oscillations_in([oscillation_table(oscillations)])
     assert [(w.loop, w.period_s, w.own) for w in back] == [(w.loop, w.period_s, w.own) for w in oscillations]
     for old, new in zip(oscillations, back, strict=True):
         np.testing.assert_array_equal(old.lines, new.lines)
