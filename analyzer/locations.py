@@ -259,6 +259,6 @@ def _state(url: Any) -> tuple[object, ...]:
 def fetch_missing(path: Path, origins: Mapping[Path, str]) -> None:
     """Copy a file missing on this machine: a worker of a cluster has none of the copies made elsewhere."""
     if path in origins and not path.exists():
-        made = path.parent
+        folder = path.parent
         _copy(place(origins[path]), path)
-        atexit.register(shutil.rmtree, made, ignore_errors=True)
+        atexit.register(shutil.rmtree, folder, ignore_errors=True)

@@ -305,8 +305,8 @@ def _of_calm(now: Belief, own: NightDecision, limits: BeliefLimits) -> NightDeci
         return NightDecision(Cause.VALVE, confidence, fault, None, Action.REPAIR_VALVE, due)
     if own.cause is not Cause.VALVE:
         return own
-    left = Action.NONE if own.action is Action.REPAIR_VALVE else own.action
-    return NightDecision(Cause.NONE, own.confidence, Fault.NONE, None, left)
+    remaining_action = Action.NONE if own.action is Action.REPAIR_VALVE else own.action
+    return NightDecision(Cause.NONE, own.confidence, Fault.NONE, None, remaining_action)
 
 
 def _of_cycle(now: Belief, own: NightDecision, limits: BeliefLimits) -> NightDecision:

@@ -119,11 +119,11 @@ def _usual_size(before: CycleBelief, significance: float, limits: BeliefLimits) 
     if before.usual is None:
         return replace(before, usual=now, shift=0.0)
     beyond = now - before.usual
-    way = 0 if abs(beyond) < math.log(limits.another_size) else int(math.copysign(1.0, beyond))
-    off = way if way * before.off <= 0 else before.off + way
+    direction = 0 if abs(beyond) < math.log(limits.another_size) else int(math.copysign(1.0, beyond))
+    off = direction if direction * before.off <= 0 else before.off + direction
     if abs(off) >= limits.confirmed:
         return replace(before, usual=now, off=0, shift=math.exp(beyond))
-    usual = before.usual if way else before.usual + beyond / min(before.nights + 1, RECENT)
+    usual = before.usual if direction else before.usual + beyond / min(before.nights + 1, RECENT)
     return replace(before, usual=usual, off=off, shift=0.0)
 
 

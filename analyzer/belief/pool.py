@@ -58,9 +58,9 @@ class Pool:
         if self.weight <= 0.0:
             return None
         mean = self.first / self.weight
-        left = self.second - self.first * mean - max(self.count - 1.0, 0.0)
+        excess = self.second - self.first * mean - max(self.count - 1.0, 0.0)
         free = self.weight - self.squares / self.weight
-        between = max(left / free, 0.0) if free > 1e-9 * self.weight and self.count > 1.0 else 0.0
+        between = max(excess / free, 0.0) if free > 1e-9 * self.weight and self.count > 1.0 else 0.0
         own = self.count / self.weight
         centre = (own * mean + between * self.total / self.count) / (own + between)
         half = NINETY * math.sqrt(1.0 / self.weight + between / self.count)

@@ -190,7 +190,7 @@ def changed_at(summed: Floats, recent: Sequence[Floats], least: float, nights: i
     after, best, gain = np.zeros(summed.size), None, least
     for k in range(len(recent) - 1, -1, -1):
         after = after + recent[k]
-        apart = max(float((summed - after).max()), 0.0) + max(float(after.max()), 0.0)
-        if apart - together > gain and len(recent) - k >= nights:
-            best, gain = k, apart - together
+        separate = max(float((summed - after).max()), 0.0) + max(float(after.max()), 0.0)
+        if separate - together > gain and len(recent) - k >= nights:
+            best, gain = k, separate - together
     return best

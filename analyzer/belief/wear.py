@@ -60,10 +60,10 @@ def change_point(days: Floats, width: Floats, deviation: Floats, limits: WearLim
     if best is None or slope <= 0.0:
         return None
     spread = max(least / max(days.size - 3, 1), 1.0)  # nights differ by more than their own errors
-    grown = slope * (days[-1] - best)
+    increase = slope * (days[-1] - best)
     start = float(np.median(width[: limits.growing_nights]))
     sure = (flat - least) / spread > limits.sure
-    return best if sure and grown > limits.least_growth * start else None
+    return best if sure and increase > limits.least_growth * start else None
 
 
 def _left(design: Floats, width: Floats, weight: Floats) -> tuple[float, Floats]:
@@ -107,8 +107,8 @@ def _wear_forecast(days: Floats, width: Floats, limits: WearLimits) -> dict[str,
 
 def _day_reached(path: Floats, size: float, last: date) -> str | None:
     """The day on which a path reaches a size, None if it does not."""
-    there = np.flatnonzero(path >= size)
-    return (last + timedelta(days=int(there[0]) + 1)).isoformat() if there.size else None
+    reached = np.flatnonzero(path >= size)
+    return (last + timedelta(days=int(reached[0]) + 1)).isoformat() if reached.size else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -149,9 +149,9 @@ def opened_store(path: Path) -> Store:
     """A store with at least one night. Raises InputError if there is none."""
     from analyzer.store.store import Store
 
-    kept = Store(path)
-    kept.require()
-    return kept
+    opened = Store(path)
+    opened.require()
+    return opened
 
 
 DECIDED = click.option(

@@ -94,19 +94,21 @@ def report(
     from analyzer.pages.before_after import changes_page
     from analyzer.pages.change_cases import change_cases
 
-    limits, kept = read_config(config), opened_store(store)
-    zone = kept.zone()
+    limits, opened = read_config(config), opened_store(store)
+    zone = opened.zone()
     if not days <= MOST_DAYS:  # NaN passes the range check of the option
         raise InputError(f"--days {days}", f"1 to {MOST_DAYS}", "correct it")
     stated = _span_given(before, "--before", zone), _span_given(after, "--after", zone)
-    found, missing = change_cases(kept, _changes(kept, limits, **named), days, stated, limits.before_after)
+    found, missing = change_cases(
+        opened, _changes(opened, limits, **named), days, stated, limits.before_after
+    )
     if not found:
         why = "; ".join(f"{tag}: {reason}" for tag, reason in missing) or "no change found"
         raise InputError(why, "loops and times that the store holds", "check the tags and times")
     span = "The stated spans" if before or after else f"{days:g} days"
     subtitle = f"{span} before and after the change, from {store.name}."
     page = changes_page(found, missing, subtitle, named["find"], zone)
-    write(kept, [page], form, single_file, out)
+    write(opened, [page], form, single_file, out)
     for tag, reason in missing:
         print_visible(f"{tag}: {reason}", err=True)
     sys.exit(EXIT_SOME_FAILED if missing else 0)
@@ -171,9 +173,9 @@ def pages(
     from analyzer.pages import night as night_pages
     from reports.folder import forget_stale
 
-    kept = opened_store(store)
+    opened = opened_store(store)
     if tag is not None:
-        write(kept, night_pages.pages_of_loop(kept, night, tag), form, single_file, out)
+        write(opened, night_pages.pages_of_loop(opened, night, tag), form, single_file, out)
         return
 
     def page_of(night: str) -> Path:
@@ -181,11 +183,11 @@ def pages(
 
     def is_up_to_date(night: str) -> bool:
         """Whether a night's dated page was written after its results."""
-        page, results = page_of(night), kept.file("nights", night)
+        page, results = page_of(night), opened.file("nights", night)
         return page.exists() and page.stat().st_mtime > results.stat().st_mtime
 
-    found = night_pages.pages_of_night(kept, night, top)
-    dated = night_pages.dated_pages(kept, night, is_up_to_date) if form == "html" else ()
-    written = write(kept, chain(found, dated), form, single_file, out)
+    found = night_pages.pages_of_night(opened, night, top)
+    dated = night_pages.dated_pages(opened, night, is_up_to_date) if form == "html" else ()
+    written = write(opened, chain(found, dated), form, single_file, out)
     if form == "html":
-        forget_stale(out, written, kept_names={page_of(night).name for night in kept.nights()})
+        forget_stale(out, written, kept_names={page_of(night).name for night in opened.nights()})

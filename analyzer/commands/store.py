@@ -61,12 +61,14 @@ def check_store(path: Path, config: Path | None) -> None:
     from analyzer.store import maintenance
     from analyzer.store.store import Store
 
-    kept, limits = Store(path), read_config(config)
+    opened, limits = Store(path), read_config(config)
     found = 0
-    for problem in (*maintenance.problems(kept), *inconsistent_beliefs(kept, limits)):
+    for problem in (*maintenance.problems(opened), *inconsistent_beliefs(opened, limits)):
         found += 1
         click.echo(f"{problem.seen}: {problem.remedy}")
-    click.echo(f"{path}: {maintenance.size_text(kept)}; " + (f"problems: {found}" if found else "no problem"))
+    click.echo(
+        f"{path}: {maintenance.size_text(opened)}; " + (f"problems: {found}" if found else "no problem")
+    )
     sys.exit(EXIT_SOME_FAILED if found else 0)
 
 
@@ -83,16 +85,16 @@ def prune(path: Path, keep: str, keep_trends: str | None, dry_run: bool) -> None
     from analyzer.store import maintenance
     from analyzer.store.lock import locked
 
-    kept = opened_store(path)
+    opened = opened_store(path)
     detail = None if keep_trends is None else days(keep_trends, "--keep-trends")
     with locked(path):
-        gone = maintenance.pruned(kept, days(keep, "--keep"), detail, dry_run)
+        pruned = maintenance.pruned(opened, days(keep, "--keep"), detail, dry_run)
     done = "would be deleted" if dry_run else "deleted"
-    for file in gone[:SHOWN]:
+    for file in pruned[:SHOWN]:
         click.echo(f"{done}: {file.relative_to(path)}")
-    if len(gone) > SHOWN:
-        click.echo(f"and {len(gone) - SHOWN} more")
-    click.echo(f"{path}: {len(gone)} files {done}, {len(kept.nights())} nights kept")
+    if len(pruned) > SHOWN:
+        click.echo(f"and {len(pruned) - SHOWN} more")
+    click.echo(f"{path}: {len(pruned)} files {done}, {len(opened.nights())} nights kept")
 
 
 @store.command()
@@ -109,12 +111,12 @@ def beliefs(path: Path, config: Path | None) -> None:
     from analyzer.config import read_config
     from analyzer.store.lock import locked
 
-    kept = opened_store(path)
+    opened = opened_store(path)
     with locked(path):
-        lost = recompute_beliefs(kept, read_config(config))
+        lost = recompute_beliefs(opened, read_config(config))
     for line in lost:
         click.echo(line)
-    click.echo(f"{path}: beliefs of {len(kept.nights())} nights computed again")
+    click.echo(f"{path}: beliefs of {len(opened.nights())} nights computed again")
     sys.exit(EXIT_SOME_FAILED if lost else 0)
 
 
@@ -149,9 +151,9 @@ def note(
     """
     from analyzer.store import notes
 
-    kept = opened_store(store)
-    night = kept.nights()[-1]
-    known = kept.read("nights", night, ["loop"]).column(0).to_pylist()
+    opened = opened_store(store)
+    night = opened.nights()[-1]
+    known = opened.read("nights", night, ["loop"]).column(0).to_pylist()
     if loop not in known:
         from difflib import get_close_matches
 
@@ -159,13 +161,13 @@ def note(
         raise InputError(f"loop {loop} is not in night {night}", f"one of its loops ({near})", "correct LOOP")
     if text is None and state is None and due is None:
         own = notes.read_notes(store).get(loop, ())
-        zone = kept.zone()
+        zone = opened.zone()
         print_visible("\n".join(n.as_line(zone) for n in own) or f"{loop}: no notes")
         return
     until, by = ("" if day is None else day.strftime("%Y-%m-%d") for day in (hide_until, due))
     written = notes.new(loop, text or state or f"due {by}", owner, until, state or "", by)
     notes.add(store, written)
-    print_visible(f"{loop}: {written.as_line(kept.zone())}")
+    print_visible(f"{loop}: {written.as_line(opened.zone())}")
 
 
 @click.command()
@@ -183,9 +185,9 @@ def summary(store: Path, night: str | None, form: str) -> None:
     from analyzer.pages.summary import summary_page
     from reports import html, markdown, plain
 
-    kept = opened_store(store)
-    zone = kept.zone()
-    old = age_note(night or kept.nights()[-1], zone)
-    found = replace(summary_page(kept, night), made=made(kept), zone=zone, subtitle=old)
+    opened = opened_store(store)
+    zone = opened.zone()
+    old = age_note(night or opened.nights()[-1], zone)
+    found = replace(summary_page(opened, night), made=made(opened), zone=zone, subtitle=old)
     draw = {"text": plain.render, "html": html.mail, "markdown": lambda p: markdown.render(p, "")}[form]
     click.echo(draw(found).rstrip("\n"))

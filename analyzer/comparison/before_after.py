@@ -176,8 +176,8 @@ def parts_of(
     own = simulated.change[name]
     days = LogRatio(0.0, measured.deviation)  # loads of comparable weeks differ as days do
     if simulated.same:
-        left, load = (measured, days) if alike else (NO_RATIO, measured)
-        return Parts(NO_RATIO, load, left, NO_RATIO)
+        residual, load = (measured, days) if alike else (NO_RATIO, measured)
+        return Parts(NO_RATIO, load, residual, NO_RATIO)
     load = days if alike else simulated.load[name]
     if alike:
         most = max(abs(part.value) for part in simulated.change.values())
@@ -188,11 +188,13 @@ def parts_of(
             (measured.value * weight[0] + sure.value * weight[1]) / sum(weight), sum(weight) ** -0.5
         )
         if abs(measured.value - sure.value) > 2.0 * math.hypot(measured.deviation, sure.deviation):
-            far = max(abs(own.value - x.value) for x in (measured, sure))
-            own = LogRatio(own.value, max(own.deviation, far / float(ndtri(0.95))))  # 90 % then includes both
+            distance = max(abs(own.value - x.value) for x in (measured, sure))
+            own = LogRatio(
+                own.value, max(own.deviation, distance / float(ndtri(0.95)))
+            )  # 90 % then includes both
     deviation = math.hypot(measured.deviation, own.deviation, 0.0 if alike else load.deviation)
-    left = LogRatio(measured.value - own.value - load.value, deviation)
-    return Parts(own, load, left, simulated.promised[name])
+    residual = LogRatio(measured.value - own.value - load.value, deviation)
+    return Parts(own, load, residual, simulated.promised[name])
 
 
 @dataclass(frozen=True, slots=True)

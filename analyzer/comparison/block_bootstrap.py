@@ -103,9 +103,9 @@ def _drift(y: Floats, design: Floats, lag: Floats, rho: float) -> tuple[float, f
     r = rho**lag if rho else np.eye(y.size)
     inverse = np.linalg.inv(r)
     information = design.T @ inverse @ design
-    rest = y - design @ np.linalg.solve(information, design.T @ inverse @ y)
+    residual = y - design @ np.linalg.solve(information, design.T @ inverse @ y)
     free = y.size - design.shape[1]
-    square = float(rest @ inverse @ rest) / free
+    square = float(residual @ inverse @ residual) / free
     likelihood = -0.5 * (np.linalg.slogdet(r)[1] + np.linalg.slogdet(information)[1] + free * np.log(square))
     weight = design[:, 1] / design[:, 1].sum() - design[:, 0] / design[:, 0].sum()
     return float(likelihood), float(square * (weight @ r @ weight))

@@ -390,16 +390,16 @@ def requested_cases(
     opened request; fault as in `case`."""
     spec, specs, series = loop_trends(plant, tag)
     judged = parts(spec, series, request.changes, request.zone)
-    kept: list[tuple[Part, Case]] = []
+    cases: list[tuple[Part, Case]] = []
     for part in judged:
         with nullcontext() if len(judged) == 1 else suppress(NotAssessedError):  # OP is constant in it
-            most = None if kept else WHOLE_SAMPLES
-            kept.append((part, case(part.spec, specs, part.series, request.config, most, fault)))
-    if not kept:
+            most = None if cases else WHOLE_SAMPLES
+            cases.append((part, case(part.spec, specs, part.series, request.config, most, fault)))
+    if not cases:
         raise NotAssessedError(f"{tag}: needs OP and PV that move in one part of its settings, has none")
-    first = kept[0][1]
-    first = replace(first, shortened=f"{parts_note([part for part, _ in kept])} {first.shortened}".strip())
-    others = {part.name: c for part, c in kept[1:]}
+    first = cases[0][1]
+    first = replace(first, shortened=f"{parts_note([part for part, _ in cases])} {first.shortened}".strip())
+    others = {part.name: c for part, c in cases[1:]}
     for path in held_out:
         elsewhere = replace(request, export=(path,), span=ALWAYS)
         others[path.name if path.name not in others else str(path)] = whole(elsewhere, tag)[0]

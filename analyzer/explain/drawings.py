@@ -168,8 +168,8 @@ def note_of(f: Feature | None) -> str:
 def spectrum_plot(e: Explained) -> Plot:
     """Spectrum of the simulation errors, as the share of the rms per octave of period."""
     pv, dt_s = recorded_pv(e), e.case.recording.dt_s
-    left = {k: pv - x for k, x in simulations(e).items() if k != "brought"}
-    lines = tuple(Line(SHORT[k], *spectrum(x, dt_s), kind=k) for k, x in left.items())
+    residuals = {k: pv - x for k, x in simulations(e).items() if k != "brought"}
+    lines = tuple(Line(SHORT[k], *spectrum(x, dt_s), kind=k) for k, x in residuals.items())
     words = "misfit-spectrum", "Spectrum of the residual", "period [s]", "% PV per octave"
     return Plot(*words, lines, (), NOTES["spectrum"], (), "x")
 

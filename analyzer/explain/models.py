@@ -118,8 +118,8 @@ def judged(data: Mapping[str, Any], found: Explanation, s: Recording, more: str 
     units = "" if unanswered(found) else wrong_units(constants(dict(data)), restored(found.plain.model.c))
     verdict = "" if units else against_plain(own, plain.rmse, AS_GOOD)
     note = "; ".join(x for x in (comparison, verdict, units, more) if x) + "."
-    fitted, held = misfit(s.pv[:cut], out[:cut], window), misfit(s.pv[cut:], out[cut:], window)
-    return UserModel(out, fitted, held, note)
+    fitted, held_out = misfit(s.pv[:cut], out[:cut], window), misfit(s.pv[cut:], out[cut:], window)
+    return UserModel(out, fitted, held_out, note)
 
 
 def against_plain(own: float, plain: float, as_good: float) -> str:

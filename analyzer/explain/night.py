@@ -107,8 +107,8 @@ def questions(plant: Plant, rows: Sequence[Mapping[str, Any]], night: Night) -> 
 
 def known(store: Store, night: str) -> list[Row]:
     """Rows of a night in the store; empty if nothing was explained."""
-    held = store.read_if_there(TABLE, night)
-    return [] if held is None else held.to_pylist()
+    table = store.read_if_there(TABLE, night)
+    return [] if table is None else table.to_pylist()
 
 
 def keep(store: Store, night: str, rows: Sequence[Row]) -> None:

@@ -59,17 +59,17 @@ def _headed(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[tuple[st
 def lined_up(rows: Rows, numeric: Sequence[int] = ()) -> list[str]:
     """Rows as lines with aligned columns, numbers to the right; the last column wraps."""
     widths = [max(map(len, cells)) for cells in zip(*rows, strict=True)]
-    left = 2 + sum(widths[:-1]) + 2 * (len(widths) - 1)
+    indent = 2 + sum(widths[:-1]) + 2 * (len(widths) - 1)
     out = []
     for row in rows:
         cells = [
             c.rjust(w) if i in numeric else c.ljust(w)
             for i, (c, w) in enumerate(zip(row, widths, strict=True))
         ]
-        last = wrap(row[-1], max(WIDTH - left, 30)) if len(cells[-1]) + left > WIDTH else [cells[-1]]
+        last = wrap(row[-1], max(WIDTH - indent, 30)) if len(cells[-1]) + indent > WIDTH else [cells[-1]]
         first, *more = last or [""]
         out.append(("  " + "  ".join([*cells[:-1], first])).rstrip())
-        out += [" " * left + m for m in more]
+        out += [" " * indent + m for m in more]
     return out
 
 

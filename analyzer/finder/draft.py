@@ -59,27 +59,27 @@ def draft(
     taken |= {tag for spec in whole for tag in spec.tags}
     free = [tag for tag in export.tags if tag not in taken]
     tags = [*free, *(tag for spec in (*whole, *open_ones) for tag in spec.tags)]
-    held = sampled(export, list(dict.fromkeys(tags)), span, report)
+    samples = sampled(export, list(dict.fromkeys(tags)), span, report)
     recorded = {spec.loop: spec for spec in open_ones}
-    rows = [_stated(held, spec, recorded.get(spec.loop)) for spec in stated]
-    rows += [_named(held, spec) for spec in whole]
-    found = by_data(held.of(free))
+    rows = [_stated(samples, spec, recorded.get(spec.loop)) for spec in stated]
+    rows += [_named(samples, spec) for spec in whole]
+    found = by_data(samples.of(free))
     rows += _joined(found, [spec for spec in named if spec.op is None])
-    return _without_ranges_of_currents(held, _with_relations(held, rows))
+    return _without_ranges_of_currents(samples, _with_relations(samples, rows))
 
 
-def _with_relations(held: Sampled, rows: Sequence[Row]) -> list[Row]:
+def _with_relations(samples: Sampled, rows: Sequence[Row]) -> list[Row]:
     """The rows with what the data show of each found loop beyond its own tags: a ratio, the scan, its rests, and
     candidates for a valve that it shares."""
     own = [k for k, row in enumerate(rows) if row.found_by in ("names", "data") and row.sure]
-    own = [k for k in own if rows[k].spec.pv in held.tags and rows[k].spec.op in held.tags]
-    if not own or len(held.values) < LEAST_BLOCKS:
+    own = [k for k in own if rows[k].spec.pv in samples.tags and rows[k].spec.op in samples.tags]
+    if not own or len(samples.values) < LEAST_BLOCKS:
         return list(rows)
     specs = [rows[k].spec for k in own]
-    pvs, ops = (held.of([str(getattr(s, role)) for s in specs]).values for role in ("pv", "op"))
+    pvs, ops = (samples.of([str(getattr(s, role)) for s in specs]).values for role in ("pv", "op"))
     taken = {tag for s in specs for tag in s.tags}
-    others = held.of([tag for tag in held.tags if tag not in taken])
-    halves_of, out, led = halves(ops, others.values), list(rows), _with_leaders(held, specs, pvs, ops)
+    others = samples.of([tag for tag in samples.tags if tag not in taken])
+    halves_of, out, led = halves(ops, others.values), list(rows), _with_leaders(samples, specs, pvs, ops)
     selects: dict[int, list[int]] = {}
     for i, j in equal_at_times(ops):
         selects.setdefault(i, []).append(j)
@@ -97,19 +97,19 @@ def _with_relations(held: Sampled, rows: Sequence[Row]) -> list[Row]:
             notes.append(f"OP is constant for {100 * resting:.0f} % of the time: in manual, or at a limit")
         scan = scan_of(ops[:, i])
         if scan is not None:
-            notes.append(f"OP moves every {scan * held.dt_s:g} s: scan_s?")
+            notes.append(f"OP moves every {scan * samples.dt_s:g} s: scan_s?")
         out[k] = replace(rows[k], spec=led[i], evidence="; ".join(notes))
     return out
 
 
 def _with_leaders(
-    held: Sampled, specs: Sequence[LoopSpec], pvs: np.ndarray, ops: np.ndarray
+    samples: Sampled, specs: Sequence[LoopSpec], pvs: np.ndarray, ops: np.ndarray
 ) -> list[LoopSpec]:
     """The rows of loops with their masters, or the loops to whose PVs their set points keep a ratio."""
-    led = [i for i, s in enumerate(specs) if s.sp in held.tags and not s.master]
+    led = [i for i, s in enumerate(specs) if s.sp in samples.tags and not s.master]
     if not led or len(specs) < 2:
         return list(specs)
-    set_points, out = held.of([str(specs[i].sp) for i in led]).values, list(specs)
+    set_points, out = samples.of([str(specs[i].sp) for i in led]).values, list(specs)
     masters, leaders = masters_of(set_points, ops, led), ratios_to(set_points, pvs, led)
     for i, master, leader in zip(led, masters, leaders, strict=True):
         if master is not None:
@@ -119,14 +119,14 @@ def _with_leaders(
     return out
 
 
-def _without_ranges_of_currents(held: Sampled, rows: Sequence[Row]) -> list[Row]:
+def _without_ranges_of_currents(samples: Sampled, rows: Sequence[Row]) -> list[Row]:
     """The rows, without a range of OP if the OPs of all found loops lie within a signal of 4 to 20 mA, as `run` takes
     them (opened.in_milliamperes): a draft that states 0 to 100 would make it percent."""
-    own = {row.spec.loop for row in rows if row.found_by in ("names", "data") and row.spec.op in held.tags}
+    own = {row.spec.loop for row in rows if row.found_by in ("names", "data") and row.spec.op in samples.tags}
     found = [row for row in rows if row.spec.loop in own]
-    if len(found) < 2 or not len(held.values):
+    if len(found) < 2 or not len(samples.values):
         return list(rows)
-    outputs = held.of([str(row.spec.op) for row in found]).values
+    outputs = samples.of([str(row.spec.op) for row in found]).values
     if not (outputs.min() >= MA_LOW and outputs.max() <= MA_HIGH):
         return list(rows)
     note = "its values lie between 4 and 20, like mA: state op_lo and op_hi"
@@ -138,13 +138,13 @@ def _without_ranges_of_currents(held: Sampled, rows: Sequence[Row]) -> list[Row]
     ]
 
 
-def _named(held: Sampled, spec: LoopSpec) -> Row:
+def _named(samples: Sampled, spec: LoopSpec) -> Row:
     """A loop by names, with type, ranges and settings from its data."""
     evidence = f"tags of one name: {', '.join(spec.tags)}"
-    known = [tag for tag in (spec.pv, spec.op, spec.sp) if tag in held.tags]
-    if known[:2] != [spec.pv, spec.op] or len(held.values) < LEAST_BLOCKS:
+    known = [tag for tag in (spec.pv, spec.op, spec.sp) if tag in samples.tags]
+    if known[:2] != [spec.pv, spec.op] or len(samples.values) < LEAST_BLOCKS:
         return Row(spec, "names", SUREST_PCT, evidence)
-    own = held.of(known)
+    own = samples.of(known)
     pair = known_pair(own.values)
     shown = _shown(own, pair)
     law = f"; {_law(own, pair)}" if pair.law_share >= LEAST_LAW_SHARE and pair.kp else ""
@@ -152,13 +152,13 @@ def _named(held: Sampled, spec: LoopSpec) -> Row:
     return Row(found, "names", SUREST_PCT, evidence + law + _beyond(shown, found.type))
 
 
-def _stated(held: Sampled, spec: LoopSpec, with_tags: LoopSpec | None) -> Row:
+def _stated(samples: Sampled, spec: LoopSpec, with_tags: LoopSpec | None) -> Row:
     """A stated loop; if it has tags but no settings, with the settings from its data."""
     own_tags = () if with_tags is None else (with_tags.pv, with_tags.op, with_tags.sp)
-    known = [tag for tag in own_tags if tag is not None and tag in held.tags]
-    if len(known) < 2 or len(held.values) < LEAST_BLOCKS:
+    known = [tag for tag in own_tags if tag is not None and tag in samples.tags]
+    if len(known) < 2 or len(samples.values) < LEAST_BLOCKS:
         return Row(spec, "stated", 100.0, "stated")
-    own = held.of(known)
+    own = samples.of(known)
     pair = known_pair(own.values)
     shown = _shown(own, pair)
     if "kp" not in shown:
@@ -177,89 +177,87 @@ def found_text(rows: Sequence[Row]) -> tuple[str, ...]:
         if row.sure
     )
     other = [row.spec.loop for row in seen if not row.sure]
-    few = ", ".join(other[:MOST_NAMES]) + (" ..." if len(other) > MOST_NAMES else "")
-    left = (
-        f"{len(other)} loops are less sure and left out ({few}); 'triage loops' writes the evidence for them"
-    )
-    return (*sure, left) if other else sure
+    names = ", ".join(other[:MOST_NAMES]) + (" ..." if len(other) > MOST_NAMES else "")
+    unsure = f"{len(other)} loops are less sure and left out ({names}); 'triage loops' writes the evidence for them"
+    return (*sure, unsure) if other else sure
 
 
-def by_data(held: Sampled) -> list[Row]:
+def by_data(samples: Sampled) -> list[Row]:
     """Loops found in the data of tags, with the position and the mode of the confident ones."""
-    pairs = found_pairs(held.values)
+    pairs = found_pairs(samples.values)
     sure = [p for p in pairs if p.sure_pct >= SURE_PCT]
-    outputs = {held.values[:, p.op].tobytes(): _name(held.tags[p.pv], held.tags[p.op]) for p in sure}
-    further = _position_and_mode(held, sure)
-    return [_row(held, pair, outputs, further.get(pair.op, {}) if pair in sure else {}) for pair in pairs]
+    outputs = {samples.values[:, p.op].tobytes(): _name(samples.tags[p.pv], samples.tags[p.op]) for p in sure}
+    further = _position_and_mode(samples, sure)
+    return [_row(samples, pair, outputs, further.get(pair.op, {}) if pair in sure else {}) for pair in pairs]
 
 
-def _position_and_mode(held: Sampled, sure: Sequence[FoundPair]) -> dict[int, dict[str, str]]:
+def _position_and_mode(samples: Sampled, sure: Sequence[FoundPair]) -> dict[int, dict[str, str]]:
     """Tags of position and mode of the confident loops, by the index of OP."""
     own = {k for p in sure for k in (p.pv, p.op, p.sp)}
-    others = [k for k in range(len(held.tags)) if k not in own]
+    others = [k for k in range(len(samples.tags)) if k not in own]
     found: dict[int, dict[str, str]] = {p.op: {} for p in sure}
-    for op, k in positions(held.values, list(found), others).items():
-        found[op]["position"] = held.tags[k]
-    candidates = {held.tags[k]: held.values[:, k] for k in others} | dict(held.texts)
+    for op, k in positions(samples.values, list(found), others).items():
+        found[op]["position"] = samples.tags[k]
+    candidates = {samples.tags[k]: samples.values[:, k] for k in others} | dict(samples.texts)
     names = [name for name, tag in candidates.items() if may_be_mode(tag)]
-    moves = {op: held.values[:, op] for op in found}
+    moves = {op: samples.values[:, op] for op in found}
     for op, k in modes(moves, [candidates[name] for name in names]).items():
         found[op]["mode"] = names[k]
     return found
 
 
-def _row(held: Sampled, pair: FoundPair, outputs: dict[bytes, str], further: dict[str, str]) -> Row:
-    name = _name(held.tags[pair.pv], held.tags[pair.op])
-    master = "" if pair.sp is None else outputs.get(held.values[:, pair.sp].tobytes(), "")
+def _row(samples: Sampled, pair: FoundPair, outputs: dict[bytes, str], further: dict[str, str]) -> Row:
+    name = _name(samples.tags[pair.pv], samples.tags[pair.op])
+    master = "" if pair.sp is None else outputs.get(samples.values[:, pair.sp].tobytes(), "")
     spec = LoopSpec(
         name,
-        type=type_of(held.tags[pair.pv]),
-        pv_unit=unit_of(held.tags[pair.pv]),
+        type=type_of(samples.tags[pair.pv]),
+        pv_unit=unit_of(samples.tags[pair.pv]),
         master="" if master == name else master,
-        sp=None if pair.sp is None else held.tags[pair.sp],
-        pv=held.tags[pair.pv],
-        op=held.tags[pair.op],
+        sp=None if pair.sp is None else samples.tags[pair.sp],
+        pv=samples.tags[pair.pv],
+        op=samples.tags[pair.op],
         position=further.get("position"),
         mode=further.get("mode"),
     )
     evidence = (
-        f"{_law(held, pair)}; {100 * pair.noise:.0f} % of their noise is common; the next best tag has "
+        f"{_law(samples, pair)}; {100 * pair.noise:.0f} % of their noise is common; the next best tag has "
     )
     evidence += f"{100 * pair.runner_up / max(pair.weight, 1e-9):.0f} % of this pair's weight"
     evidence += "" if pair.sp is None else f"; {spec.sp} is where PV is held"
     evidence += f"; {spec.op} moves at once when {spec.sp} does" if pair.answers else ""
     evidence += f"; {spec.position} has the value of {spec.op}" if spec.position else ""
     evidence += f"; {spec.op} is constant only in one value of {spec.mode}" if spec.mode else ""
-    shown = _shown(held, pair, pair.sure_pct >= SURE_PCT)
+    shown = _shown(samples, pair, pair.sure_pct >= SURE_PCT)
     return Row(replace(spec, **shown), "data", pair.sure_pct, evidence + _beyond(shown, spec.type))
 
 
-def _shown(held: Sampled, pair: FoundPair, certain: bool = True) -> dict[str, Any]:
+def _shown(samples: Sampled, pair: FoundPair, certain: bool = True) -> dict[str, Any]:
     """Columns of loops.csv from the data of a loop: recorded ranges, and settings if the law is clear; derivative and
     filter of a pair that is certain."""
-    pv, op = (held.values[:, k] for k in (pair.pv, pair.op))
+    pv, op = (samples.values[:, k] for k in (pair.pv, pair.op))
     (pv_lo, pv_hi), (op_lo, op_hi) = _extremes(pv), _extremes(op)
     if op.min() >= -WITHIN_PCT and op.max() <= 100.0 + WITHIN_PCT:
         op_lo, op_hi = 0.0, 100.0
     shown: dict[str, Any] = {"pv_lo": pv_lo, "pv_hi": pv_hi, "op_lo": op_lo, "op_hi": op_hi}
-    terms = _terms(held, pair, (pv_lo, pv_hi), (op_lo, op_hi)) if certain else {}
+    terms = _terms(samples, pair, (pv_lo, pv_hi), (op_lo, op_hi)) if certain else {}
     if terms:
         return {**shown, **terms}
     if pair.law_share < LEAST_LAW_SHARE or not pair.kp or pair.ti_samples is None:
         return shown
-    ti = 0.0 if math.isinf(pair.ti_samples) else pair.ti_samples * held.dt_s
+    ti = 0.0 if math.isinf(pair.ti_samples) else pair.ti_samples * samples.dt_s
     return {**shown, "kp": pair.kp, "ti": ti, "gain_unit": "engineering"}
 
 
 def _terms(
-    held: Sampled, pair: FoundPair, pv_range: tuple[float, float], op_range: tuple[float, float]
+    samples: Sampled, pair: FoundPair, pv_range: tuple[float, float], op_range: tuple[float, float]
 ) -> dict[str, Any]:
     """The settings of a controller with a derivative or a filter of PV; nothing for any other."""
     if pair.sp is None:
         return {}
     spans = pv_range[1] - pv_range[0], op_range[1] - op_range[0]
-    sp, pv = (100.0 * (held.values[:, k] - pv_range[0]) / spans[0] for k in (pair.sp, pair.pv))
-    found = terms_of(sp, pv, 100.0 * (held.values[:, pair.op] - op_range[0]) / spans[1], held.dt_s)
+    sp, pv = (100.0 * (samples.values[:, k] - pv_range[0]) / spans[0] for k in (pair.sp, pair.pv))
+    found = terms_of(sp, pv, 100.0 * (samples.values[:, pair.op] - op_range[0]) / spans[1], samples.dt_s)
     if found is None:
         return {}
     more = {"td": found.td_s, "td_filter": found.td_filter} if found.td_s else {}
@@ -268,16 +266,16 @@ def _terms(
     return {"kp": found.kp * spans[1] / spans[0], "ti": ti, "gain_unit": "engineering", **more}
 
 
-def _law(held: Sampled, pair: FoundPair) -> str:
+def _law(samples: Sampled, pair: FoundPair) -> str:
     """The law of a pair, in words."""
-    way = "direct" if pair.kp < 0 else "reverse"
+    action = "direct" if pair.kp < 0 else "reverse"
     law = (
-        f"{'P alone' if pair.ti_samples == math.inf else 'PI'}, {way} acting"
+        f"{'P alone' if pair.ti_samples == math.inf else 'PI'}, {action} acting"
         if pair.law_share
         else "of unknown sign"
     )
     shown = f"explains {100 * pair.law:.0f} % of its moves"
-    return f"{held.tags[pair.op]} follows {held.tags[pair.pv]} by a law ({law}) that {shown}"
+    return f"{samples.tags[pair.op]} follows {samples.tags[pair.pv]} by a law ({law}) that {shown}"
 
 
 def _beyond(shown: dict[str, Any], kind: str) -> str:
@@ -305,8 +303,10 @@ def _joined(found: Sequence[Row], open_loops: Sequence[LoopSpec]) -> list[Row]:
 
 def _name(pv: str, op: str) -> str:
     """The common prefix of both tags, if it is a name; else PV's tag."""
-    apart = next((k for k, (a, b) in enumerate(zip(pv, op, strict=False)) if a != b), min(len(pv), len(op)))
-    shared = pv[:apart].rstrip("._:/- ")
+    differs_at = next(
+        (k for k, (a, b) in enumerate(zip(pv, op, strict=False)) if a != b), min(len(pv), len(op))
+    )
+    shared = pv[:differs_at].rstrip("._:/- ")
     whole = all(len(tag) == len(shared) or not tag[len(shared)].isalnum() for tag in (pv, op))
     return shared if len(shared) > 2 and whole else pv
 

@@ -86,8 +86,8 @@ def tracked(x: Matrix, s: Matrix) -> Matrix:
     x, s = (blocks(v, width) for v in (x, s))
     x, s = x - x.mean(axis=0), s - s.mean(axis=0)
     own, moved = (x**2).mean(axis=0)[:, None], (s**2).mean(axis=0)
-    left = own + moved - 2.0 * x.T @ s / len(x)
-    size = 0.5 * np.log(np.maximum(own, TINY) / np.maximum(left, TINY))
+    residual = own + moved - 2.0 * x.T @ s / len(x)
+    size = 0.5 * np.log(np.maximum(own, TINY) / np.maximum(residual, TINY))
     return np.asarray(np.clip(np.where(moved > TINY, size, 0.0), -CERTAIN, CERTAIN))
 
 
@@ -100,9 +100,9 @@ def resting_level(pv: Matrix, op: Matrix, width: int) -> tuple[float, float]:
     columns = np.column_stack([x, np.cumsum(x) - x / 2, op])
     moved, summed, wanted = np.diff(blocks(columns, width), axis=0)[rows].T
     slope, error = fitted(wanted, moved, summed, np.ones(len(rows)))
-    rest = -slope[2] / (slope[1] or TINY)
-    off = np.hypot(error[2], rest * error[1]) / (abs(slope[1]) or TINY)
-    return float(pv.mean() + rest / width), float(off / width)
+    level = -slope[2] / (slope[1] or TINY)
+    off = np.hypot(error[2], level * error[1]) / (abs(slope[1]) or TINY)
+    return float(pv.mean() + level / width), float(off / width)
 
 
 def free_moves(op: Matrix, width: int) -> NDArray[np.int64]:

@@ -134,9 +134,9 @@ def fitted(wanted: Matrix, *columns: Matrix) -> tuple[Matrix, Matrix]:
     """Slopes of a linear regression without a constant, and their standard errors."""
     x = np.column_stack(columns)
     slope, *_ = np.linalg.lstsq(x, wanted, rcond=None)
-    left = wanted - x @ slope
+    residual = wanted - x @ slope
     inverse = np.linalg.pinv(x.T @ x)
-    variance = left @ left / max(len(wanted) - x.shape[1], 1)
+    variance = residual @ residual / max(len(wanted) - x.shape[1], 1)
     return np.asarray(slope), np.sqrt(np.maximum(np.diag(inverse) * variance, TINY))
 
 

@@ -197,8 +197,8 @@ def _near_both(
     near, still = known.copy(), np.isin(free, bag.still)
     for at, (tag, other) in enumerate(((pair.pv, pair.op), (pair.op, pair.pv))):
         x = bag.values[:, tag]
-        rest, error = resting_level(x, bag.values[:, other], pair.law_width)
-        by_law = closeness(np.maximum(np.abs(level - rest), error), x.std())
+        held_at, error = resting_level(x, bag.values[:, other], pair.law_width)
+        by_law = closeness(np.maximum(np.abs(level - held_at), error), x.std())
         near[at] -= by_chance(x, level, slow[:, [tag]] - slow[:, free])
         near[at, still] = np.maximum(near[at], by_law)[still]
         if free:
@@ -208,8 +208,8 @@ def _near_both(
 
 def _gain(pair: FoundPair, near: Matrix) -> Matrix:
     """Additional evidence for a pair with each set point over none, in the better direction."""
-    way = pair.direction_evidence + pair.output_evidence
-    return np.asarray(np.maximum(near[0] + way, near[1] - way) - abs(way))
+    evidence = pair.direction_evidence + pair.output_evidence
+    return np.asarray(np.maximum(near[0] + evidence, near[1] - evidence) - abs(evidence))
 
 
 def _with_set_point(

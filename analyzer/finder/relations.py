@@ -40,11 +40,11 @@ def ratios_to(set_points: Matrix, pvs: Matrix, own: Sequence[int]) -> list[int |
     if none. own : the columns of the loops' own PVs."""
     power, spread = (set_points**2).mean(axis=0), set_points.var(axis=0)
     both = set_points.T @ pvs / len(pvs)
-    left = power[:, None] - both**2 / np.maximum((pvs**2).mean(axis=0), TINY)
-    left /= np.maximum(spread, TINY)[:, None]
-    left[np.arange(len(own)), own] = np.inf
-    best = left.argmin(axis=1)
-    kept = (spread > TINY) & (left.min(axis=1) <= IN_RATIO)
+    residual_power = power[:, None] - both**2 / np.maximum((pvs**2).mean(axis=0), TINY)
+    residual_power /= np.maximum(spread, TINY)[:, None]
+    residual_power[np.arange(len(own)), own] = np.inf
+    best = residual_power.argmin(axis=1)
+    kept = (spread > TINY) & (residual_power.min(axis=1) <= IN_RATIO)
     return [int(k) if good else None for k, good in zip(best, kept, strict=True)]
 
 

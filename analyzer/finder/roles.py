@@ -73,9 +73,13 @@ def pv_and_sp(bag: TagSet, scores: Scores, cause: Cause, op: int) -> tuple[int, 
     elif seldom:
         swap = moved[0] < moved[1]
     else:
-        left = innovations(np.diff(bag.values[:, [*cause, op]], axis=0))
-        after = [[np.dot(left[:-k, 2], left[k:, i]) ** 2 for k in range(1, LATER)] for i in (0, 1)]
-        swap = sum(after[0]) / np.dot(left[:, 0], left[:, 0]) < sum(after[1]) / np.dot(left[:, 1], left[:, 1])
+        innovation = innovations(np.diff(bag.values[:, [*cause, op]], axis=0))
+        after = [
+            [np.dot(innovation[:-k, 2], innovation[k:, i]) ** 2 for k in range(1, LATER)] for i in (0, 1)
+        ]
+        swap = sum(after[0]) / np.dot(innovation[:, 0], innovation[:, 0]) < sum(after[1]) / np.dot(
+            innovation[:, 1], innovation[:, 1]
+        )
     return (sp, pv) if swap else (pv, sp)
 
 

@@ -42,14 +42,14 @@ def _explained_by_slopes(sp: Floats, pv: Floats, op: Floats) -> float:
     error, slopes, moves = sp - pv, np.diff(pv, 2), np.diff(op)[SLOPES:]
     plain = np.column_stack([np.diff(error)[SLOPES:], error[SLOPES + 1 :]])
     more = [slopes[SLOPES - 1 - k : slopes.size - k] for k in range(SLOPES)]
-    left = _misfit(plain, moves)
-    if left <= TINY * float(moves @ moves):
+    misfit = _misfit(plain, moves)
+    if misfit <= TINY * float(moves @ moves):
         return 0.0
-    return 1.0 - _misfit(np.column_stack([plain, *more]), moves) / left
+    return 1.0 - _misfit(np.column_stack([plain, *more]), moves) / misfit
 
 
 def _misfit(x: Floats, y: Floats) -> float:
     """Sum of squares that a linear regression without a constant leaves."""
     slope, *_ = np.linalg.lstsq(x.T @ x, x.T @ y, rcond=None)
-    left = y - x @ slope
-    return float(left @ left)
+    residual = y - x @ slope
+    return float(residual @ residual)

@@ -82,9 +82,9 @@ def require_dense(path: Path, members: Sequence[zipfile.ZipInfo]) -> None:
 def _require_dense(path: Path, found: Spread) -> None:
     span = found.row * found.column
     if span > SPANNED_CELLS and span > SPANNED_TIMES * found.cells:
-        far = f"{column_letters(found.far[1])}{found.far[0]}"
-        seen = f"{path}, {found.name}: {found.cells} cells that span {span}, as far as cell {far}"
-        remedy = f"delete isolated cells far from the table, such as {far}, or save it as CSV"
+        farthest = f"{column_letters(found.far[1])}{found.far[0]}"
+        seen = f"{path}, {found.name}: {found.cells} cells that span {span}, as far as cell {farthest}"
+        remedy = f"delete isolated cells far from the table, such as {farthest}, or save it as CSV"
         raise InputError(seen, "a table without stray cells", remedy)
 
 

@@ -325,9 +325,9 @@ def winter_offset_s(local_s: NDArray[np.float64], zone: str) -> float | None:
     inner = np.flatnonzero(np.diff(hour) <= 2.0)
     around = np.unique(np.concatenate([hour, hour[inner] + 1.0]))
     summer, winter = _offset_readings(around * HOUR_S + HOUR_S / 2, zone)
-    held = dict(zip(hour.tolist(), count.tolist(), strict=True))
-    spring = _shares(around[np.isnan(summer)], held, 1)
-    autumn = _shares(around[np.isfinite(summer) & (summer != winter)], held, AUTUMN_SAMPLES)
+    counts = dict(zip(hour.tolist(), count.tolist(), strict=True))
+    spring = _shares(around[np.isnan(summer)], counts, 1)
+    autumn = _shares(around[np.isfinite(summer) & (summer != winter)], counts, AUTUMN_SAMPLES)
     keeps = max(spring) > IN_SPRING if spring else bool(autumn) and max(autumn) < IN_AUTUMN
     if not keeps:
         return None
@@ -341,13 +341,13 @@ def is_fixed(zone: str) -> bool:
     return ZoneInfo(zone).utcoffset(None) is not None
 
 
-def _shares(hours: NDArray[np.float64], held: dict[float, int], least: int) -> list[float]:
+def _shares(hours: NDArray[np.float64], counts: dict[float, int], least: int) -> list[float]:
     """Samples in some hours relative to the fuller adjacent hour, if there are enough."""
     shares = []
     for hour in hours.tolist():
-        adjacent = held.get(hour - 1.0, 0), held.get(hour + 1.0, 0)
-        if min(adjacent) >= least or (least == 1 and max(adjacent) >= 1 and hour in held):
-            shares.append(held.get(hour, 0) / max(adjacent))
+        adjacent = counts.get(hour - 1.0, 0), counts.get(hour + 1.0, 0)
+        if min(adjacent) >= least or (least == 1 and max(adjacent) >= 1 and hour in counts):
+            shares.append(counts.get(hour, 0) / max(adjacent))
     return shares
 
 

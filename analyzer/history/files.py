@@ -193,9 +193,9 @@ def _is_export(path: Path) -> bool:
 @lru_cache(maxsize=1)
 def own_scratch() -> Path:
     """A temporary directory of this process."""
-    made = Path(tempfile.mkdtemp(prefix="triage-"))
-    atexit.register(shutil.rmtree, made, True)
-    return made
+    folder = Path(tempfile.mkdtemp(prefix="triage-"))
+    atexit.register(shutil.rmtree, folder, True)
+    return folder
 
 
 def unpacked(path: Path, place: Path) -> list[Path]:
@@ -242,16 +242,16 @@ def _members(path: Path) -> list[zipfile.ZipInfo]:
 def _archive_member(path: Path, folder: Path) -> Path:
     """The one file of a zip archive."""
     with zipfile.ZipFile(path) as archive:
-        held = [info for info in archive.infolist() if not info.is_dir()]
-        if len(held) != 1:
-            seen = f"{path}: an archive of {len(held)} files"
+        members = [info for info in archive.infolist() if not info.is_dir()]
+        if len(members) != 1:
+            seen = f"{path}: an archive of {len(members)} files"
             raise InputError(seen, "an archive of one file", "unpack it and name the folder")
-        if held[0].flag_bits & 1:
+        if members[0].flag_bits & 1:
             seen = f"{path}: an archive with a password"
             raise InputError(seen, "an archive without a password", "unpack it and name the file")
-        _check_size(path, held[0].file_size, 0, folder)
-        out = folder / Path(held[0].filename.replace("\\", "/")).name
-        with archive.open(held[0]) as source:
+        _check_size(path, members[0].file_size, 0, folder)
+        out = folder / Path(members[0].filename.replace("\\", "/")).name
+        with archive.open(members[0]) as source:
             return _copied(source, out, path)
 
 

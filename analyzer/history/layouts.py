@@ -129,8 +129,8 @@ class Source:
         if not wanted:
             return {}
         clocks = {c.clock for c in wanted.values()}
-        held = {c.value for c in wanted.values()} | {c.quality for c in wanted.values()} | {self.tag}
-        needed = sorted((held | {i for clock in clocks for i in clock.columns}) - {-1})
+        columns = {c.value for c in wanted.values()} | {c.quality for c in wanted.values()} | {self.tag}
+        needed = sorted((columns | {i for clock in clocks for i in clock.columns}) - {-1})
         where = (self.tag, list(wanted)) if long else None
         arrays = dict(zip(needed, self.table.read(needed, where), strict=True))
         if not long:
@@ -153,8 +153,8 @@ class Source:
         needed = sorted({i for clock in clocks for i in clock.columns})
         spans = []
         for arrays in self.table.each(needed):
-            held = dict(zip(needed, arrays, strict=True))
-            stamp_s = [c.utc(*c.seconds([held[i] for i in c.columns]))[0] for c in clocks]
+            arrays_by_column = dict(zip(needed, arrays, strict=True))
+            stamp_s = [c.utc(*c.seconds([arrays_by_column[i] for i in c.columns]))[0] for c in clocks]
             if self.tag >= 0 and self.clock.every_s:
                 stamp_s = [s[: max(len(s) // len(self.tags), 1)] for s in stamp_s]
             if np.isfinite(joined := np.concatenate(stamp_s)).any():

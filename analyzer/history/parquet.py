@@ -269,9 +269,9 @@ def holds_copies(place: Path) -> bool:
 
 def forget_halves(place: Path) -> None:
     """Remove incomplete copies of a terminated process from a directory."""
-    for left in place.iterdir():
-        if left.is_dir() and not (left / DONE).exists():
-            shutil.rmtree(left, ignore_errors=True)
+    for folder in place.iterdir():
+        if folder.is_dir() and not (folder / DONE).exists():
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def _stored_description(folder: Path) -> Description | None:
@@ -291,22 +291,22 @@ def _write_copy(table: Sheet | ParquetTable, tag: int, folder: Path) -> Descript
     if shutil.disk_usage(folder.parent).free < room:
         seen = f"{table.path}: no room for a copy of {room / 1e9:.1f} GB in {folder.parent}"
         raise InputError(seen, "free disk", "make room")
-    made = Path(tempfile.mkdtemp(prefix=NAMED, dir=folder.parent))
+    copy = Path(tempfile.mkdtemp(prefix=NAMED, dir=folder.parent))
     if isinstance(table, Sheet):
-        tags, notes = read_through(table, partial(_sheet_parted, tag, made))
+        tags, notes = read_through(table, partial(_sheet_parted, tag, copy))
     else:
-        tags, notes = _parted(_decoded(table.path), tag, made)[1], []
+        tags, notes = _parted(_decoded(table.path), tag, copy)[1], []
     done = {"notes": notes, "tags": tags}
-    (made / DONE).write_text(json.dumps(done), encoding="utf-8")
+    (copy / DONE).write_text(json.dumps(done), encoding="utf-8")
     shutil.rmtree(folder, ignore_errors=True)
-    os.replace(made, folder)
+    os.replace(copy, folder)
     return done
 
 
 def _sheet_parted(tag: int, folder: Path, sheet: Sheet, texts: Collection[int]) -> tuple[int, int, list[str]]:
     """Number of lines of a sheet that were rows and that were left out, and the tags."""
-    for left in folder.glob("*.parquet"):  # of an earlier pass
-        left.unlink()
+    for old in folder.glob("*.parquet"):  # of an earlier pass
+        old.unlink()
     left_out: list[int] = []
     with csv.open_csv(sheet.path, **reading(sheet, left_out, {*texts, tag} - {-1})) as reader:
         batches = ([trimmed(a, sheet.unquoted) for a in batch.columns] for batch in reader)

@@ -165,8 +165,8 @@ def _tag_of(name: str, others: Mapping[str, int]) -> str | None:
 
 def _has_fractions(table: Table, i: int) -> bool:
     """Whether a column has numbers that are not whole."""
-    held = table.head([i])[0].drop_null()
-    return pa.types.is_floating(held.type) and not pc.all(pc.equal(held, pc.floor(held))).as_py()
+    values = table.head([i])[0].drop_null()
+    return pa.types.is_floating(values.type) and not pc.all(pc.equal(values, pc.floor(values))).as_py()
 
 
 def _is_coded(table: Table, i: int) -> bool:

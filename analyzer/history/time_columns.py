@@ -146,9 +146,9 @@ def _check_seconds(table: Table, second: NDArray[np.float64], tag: int) -> None:
     if known.sum() < MINUTES_ROWS or (second[known] % 60.0 != 0).any():
         return
     tags = as_text(table.head([tag])[0]).to_pylist() if tag >= 0 else [""] * len(second)
-    kept = {(tags[k], second[k]) for k in np.flatnonzero(known)}
-    if len(kept) <= MINUTES_SHARE * known.sum():
-        samples = f"{known.sum()} samples on {len(kept)} whole minutes"
+    distinct = {(tags[k], second[k]) for k in np.flatnonzero(known)}
+    if len(distinct) <= MINUTES_SHARE * known.sum():
+        samples = f"{known.sum()} samples on {len(distinct)} whole minutes"
         remedy = (
             "export the time with its seconds (in a spreadsheet, format the column as yyyy-mm-dd hh:mm:ss)"
         )

@@ -179,10 +179,10 @@ def _process_known(verdict: Verdict, limits: AdviceLimits) -> dict[str, float | 
     if verdict.cause not in (Cause.VALVE, Cause.TUNING):
         return {}
     m, fit = verdict.measured, verdict.fit
-    apart, valve = is_known(fit, limits), fit.valve
+    is_identified, valve = is_known(fit, limits), fit.valve
     process: dict[str, float | None] = {
-        "gain": fit.gain if apart else None,
-        "time_constant_s": fit.time_constant_s if apart else None,
+        "gain": fit.gain if is_identified else None,
+        "time_constant_s": fit.time_constant_s if is_identified else None,
         "slope_pct_per_s": fit.slope,
         "dead_time_s": fit.process.dead_time_s,
     }

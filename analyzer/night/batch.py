@@ -171,14 +171,14 @@ def identity(plant: Plant) -> Identity:
 
 def _begun(plant: Plant, store: Store, nights: Sequence[Night], resume: bool) -> list[str]:
     """Keys of the complete chunks of a stopped run; everything else of it is deleted."""
-    mine = identity(plant)
-    if resume and is_same(store.run_file, mine):
+    own = identity(plant)
+    if resume and is_same(store.run_file, own):
         keys = [key for key in store.whole_chunks(nights[-1].name) if _is_readable(store, nights, key)]
     else:
         store.drop_parts()
         keys = []
     store.run_file.parent.mkdir(parents=True, exist_ok=True)
-    store.run_file.write_text(json.dumps(mine), encoding="utf-8")
+    store.run_file.write_text(json.dumps(own), encoding="utf-8")
     return keys
 
 

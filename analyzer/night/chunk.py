@@ -141,7 +141,7 @@ def _loop_row(
     night: Night,
     config: Config,
     advising: bool,
-    kept: Rows,
+    rows: Rows,
     changes: Sequence[TuningChange] = (),
     held: Held | None = None,
 ) -> None:
@@ -165,8 +165,8 @@ def _loop_row(
         except LacksError as error:
             if taught is None or taught.model is None:
                 raise
-            kept.nights.append(by_experiment(taught, spec, night.name, error.needs, present, known))
-            kept.trends.append((spec.loop, thinned(prepared.record)))
+            rows.nights.append(by_experiment(taught, spec, night.name, error.needs, present, known))
+            rows.trends.append((spec.loop, thinned(prepared.record)))
             return
         known |= _typed_in(earlier, spec, found, night.zone)
         known["turns"] = half_cycle_data(prepared, found) if advising else None
@@ -176,15 +176,15 @@ def _loop_row(
             finding = with_experiment(finding, taught, spec, present)
         drawn = _settings_row(spec, night.name, advice)
     except Exception as error:  # an error of one loop is that loop's result and never ends the night
-        kept.nights.append(_lost(error, config).of(spec, night.name, **known))
+        rows.nights.append(_lost(error, config).of(spec, night.name, **known))
         if prepared is not None:
-            kept.trends.append((spec.loop, thinned(prepared.record)))
+            rows.trends.append((spec.loop, thinned(prepared.record)))
         return
-    kept.nights.append(finding)
-    kept.trends.append((spec.loop, found.trend))
-    kept.compared += drawn
-    kept.moves += filter(None, [moves_of(prepared.record)])
-    kept.found.append(found)
+    rows.nights.append(finding)
+    rows.trends.append((spec.loop, found.trend))
+    rows.compared += drawn
+    rows.moves += filter(None, [moves_of(prepared.record)])
+    rows.found.append(found)
 
 
 def _controller_terms(spec: LoopSpec, prepared: Prepared) -> str | None:
@@ -278,20 +278,20 @@ def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
 
 def assessed(task: Task, began: Callable[[int], None] = lambda at: None) -> dict[str, Rows]:
     """The results of a chunk by night, with its pieces written."""
-    kept, plant = {n.name: Rows() for n in task.nights}, task.plant
+    rows, plant = {n.name: Rows() for n in task.nights}, task.plant
     for at, spec in enumerate(task.specs):
         began(at)
         series = _samples_of(task, spec)
         for night in task.nights:
             if isinstance(series, FailedLoop):
-                kept[night.name].nights.append(series.of(spec, night.name, timezone=night.zone))
+                rows[night.name].nights.append(series.of(spec, night.name, timezone=night.zone))
                 continue
             advising = night is task.nights[-1]
             held = task.held.get(spec.loop)
-            _loop_row(spec, series, night, plant.config, advising, kept[night.name], plant.changes, held)
+            _loop_row(spec, series, night, plant.config, advising, rows[night.name], plant.changes, held)
     for night in task.nights:
-        _write_pieces(task, night.name, kept[night.name])
-    return kept
+        _write_pieces(task, night.name, rows[night.name])
+    return rows
 
 
 def lose(task: Task, reason: str) -> Done:
@@ -303,21 +303,21 @@ def lose(task: Task, reason: str) -> Done:
     return Done(task.key, len(task.specs))
 
 
-def _write_pieces(task: Task, night: str, kept: Rows) -> None:
+def _write_pieces(task: Task, night: str, rows: Rows) -> None:
     """Write the pieces, that of the table of nights last: it names the others, and makes the chunk complete."""
     trends = [
         pa.table({"loop": pa.array([loop] * len(trend["time_s"])).dictionary_encode(), **trend})
-        for loop, trend in kept.trends
+        for loop, trend in rows.trends
     ]
-    made = {
-        "hours": rows_table([row for a in kept.found for row in hour_rows(a, night)], HOURS),
+    tables = {
+        "hours": rows_table([row for a in rows.found for row in hour_rows(a, night)], HOURS),
         "trends": pa.concat_tables(trends).unify_dictionaries() if trends else None,
-        "waves": oscillation_table([oscillation for a in kept.found for oscillation in a.oscillation_lines]),
-        "moves": moves_table(kept.moves),
-        "compared": rows_table(kept.compared, SETTINGS),
-        "nights": rows_table([piece_row(found) for found in kept.nights], NIGHTS),
+        "waves": oscillation_table([oscillation for a in rows.found for oscillation in a.oscillation_lines]),
+        "moves": moves_table(rows.moves),
+        "compared": rows_table(rows.compared, SETTINGS),
+        "nights": rows_table([piece_row(found) for found in rows.nights], NIGHTS),
     }
-    filled = {name: table for name, table in made.items() if table is not None and table.num_rows}
+    filled = {name: table for name, table in tables.items() if table is not None and table.num_rows}
     last = naming(filled.pop("nights"), filled)
     paths = [task.store.part(night, name, task.key) for name in filled]
     each(lambda path, table: write_table(table, path), paths, filled.values())

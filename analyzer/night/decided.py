@@ -57,9 +57,9 @@ def decided(plant: Plant, night: Night, loop: str, store: Store | None = None) -
     with TemporaryDirectory() as folder:
         made = Store(Path(folder) / "store")
         task = Task(replace(plant, specs=specs, notes=()), (night,), made, "alone")
-        kept = assessed(task)[night.name]
+        rows = assessed(task)[night.name]
         finish_night(made, night.name, [spec.loop for spec in specs], plant.config, [task.key])
-        found = next((a for a in kept.found if a.loop == loop), None)
+        found = next((a for a in rows.found if a.loop == loop), None)
         return Decided(_stored(made, night.name, loop), found)
 
 

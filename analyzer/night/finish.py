@@ -69,8 +69,8 @@ def finish_night(
     order : the loops of the run, in stored order; keys : the chunks whose pieces count; replace : delete what the
     store has of the night. Returns sentences on what was joined, and on loops whose earlier record was kept.
     """
-    held = Pieces(store, night, keys)
-    fresh = {r["loop"]: finding_of(r) for t in held.tables("nights", PLANT_WIDE) for r in t.to_pylist()}
+    pieces = Pieces(store, night, keys)
+    fresh = {r["loop"]: finding_of(r) for t in pieces.tables("nights", PLANT_WIDE) for r in t.to_pylist()}
     if not fresh:
         return ()
     other = [] if replace else _rows_held(store, "groups", night, GROUPS)
@@ -78,26 +78,26 @@ def finish_night(
     other = [r for r in other if r["group"] not in gone]
     first = 1 + max((int(r["group"]) for r in other), default=0)
     with TemporaryFile() as lines:
-        oscillations = oscillations_in(held.tables("waves"), lines)
+        oscillations = oscillations_in(pieces.tables("waves"), lines)
         traced, found = traced_night(fresh, oscillations, config.plant, first)
-    links = links_of([m for t in held.tables("moves") for m in moves_in(t)], config.plant)
+    links = links_of([m for t in pieces.tables("moves") for m in moves_in(t)], config.plant)
     loops = linked(traced, links, config.plant)
     old = {} if replace else _worth_held(store, night)
-    kept = {
+    fuller_loops = {
         loop for loop, own in loops.items() if loop in old and fuller(old[loop], _worth(own), config.nights)
     }
     others = [loop for loop in old if loop not in loops]
-    mine = [loop for loop in loops if loop not in kept]
+    new = [loop for loop in loops if loop not in fuller_loops]
     for name in JOINED:  # trends are most of a night's data
         before = () if replace else store.parts_if_there(name, night)
-        store.write(name, night, _joined_tables(before, held.tables(name), mine))
+        store.write(name, night, _joined_tables(before, pieces.tables(name), new))
     groups = [*other, *reassign_sources(found, loops)]
     store.write("groups", night, rows_table(groups, GROUPS) if groups else None)
     joined = [*(k for k in order if k in loops), *others]
-    store.write("nights", night, _joined_rows(held, joined, {k: loops[k] for k in mine}, config))
-    store.forget_explained(night, None if replace else mine)
+    store.write("nights", night, _joined_rows(pieces, joined, {k: loops[k] for k in new}, config))
+    store.forget_explained(night, None if replace else new)
     store.forget_compared()
-    return (*update_beliefs(store, night, config), *_joining_notes(night, loops, old, kept, others))
+    return (*update_beliefs(store, night, config), *_joining_notes(night, loops, old, fuller_loops, others))
 
 
 class Pieces:
@@ -131,15 +131,15 @@ class Pieces:
 
 
 def _joined_rows(
-    held: Pieces, order: Sequence[str], judged: Mapping[str, Finding], config: Config
+    pieces: Pieces, order: Sequence[str], judged: Mapping[str, Finding], config: Config
 ) -> Iterator[pa.Table]:
     """The table of a night in parts: judged rows of loops, and rows of others from the store."""
     for k in range(0, len(order), LOOPS_AT_ONCE):
         part = order[k : k + LOOPS_AT_ONCE]
-        old = _rows_held(held.store, "nights", held.night, NIGHTS, set(part) - judged.keys())
+        old = _rows_held(pieces.store, "nights", pieces.night, NIGHTS, set(part) - judged.keys())
         rows = {r["loop"]: r for r in old}
         for loop in judged.keys() & set(part):
-            whole = {**held.known(loop), **judged[loop].known}
+            whole = {**pieces.known(loop), **judged[loop].known}
             rows[loop] = night_row(in_lanes(dataclasses.replace(judged[loop], known=whole), config.lanes))
         yield rows_table([rows[loop] for loop in part], NIGHTS)
 
@@ -166,13 +166,13 @@ def _rows_held(
 
 
 def _joined_tables(
-    before: Iterable[pa.Table], pieces: Iterable[pa.Table], mine: Sequence[str]
+    before: Iterable[pa.Table], pieces: Iterable[pa.Table], loops: Sequence[str]
 ) -> Iterator[pa.Table]:
     """Rows of a table of the store in parts, with those of some loops taken from pieces; all of one schema."""
-    kept = chain(
-        (rows_of_loops(t, mine, others=True) for t in before), (rows_of_loops(t, mine) for t in pieces)
+    parts = chain(
+        (rows_of_loops(t, loops, others=True) for t in before), (rows_of_loops(t, loops) for t in pieces)
     )
-    filled = (t.unify_dictionaries() for t in kept if t.num_rows)
+    filled = (t.unify_dictionaries() for t in parts if t.num_rows)
     first = next(filled, None)
     if first is None:
         return
@@ -183,13 +183,17 @@ def _joined_tables(
 
 
 def _joining_notes(
-    night: str, loops: Mapping[str, Finding], old: Mapping[str, Row], kept: set[str], others: Sequence[str]
+    night: str,
+    loops: Mapping[str, Finding],
+    old: Mapping[str, Row],
+    fuller_loops: set[str],
+    others: Sequence[str],
 ) -> tuple[str, ...]:
     """Notes on a night that already existed."""
     notes = []
     if others:
         notes.append(f"night {night}: {len(others)} loops of an earlier run are also kept")
-    for loop in sorted(kept):
+    for loop in sorted(fuller_loops):
         notes.append(
             f"{loop}: the store has {_good_h(old[loop]):.1f} good hours of night {night}, this export "
             f"{_good_h(loops[loop].known):.1f}; the fuller record is kept (--replace takes this one)"

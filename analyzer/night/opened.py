@@ -52,8 +52,8 @@ def opened(request: ExportRequest) -> Plant:
         specs, notes = match(stated, source.tags)
         own = unknown_columns(stated)
         if own:
-            kept = f"{request.loops}: columns {', '.join(own)} are not used and are kept as the plant's own"
-            notes = (kept, *notes)
+            note = f"{request.loops}: columns {', '.join(own)} are not used and are kept as the plant's own"
+            notes = (note, *notes)
     specs, currents = in_milliamperes(source, specs)
     notes = (*notes, *currents, *_of_no_loop(request.changes, specs))
     return Plant(source, specs, request.config, request.span, request.changes, request.zone, notes)
@@ -137,12 +137,12 @@ class Guarded(Export):
     @classmethod
     def of(cls, plain: Export, limits: WorkerLimits) -> Guarded:
         """An export, read under limits; the worker ends with it."""
-        made = cls(**{f.name: getattr(plain, f.name) for f in fields(plain)})
+        export = cls(**{f.name: getattr(plain, f.name) for f in fields(plain)})
         worker = Workers(1, read_apart, limits)
         for name, value in (("_plain", plain), ("_sent", []), ("_worker", worker)):
-            object.__setattr__(made, name, value)
-        finalize(made, worker.__exit__)
-        return made
+            object.__setattr__(export, name, value)
+        finalize(export, worker.__exit__)
+        return export
 
     def read(self, tags: Sequence[str]) -> dict[str, Series]:
         self._check_known(tags)

@@ -225,12 +225,12 @@ def _forget_dead_servers(folder: Path) -> None:
     known = _open_sockets()
     if forkserver._forkserver._forkserver_pid is not None or known is None:  # type: ignore
         return
-    for left in folder.glob("pymp-*"):
+    for server_folder in folder.glob("pymp-*"):
         with contextlib.suppress(OSError):
-            held, of = list(left.iterdir()), left.stat()
+            held, of = list(server_folder.iterdir()), server_folder.stat()
             old = of.st_uid == os.getuid() and time.time() - of.st_mtime > NEW_S
             if old and held and all(path.is_socket() and str(path) not in known for path in held):
-                shutil.rmtree(left, ignore_errors=True)
+                shutil.rmtree(server_folder, ignore_errors=True)
 
 
 def _open_sockets() -> str | None:

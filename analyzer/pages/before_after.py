@@ -82,9 +82,9 @@ def _part_cell(part: LogRatio) -> parts.Cell:
 
 def _stated(row: words.Row, name: str) -> float | None:
     """A number stated by the plant: a column of the night, or of its JSON of the plant's own columns."""
-    held = json.loads(row.get("extra") or "{}") | {k: v for k, v in row.items() if v is not None}
+    columns = json.loads(row.get("extra") or "{}") | {k: v for k, v in row.items() if v is not None}
     try:
-        value = float(held[name])
+        value = float(columns[name])
     except (KeyError, TypeError, ValueError):
         return None
     return value if math.isfinite(value) and value > 0 else None

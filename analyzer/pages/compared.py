@@ -83,8 +83,8 @@ def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
     )
     if ratio is None:
         return f"{text}."
-    so = "; the cost is that" if ratio > WORSE else ", and"
-    return f"{text}{so} the integral of the error after a load step is {number(ratio)} times as large."
+    link = "; the cost is that" if ratio > WORSE else ", and"
+    return f"{text}{link} the integral of the error after a load step is {number(ratio)} times as large."
 
 
 def choices(c: Comparison, spec: LoopSpec) -> list[str]:

@@ -216,22 +216,22 @@ def graph(g: GroupView) -> parts.Graph:
     lags = {n: by_name[n]["lag_s"] for n in parents}
     texts = {n: f"{by_name[n]['coherence']:.2f}" if s is None else f"{s:+.0f} s" for n, s in lags.items()}
     arrows = tuple(parts.Arrow(parents[n], n, text) for n, text in texts.items())
-    left = len(g.rows) - len(shown)
+    not_shown = len(g.rows) - len(shown)
     caption = "From left to right as coherence falls; lags are behind the likeliest source."
-    caption += f" {left} more not drawn." if left else ""
+    caption += f" {not_shown} more not drawn." if not_shown else ""
     return parts.Graph("way", "Source and followers", nodes, arrows, caption)
 
 
 def heat_map(g: GroupView) -> parts.HeatMap | None:
     """Spectra of the members below each other; None if the night has none."""
     rows = g.rows[:GROUP_LOOPS]
-    kept = [(r["loop"], json.loads(s)) for r in rows if (s := g.loops[r["loop"]]["spectrum"])]
-    if not kept:
+    spectra = [(r["loop"], json.loads(s)) for r in rows if (s := g.loops[r["loop"]]["spectrum"])]
+    if not spectra:
         return None
-    count = max(len(s["db"]) for _, s in kept)
-    longest = max(s["period_s"] for _, s in kept)
-    shares = np.full((len(kept), count), np.nan)
-    for i, (_, s) in enumerate(kept):
+    count = max(len(s["db"]) for _, s in spectra)
+    longest = max(s["period_s"] for _, s in spectra)
+    shares = np.full((len(spectra), count), np.nan)
+    for i, (_, s) in enumerate(spectra):
         level = np.array(s["db"], dtype=float)
         at = round(PER_OCTAVE * np.log2(longest / s["period_s"])) + np.arange(level.size)
         inside = at < count
@@ -240,7 +240,7 @@ def heat_map(g: GroupView) -> parts.HeatMap | None:
     periods = longest / 2.0 ** (np.arange(count) / PER_OCTAVE)
     mark = parts.Mark(g.period_s, duration(g.period_s))
     caption = "Depth of colour: level of the error in each band under the loop's own peak, 30 dB to nothing."
-    loops = tuple(n for n, _ in kept)
+    loops = tuple(n for n, _ in spectra)
     return parts.HeatMap(
         "spectra", "Spectra", "period [s]", periods[::-1], loops, shares[:, ::-1], (mark,), caption
     )

@@ -146,12 +146,12 @@ def _spectrum_plot(error: Floats, step: float, period_s: float | None) -> Plot:
 
 def turn_panels(row: Row, scale: PvScale) -> Panels | None:
     """A night's half-cycles superimposed from each OP reversal, and PV over OP; None if the night has none."""
-    kept = json.loads(row.get("turns") or "null")
-    if not kept:
+    half_cycles = json.loads(row.get("turns") or "null")
+    if not half_cycles:
         return None
-    delay = f", PV {kept['dead_s']:.3g} s later" if kept["dead_s"] > 0 else ""
+    delay = f", PV {half_cycles['dead_s']:.3g} s later" if half_cycles["dead_s"] > 0 else ""
     pv, minutes = f"PV [{scale.label}]", "min since OP's reversal"
-    halves = [_half_cycle(h, scale, kept["step_s"]) for h in kept["halves"]]
+    halves = [_half_cycle(h, scale, half_cycles["step_s"]) for h in half_cycles["halves"]]
     op_lines, pv_lines, plane = map(_laid_over, zip(*halves, strict=True))
     reach = _least_ends(float(np.median(plane[0].y)), scale)
     plots = (
@@ -160,7 +160,9 @@ def turn_panels(row: Row, scale: PvScale) -> Panels | None:
         Plot("turns-plane", f"PV over OP{delay}", "OP [%]", pv, plane, reach=reach),
     )
     caption = texts("half_cycles").get(row["cause"], "Half-cycles, superimposed.")
-    title = f"The last {len(kept['halves'])} half-cycles, from each OP reversal (falling ones inverted)"
+    title = (
+        f"The last {len(half_cycles['halves'])} half-cycles, from each OP reversal (falling ones inverted)"
+    )
     return Panels("turns", title, plots, caption)
 
 
@@ -170,10 +172,14 @@ def _half_cycle(kept: Row, scale: PvScale, step_s: float) -> tuple[Course, Cours
     op, pv, late = (np.array(kept[name], dtype=np.float64) for name in ("op", "pv", "late"))
     pv, late = scale.of(pv), scale.of(late)
     first, last = kept["stuck"]
-    stuck = slice(first, last + 1 if last > first else last)
+    at_rest = slice(first, last + 1 if last > first else last)
     minutes = np.arange(op.size, dtype=np.float64) * (step_s / 60.0)
-    way = 1.0 if op[-1] >= op[0] else -1.0
-    return (minutes, way * (op - op[0]), stuck), (minutes, way * (pv - pv[0]), stuck), (op, late, stuck)
+    sign = 1.0 if op[-1] >= op[0] else -1.0
+    return (
+        (minutes, sign * (op - op[0]), at_rest),
+        (minutes, sign * (pv - pv[0]), at_rest),
+        (op, late, at_rest),
+    )
 
 
 def _laid_over(paths: Sequence[Course]) -> tuple[Line, ...]:

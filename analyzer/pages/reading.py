@@ -135,26 +135,26 @@ def _read_loops(path: Path, columns: Sequence[str] | None, loops: Collection[str
 def read_hours(store: Store, loops: Collection[str], nights: Sequence[str]) -> dict[str, dict[str, Floats]]:
     """Hourly figures by loop, in order of time, NaN where unknown; of an hour recorded twice the fuller one."""
     out = {}
-    for tag, held in _figures(store, "hours", loops, nights).items():
-        order = np.lexsort((held["usable_h"], held["hour_s"]))
-        last = order[np.append(np.diff(held["hour_s"][order]) != 0, True)]
-        out[tag] = {name: x[last] for name, x in held.items()}
+    for tag, figures in _figures(store, "hours", loops, nights).items():
+        order = np.lexsort((figures["usable_h"], figures["hour_s"]))
+        last = order[np.append(np.diff(figures["hour_s"][order]) != 0, True)]
+        out[tag] = {name: x[last] for name, x in figures.items()}
     return out
 
 
 def read_trends(store: Store, loops: Collection[str], nights: Sequence[str]) -> dict[str, Thinned]:
     """Decimated trends by loop, in order of time; a bucket of a gap where nothing was recorded."""
     found = _figures(store, "trends", loops, nights, ("loop", *TREND, *SHADED))
-    return {tag: _thinned_from(held) for tag, held in found.items()}
+    return {tag: _thinned_from(figures) for tag, figures in found.items()}
 
 
-def _thinned_from(held: Mapping[str, Floats]) -> Thinned:
-    time_s, order = np.unique(held["time_s"], return_index=True)
+def _thinned_from(figures: Mapping[str, Floats]) -> Thinned:
+    time_s, order = np.unique(figures["time_s"], return_index=True)
     step = np.diff(time_s)
     jumps = np.flatnonzero(step > 3 * np.median(step)) + 1 if step.size else np.array([], int)
-    extremes = {name: held[name][order] for name in TREND if name not in ("time_s", "bad")}
-    unknown = np.zeros(held["bad"].size)
-    gap, *shaded = (held.get(name, unknown)[order] > 0.5 for name in ("bad", *SHADED))
+    extremes = {name: figures[name][order] for name in TREND if name not in ("time_s", "bad")}
+    unknown = np.zeros(figures["bad"].size)
+    gap, *shaded = (figures.get(name, unknown)[order] > 0.5 for name in ("bad", *SHADED))
     return Thinned(
         np.insert(time_s, jumps, time_s[jumps - 1] + 1.0),
         {name: np.insert(x, jumps, x[jumps - 1]) for name, x in extremes.items()},

@@ -48,10 +48,10 @@ def first_things(rows: Sequence[words.Row], groups: Sequence[GroupView] = ()) ->
         found.append((sum(cost(by_loop[m], by) for m in members), _of_group(source, others)))
     remaining = sorted((r for r in rows if r["loop"] not in named), key=lambda r: (-cost(r, by), r["loop"]))
     for work in orders.texts("work"):
-        mine = [r for r in remaining if orders.kind_of_work(r) == work]
-        if mine:  # a repair at the next shutdown is not for tonight
-            worth = 0.0 if work == Due.SHUTDOWN else sum(cost(r, by) for r in mine)
-            found.append((worth, orders.work_sentence(work, mine, listed([r["loop"] for r in mine]))))
+        of_work = [r for r in remaining if orders.kind_of_work(r) == work]
+        if of_work:  # a repair at the next shutdown is not for tonight
+            worth = 0.0 if work == Due.SHUTDOWN else sum(cost(r, by) for r in of_work)
+            found.append((worth, orders.work_sentence(work, of_work, listed([r["loop"] for r in of_work]))))
     ordered = sorted(found, key=lambda pair: -pair[0])
     return tuple(text for _, text in ordered[:SENTENCES]) or (CALM,)
 
@@ -170,7 +170,7 @@ def summary_page(store: Store, name: str | None = None) -> Page:
     return Page("summary", f"Loops in the morning of {night.name}", "", sections)
 
 
-def _worst(night: ShownNight, left: int) -> Table:
+def _worst(night: ShownNight, not_listed: int) -> Table:
     """The worst loops with their actions, and the number of those left out; their notes if there are any."""
 
     def own(row: words.Row) -> dict[str, words.CellContent]:
@@ -178,5 +178,5 @@ def _worst(night: ShownNight, left: int) -> Table:
 
     noted = any(night.note(r["loop"]) for r in night.worst)
     shown = words.page_columns("summary")[: 4 if noted else 3]
-    more = f"{left} more in the list." if left > 0 else ""
+    more = f"{not_listed} more in the list." if not_listed > 0 else ""
     return night.table("summary", night.worst, own, columns=shown, note=more)

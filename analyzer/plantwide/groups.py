@@ -112,11 +112,11 @@ class _Neighbours:
         )
         found = self._coherences(one, near)
         own = 1.0 - limits.lost - limits.lost_to_noise * (self._own_noise[one] + self._own_noise[near])
-        kept = (found >= loose) & (found >= own)
-        near, found = near[kept], found[kept]
+        coherent = (found >= loose) & (found >= own)
+        near, found = near[coherent], found[coherent]
         over = found / np.maximum(self._by_chance(one, near), 1e-9)
-        kept = over >= limits.over_chance
-        near, found, over = near[kept], found[kept], over[kept]
+        coherent = over >= limits.over_chance
+        near, found, over = near[coherent], found[coherent], over[coherent]
         drifts = self._drifts(oscillation, [self.oscillations[j] for j in near])
         sure = (found >= strict) & (drifts <= limits.drift)
         sure |= (over >= limits.over_chance_in_step) & (drifts <= limits.drift_in_step)
@@ -192,15 +192,15 @@ def _is_oscillation(oscillations: Sequence[OscillationLines], limits: PlantLimit
 
 def _merged(groups: Sequence[Group], limits: PlantLimits) -> list[Group]:
     """Merge groups of one period with mostly the same loops, and groups at harmonics of others."""
-    kept: list[Group] = []
+    merged: list[Group] = []
     for group in sorted(groups, key=lambda g: (-g.period_s, -len(g.oscillations))):
-        for k, other in enumerate(kept):
+        for k, other in enumerate(merged):
             if _is_same(group, other, limits) or _is_group_of_harmonics(group, other, limits):
-                kept[k] = other.with_lacking(group.oscillations, group.coherence)
+                merged[k] = other.with_lacking(group.oscillations, group.coherence)
                 break
         else:
-            kept.append(group)
-    return kept
+            merged.append(group)
+    return merged
 
 
 def _is_same(one: Group, other: Group, limits: PlantLimits) -> bool:

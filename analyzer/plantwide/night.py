@@ -147,7 +147,7 @@ def group_rows(
             continue
         link, candidate = found.links.get(loop, itself), known.get(loop, Candidate(loop, {}, 0.0))
         share, error = min(oscillation.share, 1.0), loops[loop].known.get("average_absolute_error_pct")
-        gone = 1.0 - math.sqrt(max(1.0 - share, 0.0))  # part of the error due to the oscillation
+        removed = 1.0 - math.sqrt(max(1.0 - share, 0.0))  # part of the error due to the oscillation
         signs = json.dumps({k: round(v, 3) for k, v in candidate.signs.items()}) if loop in known else None
         row = {
             "loop": loop,
@@ -161,7 +161,7 @@ def group_rows(
             "lag_s": link.lag_s,
             "wave_amplitude_pct": oscillation.amplitude_pct,
             "wave_share_pct": 100.0 * share,
-            "gain_pct": error * gone if isinstance(error, float) else None,
+            "gain_pct": error * removed if isinstance(error, float) else None,
             "group_signs": signs,
         }
         out.append(row)

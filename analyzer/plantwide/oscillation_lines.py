@@ -217,8 +217,8 @@ def oscillations_in(tables: Iterable[pa.Table], file: BinaryIO | None = None) ->
         known = table.select(SCALARS).to_pylist()
         real, imag, trend = (table.column(name).to_numpy() for name in ("real", "imag", "trend"))
         for scalars, x, y, t in zip(known, real, imag, trend, strict=True):
-            held: list[Any] = [x + 1j * y, t]
-            laid: list[Any] = held if file is None else [Laid(part, file) for part in held]
+            arrays: list[Any] = [x + 1j * y, t]
+            laid: list[Any] = arrays if file is None else [Laid(part, file) for part in arrays]
             found.append(OscillationLines(**scalars, lines=laid[0], trend=laid[1]))
     return found
 

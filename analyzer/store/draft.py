@@ -37,10 +37,10 @@ class Draft(Store):
         return [self.file(table, n) for n in sorted(names) if self._made.get((table, n), True)]
 
     def write(self, table: str, night: str, rows: pa.Table | Iterable[pa.Table] | None) -> None:
-        made = rows is not None and write_table(rows, self._draft_file(table, night))
-        if not made:
+        written = rows is not None and write_table(rows, self._draft_file(table, night))
+        if not written:
             self._draft_file(table, night).unlink(missing_ok=True)
-        self._made[table, night] = made
+        self._made[table, night] = written
 
     def keep(self) -> None:
         """Move all changed tables to the store, the tables of nights last, so that readers find only complete
@@ -54,14 +54,14 @@ class Draft(Store):
         return self._folder / table / f"{night}.parquet"
 
 
-def _moved(made: Path, to: Any, there: bool) -> None:
-    if not there:
+def _moved(draft: Path, to: Any, exists: bool) -> None:
+    if not exists:
         to.unlink(missing_ok=True)
     elif is_remote(to):
-        to.fs.put_file(str(made), to.path)
+        to.fs.put_file(str(draft), to.path)
     else:
         to.parent.mkdir(parents=True, exist_ok=True)
-        os.replace(made, to)
+        os.replace(draft, to)
 
 
 @contextmanager

@@ -66,7 +66,7 @@ def scratch(store: Path, resume: bool = False) -> Iterator[Path]:
             yield Path(made)
         return
     store.mkdir(parents=True, exist_ok=True)
-    place, mine = _held_scratch(store, resume)
+    place, lock = _held_scratch(store, resume)
     kept = False
     try:
         yield place
@@ -74,7 +74,7 @@ def scratch(store: Path, resume: bool = False) -> Iterator[Path]:
         kept = holds_copies(place)
         raise
     finally:
-        mine.release()
+        lock.release()
         if not kept:
             shutil.rmtree(place, ignore_errors=True)
 
@@ -94,27 +94,27 @@ def _lock(folder: Path) -> BaseFileLock | None:
 def _held_scratch(store: Path, resume: bool) -> tuple[Path, BaseFileLock]:
     """A directory of copies and its lock: for a resumed run the newest unused one, otherwise a new one. Other unused
     ones are removed."""
-    for left in store.glob(f"{MAKING}{SCRATCH}*"):
-        if time.time() - _changed_s(left) > LEFT_OVER_S:
-            shutil.rmtree(left, ignore_errors=True)
+    for unused in store.glob(f"{MAKING}{SCRATCH}*"):
+        if time.time() - _changed_s(unused) > LEFT_OVER_S:
+            shutil.rmtree(unused, ignore_errors=True)
     taken: tuple[Path, BaseFileLock] | None = None
-    for left in sorted(store.glob(f"{SCRATCH}*"), key=_changed_s, reverse=True):
+    for unused in sorted(store.glob(f"{SCRATCH}*"), key=_changed_s, reverse=True):
         with contextlib.suppress(OSError):
-            lock = _lock(left)
+            lock = _lock(unused)
             if lock is None:
                 continue
-            if resume and taken is None and holds_copies(left):
-                taken = left, lock
+            if resume and taken is None and holds_copies(unused):
+                taken = unused, lock
                 continue
             lock.release()
-            shutil.rmtree(left, ignore_errors=True)
+            shutil.rmtree(unused, ignore_errors=True)
     if taken is not None:
         forget_halves(taken[0])
         return taken
-    made = Path(tempfile.mkdtemp(prefix=f"{MAKING}{SCRATCH}", dir=store))
-    own = _lock(made)
+    folder = Path(tempfile.mkdtemp(prefix=f"{MAKING}{SCRATCH}", dir=store))
+    own = _lock(folder)
     assert own is not None  # no other process knows the directory yet
-    return made.rename(made.with_name(made.name.removeprefix(MAKING))), own  # others see it when locked
+    return folder.rename(folder.with_name(folder.name.removeprefix(MAKING))), own  # others see it when locked
 
 
 def _changed_s(path: Path) -> float:
@@ -127,24 +127,24 @@ def _changed_s(path: Path) -> float:
 @contextmanager
 def locked(store: Path) -> Iterator[None]:
     """Lock the store for one run. Raises InputError if another run has it, with user, host and start time."""
-    mine = _signature_of_this()
+    signature = _signature_of_this()
     with ExitStack() as held:
         if is_remote(store):
-            _sign_alone(store, mine)
-            held.callback(_unsign, store, mine)
-            held.enter_context(_renewed(store, mine))
+            _sign_alone(store, signature)
+            held.callback(_unsign, store, signature)
+            held.enter_context(_renewed(store, signature))
         else:
             store.mkdir(parents=True, exist_ok=True)
             lock = _lock(store)
             if lock is None:
                 raise _in_use(store)
             held.callback(lock.release)
-            held.callback(_unsign, store, mine)
-            _sign_lock(store, mine)
+            held.callback(_unsign, store, signature)
+            _sign_lock(store, signature)
         yield
 
 
-def _sign_alone(store: Path, mine: Signature) -> None:
+def _sign_alone(store: Path, signature: Signature) -> None:
     """Sign a store on shared storage that has no owner. The storage creates the object only if there is none, so that
     of two runs starting at the same time one is rejected. Raises InputError where another run has it."""
     with refusals_as_errors(store):
@@ -152,15 +152,15 @@ def _sign_alone(store: Path, mine: Signature) -> None:
         if dead:
             (store / OWNER).unlink(missing_ok=True)
         try:
-            known = _made_alone(store / OWNER, _as_text(mine).encode("utf-8"))
+            known = _made_alone(store / OWNER, _as_text(signature).encode("utf-8"))
         except Exception:
-            if _signature(store).get("mark") != mine["mark"]:  # otherwise only the response was lost
+            if _signature(store).get("mark") != signature["mark"]:  # otherwise only the response was lost
                 _require_unsigned(store)
                 raise
             known = True
         if dead or not known:
             time.sleep(SETTLE_S)
-            if _signature(store).get("mark") != mine["mark"]:
+            if _signature(store).get("mark") != signature["mark"]:
                 raise _in_use(store)
 
 
@@ -195,20 +195,20 @@ def _require_unsigned(store: Path) -> bool:
     if _is_dead_here(known):
         return True
     if isinstance(alive_s, int | float) and time.time() - alive_s < DEAD_S:
-        left = max(math.ceil((DEAD_S + alive_s - time.time()) / 60.0), 1)
-        raise _in_use(store, f"; if it died, its hold ends in {left} min, then --resume continues it")
+        minutes = max(math.ceil((DEAD_S + alive_s - time.time()) / 60.0), 1)
+        raise _in_use(store, f"; if it died, its hold ends in {minutes} min, then --resume continues it")
     return bool(known)
 
 
 @contextmanager
-def _renewed(store: Path, mine: Signature) -> Iterator[None]:
+def _renewed(store: Path, signature: Signature) -> Iterator[None]:
     """Renew the signature periodically, in a thread, until the end."""
     ended = threading.Event()
 
     def live() -> None:
         while not ended.wait(ALIVE_S):
             with contextlib.suppress(Exception):  # the next one may succeed
-                _sign_lock(store, mine)
+                _sign_lock(store, signature)
 
     alive = threading.Thread(target=live, daemon=True)
     alive.start()
@@ -239,19 +239,19 @@ def _signature_of_this() -> Signature:
     }
 
 
-def _sign_lock(store: Path, mine: Signature) -> None:
+def _sign_lock(store: Path, signature: Signature) -> None:
     """Write the signature of the living owner of a store."""
-    (store / OWNER).write_text(_as_text(mine), encoding="utf-8")
+    (store / OWNER).write_text(_as_text(signature), encoding="utf-8")
 
 
-def _as_text(mine: Signature) -> str:
-    return json.dumps(mine | {"alive_s": time.time()})
+def _as_text(signature: Signature) -> str:
+    return json.dumps(signature | {"alive_s": time.time()})
 
 
-def _unsign(store: Path, mine: Signature) -> None:
+def _unsign(store: Path, signature: Signature) -> None:
     """Remove a signature if it is still this process's; one left on shared storage expires in ten minutes."""
     with contextlib.suppress(Exception):  # including a failing storage
-        if _signature(store).get("mark") == mine["mark"]:
+        if _signature(store).get("mark") == signature["mark"]:
             (store / OWNER).unlink(missing_ok=True)
 
 

@@ -98,13 +98,13 @@ def pruned(store: Store, keep_d: int, detail_d: int | None, dry: bool = False) -
     latest = date.fromisoformat(max((n for n in store.nights() if n <= tomorrow), default=NEVER))
     first = _days_before(latest, keep_d)
     detailed = first if detail_d is None else max(first, _days_before(latest, detail_d))
-    gone = [p for t in KEPT for p in store.files(t.name) if p.stem < (detailed if t.bulky else first)]
+    outdated = [p for t in KEPT for p in store.files(t.name) if p.stem < (detailed if t.bulky else first)]
     half_written, before = sorted(store.path.rglob(f".*{SUFFIX}")), time.time() - LEFT_OVER_S
-    gone += [path for path in half_written if path.stat().st_mtime < before]
+    outdated += [path for path in half_written if path.stat().st_mtime < before]
     if not dry:
-        for path in gone:
+        for path in outdated:
             path.unlink(missing_ok=True)
-    return gone
+    return outdated
 
 
 def _days_before(day: date, days: int) -> str:

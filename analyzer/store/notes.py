@@ -68,11 +68,11 @@ def add(store: Path, note: Note) -> None:
         before = path.read_bytes() if path.exists() else b""
         path.write_bytes(before + (b"" if before[-1:] in (b"", b"\n") else b"\n") + line)
         return
-    with (store / FILE).open("ab+", buffering=0) as kept:
-        if kept.tell():
-            kept.seek(-1, os.SEEK_END)
-            line = line if kept.read(1) == b"\n" else b"\n" + line
-        if kept.write(line) != len(line):
+    with (store / FILE).open("ab+", buffering=0) as file:
+        if file.tell():
+            file.seek(-1, os.SEEK_END)
+            line = line if file.read(1) == b"\n" else b"\n" + line
+        if file.write(line) != len(line):
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(store / FILE))
 
 
@@ -110,9 +110,9 @@ def broken(store: Path) -> int:
 def _parsed_note(line: str) -> Note | None:
     """The note of a line; None for an invalid line of any kind."""
     try:
-        kept = json.loads(line)
-        parts = [kept.get(k, "") for k in ("loop", "text", "owner", "hidden_until", "state", "due")]
-        at_s = float(kept["time_s"])
+        data = json.loads(line)
+        parts = [data.get(k, "") for k in ("loop", "text", "owner", "hidden_until", "state", "due")]
+        at_s = float(data["time_s"])
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError):
         return None
     if not all(isinstance(x, str) for x in parts) or not 0.0 <= at_s <= LATEST_S:

@@ -123,11 +123,11 @@ def belief_reason(now: Belief, row: Row) -> str:
 
 def _calmed(now: Belief) -> str:
     """Remaining part of a cycle since its settings were changed."""
-    left, then = now.last, now.before
-    assert left is not None
+    last, then = now.last, now.before
+    assert last is not None
     assert then is not None
     return (
-        f"cycles every {duration(left.period_s)} with {_sizes(left)} since its settings were changed; "
+        f"cycles every {duration(last.period_s)} with {_sizes(last)} since its settings were changed; "
         f"at the next shutdown stroke it; {width_text(now)}; it cycled every {duration(then.period_s)} with "
         f"{_sizes(then)} until {then.night}"
     )

@@ -96,21 +96,24 @@ def advise(
     controller: Pid | None,
     pv_span: float,
     config: Config,
-    held: Pid | None = None,
+    earlier_settings: Pid | None = None,
     record: LoopRecord | None = None,
 ) -> Advice:
     """The advice on one assessed loop.
 
     controller, its stated settings in percent and seconds; pv_span, span of PV in its own unit, for settings in
-    engineering units; held, settings reported by earlier nights, which are then compared with the present ones;
-    record, the whole one, on whose load the settings of a loop that is too tight are tested, None: that of the fitted
-    stretch.
+    engineering units; earlier_settings, settings reported by earlier nights, which are then compared with the present
+    ones; record, the whole one, on whose load the settings of a loop that is too tight are tested, None: that of the
+    fitted stretch.
     """
-    kept, oscillation = withheld(found, spec, controller, pv_span, config), counting(found.oscillations)
+    withheld_advice, oscillation = (
+        withheld(found, spec, controller, pv_span, config),
+        counting(found.oscillations),
+    )
     if not found.op_scaled and found.for_settings is not None:
-        return _unscaled(kept, found.for_settings)
-    if kept is not None:
-        return kept
+        return _unscaled(withheld_advice, found.for_settings)
+    if withheld_advice is not None:
+        return withheld_advice
     assert controller is not None  # else `withheld` has given the reason
     assert oscillation is not None
     proposed = propose(found.verdict, controller, oscillation.period_s, config, record)
@@ -121,7 +124,7 @@ def advise(
         return _lacking(Requirement(MissingData.STEP_TEST, RequirementKind.STEP_TEST, (proposal.reason,)))
     comparison = None
     if proposed.loop is not None and proposed.load is not None:
-        known = proposed.loop, proposed.load, held or proposal.new, oscillation.period_s, pv_span
+        known = proposed.loop, proposed.load, earlier_settings or proposal.new, oscillation.period_s, pv_span
         comparison = compared(*known, config.tuning, proposed.others, proposed.indistinguishable)
     return replace(_as_advice(proposal, spec, pv_span), compared=comparison)
 
@@ -205,10 +208,10 @@ def on_recorded(advice: Advice, found: Assessment, spec: LoopSpec, pv_span: floa
     return replace(advice, reason=TEXTS["on_recorded"].format(followed, advice.reason))
 
 
-def _unscaled(kept: Advice | None, needs: Requirement) -> Advice:
+def _unscaled(advice: Advice | None, needs: Requirement) -> Advice:
     """Advice if OP is not in percent: a stroke test of a faulty valve nevertheless, else a request for the range."""
-    if kept is not None and kept.action is Action.REPAIR_VALVE:
-        return replace(kept, reason=str(needs), lack=needs.lack)
+    if advice is not None and advice.action is Action.REPAIR_VALVE:
+        return replace(advice, reason=str(needs), lack=needs.lack)
     return _lacking(needs)
 
 

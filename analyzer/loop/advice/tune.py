@@ -83,21 +83,21 @@ def tune(
     found: Assessment,
     controller: Pid,
     config: Config,
-    kept: Advice | None,
+    advice: Advice | None,
     prepared: Prepared,
     kind: str,
     decided: tuple[Action, Pid | None] | None = None,
 ) -> Tuning:
     """Propose settings for one assessed loop with stated ones `controller` [%, s], and further terms found in the
-    record; `kept`, the reason if none are to be proposed (advice.withheld); prepared, its record, and kind, its type;
-    decided, action and settings of all nights, which have precedence. Raises NotAssessedError if the loop's trends
-    give no model."""
+    record; `advice`, the reason if none are to be proposed (advice.withheld); prepared, its record, and kind, its
+    type; decided, action and settings of all nights, which have precedence. Raises NotAssessedError if the loop's
+    trends give no model."""
     verdict, controller = found.verdict, found.shown or controller
     first = found.oscillations.first
     period = first.period_s if first else None
     model, fit, others = tuning_model(verdict, controller, config.advice)
-    if kept is not None and kept.reason and kept.action is not None:
-        proposal = Proposal(kept.action, kept.reason)
+    if advice is not None and advice.reason and advice.action is not None:
+        proposal = Proposal(advice.action, advice.reason)
     else:
         proposal = propose(verdict, controller, period, config, prepared.record).proposal
     if decided is not None:
@@ -144,8 +144,8 @@ def _forecast(
     unmodelled = UNMODELLED_SPARSE if sparse else UNMODELLED
     found = predict(model, new, night, others, same, unmodelled)
     ratio = found.before[FORECAST[0]].value / max(error_of_night(record, now), 1e-9)
-    apart = abs(math.log(max(ratio, 1e-9)))
-    return found if apart <= math.log(config.advice.agree_error) else None
+    distance = abs(math.log(max(ratio, 1e-9)))
+    return found if distance <= math.log(config.advice.agree_error) else None
 
 
 def _as_decided(found: Proposal, action: Action, new: Pid | None) -> Proposal:
@@ -291,14 +291,14 @@ def _routine(one: PlantLoop, stated: Pid | None, decision: Decided, drawn: bool)
         needs = limited or unfit_for_cause(prepared, None, config)  # the most direct reason first
         raise NotAssessedError(f"{loop}: {needs or found.verdict.needs or NO_MOVES}")
     if cause not in AGAINST and action is not Action.RETUNE:
-        left = [WHY[cause]] if action is WITHOUT_SETTINGS[cause] else []
+        reasons = [WHY[cause]] if action is WITHOUT_SETTINGS[cause] else []
         kind = "no_model_of_load" if cause is Cause.LOAD else "no_model"
-        return TuningReport([*text, *left, TEXTS[kind]], {}, row)
+        return TuningReport([*text, *reasons, TEXTS[kind]], {}, row)
     new = None
     if action is Action.RETUNE:
         new = controller_of(replace(spec, kp=row["kp_new"], ti=row["ti_new"]), prepared)
-    kept = withheld(found, spec, stated, prepared.scale.span, config)
-    tuning = tune(found, stated, config, kept, prepared, spec.type, (action, new))
+    advice = withheld(found, spec, stated, prepared.scale.span, config)
+    tuning = tune(found, stated, config, advice, prepared, spec.type, (action, new))
     text += proposal_lines(tuning, spec, prepared.scale.span)
     lines, files = _with_compared_settings(
         tuning, spec, prepared.scale.span, config, row["night"], text, drawn

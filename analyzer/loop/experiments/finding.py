@@ -42,8 +42,8 @@ def _known(of: ExperimentResults) -> dict[str, Cell]:
 
 def _witnessed(of: ExperimentResults, witness: Cell) -> dict[str, Cell]:
     """The night's evidence, with the constants of the model."""
-    kept = witness if isinstance(witness, str) else None
-    return {} if of.model is None else {"witness": with_constants(kept, of.model)}
+    stored = witness if isinstance(witness, str) else None
+    return {} if of.model is None else {"witness": with_constants(stored, of.model)}
 
 
 def by_experiment(

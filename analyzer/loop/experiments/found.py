@@ -153,8 +153,8 @@ def _checked_sign(model: Modelled, stated: Pid | None) -> Modelled:
 
 def controlled(part: LoopRecord) -> Controlled:
     """The overshoot of an experiment in automatic, without noise, and the law that explains OP in it."""
-    way = float(np.sign(np.median(part.error[:5]))) or 1.0
-    beyond = -way * part.error
+    sign = float(np.sign(np.median(part.error[:5]))) or 1.0
+    beyond = -sign * part.error
     reached = np.flatnonzero(beyond >= 0.0)
     noise = 3.0 * robust_deviation(np.diff(part.pv)) / math.sqrt(2.0)
     most = float(beyond[reached[0] :].max()) - noise if reached.size else 0.0

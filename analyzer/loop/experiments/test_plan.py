@@ -101,10 +101,10 @@ def known_of(one: PlantLoop, store: Path | None) -> Known:
     if taught is not None and taught.model is not None:
         return of_experiments(taught.model)
     if store is not None:
-        kept = Store(store)
-        kept.require()
-        for night in reversed(kept.nights()):
-            rows = kept.own_rows("nights", night, READ, [one.spec.loop])
+        opened = Store(store)
+        opened.require()
+        for night in reversed(opened.nights()):
+            rows = opened.own_rows("nights", night, READ, [one.spec.loop])
             found = of_row(rows[0]) if rows else None
             if found is not None:
                 return found

@@ -129,15 +129,17 @@ def regressed(y: Floats, terms: Floats, usable: Mask) -> Floats:
     return np.asarray(y - terms @ slope)
 
 
-def _on_scans(left: Floats, problem: Problem, controller: Pid) -> tuple[Floats, Floats]:
+def _on_scans(residual_load: Floats, problem: Problem, controller: Pid) -> tuple[Floats, Floats]:
     """Clock of the controller's scans [s] and the smooth part of a load on it [% PV], the set point subtracted."""
     scan_s = controller.scan_s or problem.dt_s
     if problem.blocks.factor == 1 and _loses_noise(problem, controller):
-        left = without_noise(left)
+        residual_load = without_noise(residual_load)
     if problem.blocks.sp is not None:
-        left = left - (problem.blocks.sp - problem.blocks.sp.mean())
+        residual_load = residual_load - (problem.blocks.sp - problem.blocks.sp.mean())
     clock: Floats = scan_s * np.arange(int(problem.duration_s / scan_s), dtype=np.float64)
-    return clock, np.asarray(np.interp(clock, np.arange(left.size) * problem.dt_s, left), dtype=np.float64)
+    return clock, np.asarray(
+        np.interp(clock, np.arange(residual_load.size) * problem.dt_s, residual_load), dtype=np.float64
+    )
 
 
 def _loses_noise(problem: Problem, controller: Pid) -> bool:
@@ -204,8 +206,8 @@ def _noise_of(op: Floats, free: Mask, order: int, shared: Floats) -> float | Non
         if order > 2:
             return None
         spread = math.sqrt(float(np.mean(jumps[jumps <= 2.0 * COARSE * digit] ** 2)))
-    apart = np.abs(np.subtract.outer(np.arange(order + 1), np.arange(order + 1)))
-    share = float(weights @ shared[apart] @ weights)
+    lags = np.abs(np.subtract.outer(np.arange(order + 1), np.arange(order + 1)))
+    share = float(weights @ shared[lags] @ weights)
     return math.sqrt(max(spread**2 - rounding, 0.0) / share)
 
 

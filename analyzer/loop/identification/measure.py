@@ -143,11 +143,11 @@ def _without_a_cycle(m: Measured, best: Fitted, linear: Fitted, due: Mask | None
 def _kurtosis(record: LoopRecord, error: Spectrum, scale_s: float) -> float:
     """Kurtosis of the cycle's size in the error at rest of the set point; if that moves too often, in the error
     without its part, whose removal disturbs a steady load over the whole record."""
-    rest = at_rest(record.sp, scale_s / record.dt_s, after=True)
-    if 2 * np.count_nonzero(rest) < rest.size:
+    resting = at_rest(record.sp, scale_s / record.dt_s, after=True)
+    if 2 * np.count_nonzero(resting) < resting.size:
         return size_kurtosis(error, error.duration_s / scale_s)
     whole = error_spectrum(record, whole=True)
-    return size_kurtosis(whole, whole.duration_s / scale_s, rest[-whole.n :])
+    return size_kurtosis(whole, whole.duration_s / scale_s, resting[-whole.n :])
 
 
 def _of_a_cycle(

@@ -261,15 +261,15 @@ def detect(record: LoopRecord, limits: OscillationLimits, whole: bool = False) -
         return Oscillations(spectrum=s)
     b = bands(tapered_power(s), limits.periods)
     usable = record.at_work[len(record) - s.n :]
-    kept: list[Oscillation] = []
+    oscillations: list[Oscillation] = []
     longest = _longest_seen(record)
     for k in peaks(b, limits.shape_prominence):
         o = _candidate(s, b, k, limits)
-        if o is None or any(abs(math.log(o.period_s / p.period_s)) < math.log(1.3) for p in kept):
+        if o is None or any(abs(math.log(o.period_s / p.period_s)) < math.log(1.3) for p in oscillations):
             continue
-        if o.period_s <= longest and not any(_is_harmonic_of(o, p) for p in kept):
-            kept.append(o)
-    each = (_sized_by_envelope(s, o, usable, limits) for o in kept[:REPORTED])
+        if o.period_s <= longest and not any(_is_harmonic_of(o, p) for p in oscillations):
+            oscillations.append(o)
+    each = (_sized_by_envelope(s, o, usable, limits) for o in oscillations[:REPORTED])
     lasting = (r for r in each if whole or _lasts(s, record, r[0], limits))
     sized = sorted(lasting, key=lambda r: -r[0].significance)
     if not sized:

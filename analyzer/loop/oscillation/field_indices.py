@@ -45,8 +45,8 @@ def field_indices(
             out["idle"] = _idle(record, controller)
     cycle, shapely = counting(found), prepared.compressed_share <= config.quality.straight_share
     if cycle is not None and prepared.op_known and shapely:
-        way = 1.0 if controller is None else math.copysign(1.0, controller.kp or controller.ti_s)
-        out |= _of_valve(record, cycle.period_s / record.dt_s, way, kind)
+        sign = 1.0 if controller is None else math.copysign(1.0, controller.kp or controller.ti_s)
+        out |= _of_valve(record, cycle.period_s / record.dt_s, sign, kind)
         if not prepared.op_scaled:
             del out["ellipse"]
     return json.dumps({k: [float(f"{x:.4g}") for x in v] for k, v in out.items() if v is not None})
@@ -57,11 +57,11 @@ def _averaged(x: Floats, width: int) -> Floats:
     return x[: x.size // width * width].reshape(-1, width).mean(axis=1)
 
 
-def _of_valve(record: LoopRecord, period: float, way: float, kind: str) -> Mapping[str, of.Values | None]:
-    """Indices of a valve in a cycle [samples]; way, the sign of the process gain."""
+def _of_valve(record: LoopRecord, period: float, sign: float, kind: str) -> Mapping[str, of.Values | None]:
+    """Indices of a valve in a cycle [samples]; sign, the sign of the process gain."""
     width = max(int(period / A_CYCLE), 1)
     last = record.span(len(record) - int(MOST_CYCLES * period), len(record))
-    op, pv, error = (_averaged(x, width) for x in (last.op, way * last.pv, record.error))
+    op, pv, error = (_averaged(x, width) for x in (last.op, sign * last.pv, record.error))
     cycle = period / width
     out = {"he": of.curve_fit(pv if kind == LEVEL else op, cycle), "choudhury": of.nonlinearity(error)}
     if kind != LEVEL:

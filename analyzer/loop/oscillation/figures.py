@@ -115,7 +115,7 @@ def travel_of(signal: Floats, use: Mask, step: int, deadband: float) -> tuple[fl
     Moves between usable neighbours form one path: moves of a signal during a gap are unknown.
     """
     half, x, stem = 0.5 * deadband, 0.0, 0.0
-    path, way, turns = 0.0, 0.0, 0
+    path, direction, turns = 0.0, 0.0, 0
     for k in range(step, signal.size, step):
         if use[k] and use[k - step]:
             x += signal[k] - signal[k - step]
@@ -127,8 +127,8 @@ def travel_of(signal: Floats, use: Mask, step: int, deadband: float) -> tuple[fl
         path += abs(moved)
         if abs(moved) > ROUNDING:
             now = 1.0 if moved > 0 else -1.0
-            turns += way == -now
-            way = now
+            turns += direction == -now
+            direction = now
     return path, turns
 
 

@@ -57,8 +57,8 @@ def moves(record: LoopRecord, noise: float, limits: FigureLimits) -> tuple[Move,
     steps = np.flatnonzero(np.abs(np.diff(record.sp)) > 1e-6) + 1
     if not steps.size:
         return ()
-    apart = np.flatnonzero(np.diff(steps) >= limits.move_stands) + 1
-    runs = np.split(steps, apart)
+    separate = np.flatnonzero(np.diff(steps) >= limits.move_stands) + 1
+    runs = np.split(steps, separate)
     firsts, lasts = (np.array([run[k] for run in runs]) for k in (0, -1))
     before, after = np.append(0, lasts[:-1]), np.append(firsts[1:], len(record))
     size = record.sp[lasts] - record.sp[firsts - 1]
@@ -96,20 +96,20 @@ def _answered(
     """Response of PV to a move of `ramp` samples; part, from the sample before it to the next move; spread of the
     error before [% of span]."""
     begin = float(record.sp[part.start])
-    way = (record.pv[part] - begin) / size
+    response = (record.pv[part] - begin) / size
     still = spread / abs(size)
     settled = _settled_from(
-        np.abs(way[ramp:] - 1.0) > max(2.0 * still, limits.move_settled), limits.move_stands
+        np.abs(response[ramp:] - 1.0) > max(2.0 * still, limits.move_settled), limits.move_stands
     )
-    shown = way.size if settled is None else min(way.size, FOLLOWED * (settled + ramp) + 2)
-    course = np.interp(np.linspace(0, shown - 1, POINTS), np.arange(shown), way[:shown])
+    shown = response.size if settled is None else min(response.size, FOLLOWED * (settled + ramp) + 2)
+    course = np.interp(np.linspace(0, shown - 1, POINTS), np.arange(shown), response[:shown])
     return Move(
         record.start_s + (part.start + 1) * record.dt_s,
         begin,
         size,
         ramp * record.dt_s,
-        None if ramp else _rise(way, record.dt_s),
-        max(_excursion(way) - 2.0 * still, 0.0),
+        None if ramp else _rise(response, record.dt_s),
+        max(_excursion(response) - 2.0 * still, 0.0),
         None if settled is None else settled * record.dt_s,
         (shown - 1) * record.dt_s,
         tuple(float(f"{x:.3f}") for x in course),
@@ -127,23 +127,24 @@ def _settled_from(outside: Mask, least: int) -> int | None:
     return int(ends[calm[0]]) + 1 if calm.size else None
 
 
-def _excursion(way: Floats) -> float:
+def _excursion(response: Floats) -> float:
     """First excursion of PV beyond the set point [-]; later ones come from loads."""
-    beyond = way > 1.0
+    beyond = response > 1.0
     if not beyond.any():
         return 0.0
     first = int(np.argmax(beyond))
     back = np.flatnonzero(~beyond[first:])
-    return float(way[first : first + (int(back[0]) if back.size else way.size)].max()) - 1.0
+    return float(response[first : first + (int(back[0]) if back.size else response.size)].max()) - 1.0
 
 
-def _rise(way: Floats, dt_s: float) -> float | None:
+def _rise(response: Floats, dt_s: float) -> float | None:
     """Time from the first tenth of the way to the first nine tenths [s], interpolated between samples."""
-    at = [int(np.argmax(way >= share)) for share in (0.1, 0.9)]
-    if not way.max() >= 0.9 or 0 in at:
+    at = [int(np.argmax(response >= share)) for share in (0.1, 0.9)]
+    if not response.max() >= 0.9 or 0 in at:
         return None
     first, last = (
-        k - (way[k] - share) / (way[k] - way[k - 1]) for k, share in zip(at, (0.1, 0.9), strict=True)
+        k - (response[k] - share) / (response[k] - response[k - 1])
+        for k, share in zip(at, (0.1, 0.9), strict=True)
     )
     return float(last - first) * dt_s
 

@@ -227,16 +227,16 @@ def _plainly(seen: LawsCompared, stated: Pid, record: LoopRecord, limits: Settin
         return False
     if (limited or stated.ti_s < unseen) and seen.explained < limits.explained_unseen:
         return False
-    apart = _apart(seen.found, stated, record.dt_s, limits.filtered)
-    return seen.left * seen.explained >= limits.left and apart >= limits.factor
+    factor = _apart(seen.found, stated, record.dt_s, limits.filtered)
+    return seen.left * seen.explained >= limits.left and factor >= limits.factor
 
 
 def _apart(found: Pid, stated: Pid, dt_s: float, filtered: float) -> float:
     """The largest factor between settings, less the possible effect of a derivative's filter; a slope computed
     between the samples is unknown."""
-    apart = max(_factor(found.kp, stated.kp), _factor(found.ti_s, stated.ti_s))
+    factor = max(_factor(found.kp, stated.kp), _factor(found.ti_s, stated.ti_s))
     if max(found.td_s, stated.td_s) == 0.0:
-        return apart
+        return factor
     slopes = (pid.kp * max(pid.td_s, dt_s) for pid in (found, stated))
     slope = 1.0 if stated.scan_s < dt_s else _factor(*slopes)
-    return max(apart / math.sqrt(filtered), slope / filtered)
+    return max(factor / math.sqrt(filtered), slope / filtered)
