@@ -26,7 +26,7 @@ def _name_of_kernels() -> str:
     return f"kernels-{hashlib.sha256(repr(stamps).encode()).hexdigest()[:12]}"
 
 
-def _places() -> Iterator[Path]:
+def _cache_folders() -> Iterator[Path]:
     """Possible folders for kernels, best first: as configured, next to the code, and the cache folder of a
     service or user."""
     if stated := os.environ.get(KERNELS):
@@ -47,39 +47,39 @@ def _is_writable(folder: Path) -> bool:
     return True
 
 
-def _keep_kernels() -> None:
+def _set_kernel_cache() -> None:
     """Give numba a writable folder: without one, the import of a kernel is an error.
 
     The folder is next to the code or elsewhere; the last choice is a temporary folder of this process.
     Kernels
     compiled at installation are copied there. If no folder can be made, kernels are compiled and not kept.
     """
-    name, beside = _name_of_kernels(), Path(__file__).parent / "__pycache__"
-    place = next(filter(_is_writable, _places()), None)
+    name, own_cache = _name_of_kernels(), Path(__file__).parent / "__pycache__"
+    place = next(filter(_is_writable, _cache_folders()), None)
     if place is None:
         try:
             place = Path(tempfile.mkdtemp(prefix="triage-kernels-"))
         except OSError:
-            _keep_nothing()
+            _disable_kernel_cache()
             return
         atexit.register(shutil.rmtree, place, True)
     kept = place / name
     os.environ[KERNELS] = str(kept)
     if kept.exists():
         return
-    if place == beside:
-        for old in beside.glob("kernels-*"):
+    if place == own_cache:
+        for old in own_cache.glob("kernels-*"):
             shutil.rmtree(old, ignore_errors=True)
-    elif (beside / name).exists():
+    elif (own_cache / name).exists():
         with contextlib.suppress(OSError, shutil.Error):
-            shutil.copytree(beside / name, kept)
+            shutil.copytree(own_cache / name, kept)
 
 
-def _keep_nothing() -> None:
+def _disable_kernel_cache() -> None:
     from numba.core.dispatcher import Dispatcher
 
     os.environ.pop(KERNELS, None)
     Dispatcher.enable_caching = lambda _: None  # type: ignore
 
 
-_keep_kernels()
+_set_kernel_cache()

@@ -68,8 +68,8 @@ def _block(block: parts.Block, folder: str) -> list[str]:
 
 def _section(section: parts.Section, folder: str) -> list[str]:
     shown = [lines for b in section.blocks if (lines := _block(b, folder))]
-    told = [line for lines in shown for line in (*lines, "")]
-    return [f"## {escaped(section.title)}", "", *told] if told else []
+    body = [line for lines in shown for line in (*lines, "")]
+    return [f"## {escaped(section.title)}", "", *body] if body else []
 
 
 def render(page: parts.Page, folder: str = "pictures") -> str:

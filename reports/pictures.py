@@ -152,9 +152,9 @@ def _style(drawn: str) -> str:
     colours, rules = _rules()
     used = {name for held in re.findall(r'class="([^"]*)"', drawn) for name in held.split()}
 
-    def speaks(selector: str) -> bool:
+    def applies(selector: str) -> bool:
         names = [set(re.findall(r"\.([a-z][\w-]*)", part)) for part in selector.split(",")]
         return selector == "svg text" or any(part and part <= used for part in names)
 
-    found = "\n".join(f"{s} {{ {d} }}" for s, d in rules if speaks(s)).replace("svg.", ".")
+    found = "\n".join(f"{s} {{ {d} }}" for s, d in rules if applies(s)).replace("svg.", ".")
     return re.sub(r"var\(--([\w-]+)\)", lambda m: colours[m[1]], found)

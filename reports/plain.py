@@ -27,7 +27,7 @@ def _wrapped(text: str, first: str = "", then: str = "") -> list[str]:
     return textwrap.wrap(" ".join(text.split()), WIDTH, initial_indent=first, subsequent_indent=then) or []
 
 
-def _told(table: Table) -> list[str]:
+def _table_lines(table: Table) -> list[str]:
     """A row as its first cell and, indented below, the other cells that are not empty."""
     out = []
     for row in table.rows:
@@ -42,7 +42,7 @@ def _told(table: Table) -> list[str]:
 def _block(block: Block) -> list[str]:
     match block:
         case Table():
-            return _told(block)
+            return _table_lines(block)
         case Text():
             return [line for p in block.paragraphs for line in _wrapped(p)]
         case Listing():

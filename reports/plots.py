@@ -213,7 +213,7 @@ def _times(start: float, end: float, zone: str) -> list[tuple[float, str]]:
     form = "%H:%M:%S" if step < 60 else "%H:%M"
     out = []
     for at in (k * step - offset for k in whole):
-        told = datetime.fromtimestamp(at, UTC).astimezone(clock)
-        midnight = step >= 60 and told.hour == told.minute == 0
-        out.append((at, f"{told.day} {told:%b}" if step >= DAY_S or midnight else f"{told:{form}}"))
+        local = datetime.fromtimestamp(at, UTC).astimezone(clock)
+        midnight = step >= 60 and local.hour == local.minute == 0
+        out.append((at, f"{local.day} {local:%b}" if step >= DAY_S or midnight else f"{local:{form}}"))
     return out

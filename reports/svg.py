@@ -19,7 +19,7 @@ LETTER = 6.6
 """Approximate width of a letter of a tick label."""
 POINT = 4.5
 """Radius of a named point."""
-BESIDE = tuple(
+LABEL_POSITIONS = tuple(
     (down, across, side)
     for down in (4.0, -9.0, 17.0, -22.0, 30.0)
     for across, side in ((8.0, "start"), (-8.0, "end"), (0.0, "middle"))
@@ -139,14 +139,16 @@ def named_places(points: Sequence[tuple[Place, float, float]], room: Corners) ->
     out = []
     for place, x, y in points:
         wide, spots = LETTER * len(place.label), []
-        for k, (dy, dx, side) in enumerate(BESIDE):
+        for k, (dy, dx, side) in enumerate(LABEL_POSITIONS):
             left, down = x + dx - wide * ANCHORED[side], y + dy
-            own = (left, down - 10.0, left + wide, down + 3.0)
-            outside = (own[2] - own[0]) * (own[3] - own[1]) - _covered(own, [room])
-            bad = _covered(own, taken) + outside
-            spots.append((bad, k, own, (x + dx, down, place.label, side, "placed")))
-        _, _, own, text = min(spots)
-        taken.append(own)
+            label_box = (left, down - 10.0, left + wide, down + 3.0)
+            outside = (label_box[2] - label_box[0]) * (label_box[3] - label_box[1]) - _covered(
+                label_box, [room]
+            )
+            bad = _covered(label_box, taken) + outside
+            spots.append((bad, k, label_box, (x + dx, down, place.label, side, "placed")))
+        _, _, label_box, text = min(spots)
+        taken.append(label_box)
         out.append(f'<circle class="place {place.kind}" cx="{digits(x)}" cy="{digits(y)}" r="{POINT}"/>')
         out.append(written(*text))
     return out

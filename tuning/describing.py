@@ -15,7 +15,7 @@ from identification.models import Backlash, Motion, Stiction, Valve
 from identification.record import Floats
 from identification.simulation.valve import thresholds
 
-PLAY_JUMP_SHARE = 0.02
+BACKLASH_JUMP_SHARE = 0.02
 """Slip jump over the stickband below which it counts as backlash: fifty jumps a stickband look like it."""
 JUMPS_MOST = 60  # Jumps per half cycle up to which stick-slip has branches of its own: far beyond what is met
 
@@ -92,7 +92,7 @@ def sliding(amplitude: ArrayLike, stickband: float, slip_jump: float) -> Complex
 def is_backlash(valve: Valve) -> bool:
     """Whether the valve has backlash, or stick-slip with a negligible jump."""
     return isinstance(valve, Backlash) or (
-        isinstance(valve, Stiction) and valve.slip_jump <= PLAY_JUMP_SHARE * valve.stickband
+        isinstance(valve, Stiction) and valve.slip_jump <= BACKLASH_JUMP_SHARE * valve.stickband
     )
 
 
@@ -170,7 +170,7 @@ def _branch(jumps: int, amplitude: Floats, n: Complexes) -> Branch:
     return Branch(jumps, np.sqrt(np.maximum(-np.angle(n), 0.0)), np.log(amplitude), np.log(np.abs(n)))
 
 
-def _play_branch(width: float) -> Branch:
+def _backlash_branch(width: float) -> Branch:
     """Backlash table over the angle x = acos(2d/A - 1) in which the stem moves.
 
     N = (x - sin(2x)/2 - i sin(x)^2)/pi, Eq. (1) rewritten without cancellation as A tends to d.
@@ -194,7 +194,7 @@ def branches(valve: Valve) -> tuple[Branch, ...]:
     if valve is None or width <= 0.0:
         return ()
     if isinstance(valve, Backlash) or is_backlash(valve):
-        return (_play_branch(width),)
+        return (_backlash_branch(width),)
     if valve.motion is not Motion.RESTS:
         amplitude = width / (1.0 + np.cos(np.linspace(0.0, np.pi, TABLE_SIZE + 1)[:-1]))
         return (_branch(1, amplitude, sliding(amplitude * (1 + 1e-12), width, valve.slip_jump)),)

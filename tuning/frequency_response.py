@@ -138,11 +138,11 @@ def _half_turns(process: Scanned, kp: float, law: Acting, low: float, points: in
     rate, td, slope_keep, pv_keep = law
     kp *= 1.0 - pv_keep
     turns, i, j, last = 0, 0, 0, complex(0.0, 0.0)
-    apart, ratio = math.pi / (points - 1), math.exp(math.log(math.pi / low) / (points - 1))
-    turn, turn_late = _backwards(apart), _backwards(apart * (delay + 1))
+    spacing, ratio = math.pi / (points - 1), math.exp(math.log(math.pi / low) / (points - 1))
+    turn, turn_late = _backwards(spacing), _backwards(spacing * (delay + 1))
     even, even_late, spread = complex(1.0, 0.0), complex(1.0, 0.0), low
     while i < points or j < points:
-        if i < points and (j == points or apart * i <= spread):
+        if i < points and (j == points or spacing * i <= spread):
             w, late = even, even_late
             even, even_late, i = even * turn, even_late * turn_late, i + 1
         else:

@@ -158,7 +158,7 @@ class TravelMap:
     """Figures 4, 5 and 7: the limit cycle over the Kp-Ti plane by harmonic balance.
 
     kp [% OP / % PV] of shape (n,), ti_s [s] of shape (m,). Of shape (m, n), 0 where there is no cycle: travel
-    [% OP / s], OP amplitude over period as the study defines it, and period_s [s]. Masks of shape (m, n): `rests`
+    [% OP / s], OP amplitude over period as the study defines it, and period_s [s]. Masks of shape (m, n): `at_rest`
     True where no limit cycle is predicted and the linear loop is stable (the study's green), `unstable` True where
     the linear loop itself is not stable.
     """
@@ -167,7 +167,7 @@ class TravelMap:
     ti_s: Floats
     travel: Floats
     period_s: Floats
-    rests: Mask
+    at_rest: Mask
     unstable: Mask
 
 
@@ -212,7 +212,7 @@ def travel_map(loop: Loop, kp: Floats, ti_s: Floats) -> TravelMap:
     """Valve travel over gains kp, shape (n,), all of the controller's sign, and integral times ti_s > 0, shape (m,).
 
     The loop's own Kp and Ti are ignored. For stick-slip, no solution of the balance does not imply rest: with
-    integral action OP ramps until the stem slips; `rests` is then False and only simulation gives the result.
+    integral action OP ramps until the stem slips; `at_rest` is then False and only simulation gives the result.
     """
     rows = [
         replace(loop, controller=replace(loop.controller, kp=float(kp[0]), ti_s=float(ti))) for ti in ti_s
@@ -226,6 +226,6 @@ def travel_map(loop: Loop, kp: Floats, ti_s: Floats) -> TravelMap:
         ti_s,
         travel=np.where(cycles, amplitude, 0.0) / np.where(cycles, period, 1.0),
         period_s=period,
-        rests=~cycles & stable & (band(loop.valve) <= 0.0 or is_backlash(loop.valve)),
+        at_rest=~cycles & stable & (band(loop.valve) <= 0.0 or is_backlash(loop.valve)),
         unstable=~stable,
     )

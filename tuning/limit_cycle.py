@@ -91,8 +91,8 @@ def _kicked(loop: Loop, steps: int, kick: float) -> LoopRecord:
     load[0] = 0.0
     if isinstance(valve, Stiction) and valve.motion is Motion.RESTS and isinstance(loop.process, Fopdt):
         stem = closed_loop(free, np.zeros(half), load[:half], op_start=0.0).stem[-1]
-        rests = -loop.process.gain * (stem + valve.slip_jump * np.array([-0.5, 0.5]))
-        load[half:] = rests[np.argmin(np.abs(rests - kick))]
+        rest_levels = -loop.process.gain * (stem + valve.slip_jump * np.array([-0.5, 0.5]))
+        load[half:] = rest_levels[np.argmin(np.abs(rest_levels - kick))]
     return closed_loop(free, np.zeros(steps), load, op_start=0.0)
 
 

@@ -39,7 +39,7 @@ def settings(controller: Pid) -> str:
     return f"Kp {controller.kp:.3g} %/%, Ti {f'{seconds_text(ti)} s' if math.isfinite(ti) else 'off'}"
 
 
-def fault_told(loop: Loop) -> str:
+def fault_text(loop: Loop) -> str:
     """Text for a valve fault with its size."""
     width = band(loop.valve)
     return (
@@ -65,7 +65,7 @@ def why_calmer(best: Candidate, before: Confirmed, after: Confirmed, ms_before: 
     loop, new = table.loops[0], best.controller
     peaks = [rejection(loop.process, pid).peak for pid in (new, loop.controller)]
     why = WHY["calmer"].format(
-        fault=fault_told(loop),
+        fault=fault_text(loop),
         old=f"{swings(before.cycle)} at {settings(loop.controller)} ({robustness(ms_before)})",
         new=f"{swings(after.cycle)} at {settings(new)} ({robustness(best.ms)})",
         models=len(table.loops),
@@ -82,6 +82,6 @@ def why_calmer(best: Candidate, before: Confirmed, after: Confirmed, ms_before: 
 
 def nothing_better(loop: Loop, before: Confirmed, considered: bool) -> str:
     """Reason for no settings for a loop with a faulty valve."""
-    known = {"fault": fault_told(loop), "cycle": swings(before.cycle)}
+    known = {"fault": fault_text(loop), "cycle": swings(before.cycle)}
     kind = "backlash" if isinstance(loop.valve, Backlash) else "stick-slip"
     return WHY["none_worth_it" if considered else "none_kept"].format(kind=kind, **known)

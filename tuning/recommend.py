@@ -22,7 +22,7 @@ from tuning.forecast import in_digits
 from tuning.frequency_response import integral_s, maximum_sensitivity, rejects_s, resonance_s
 from tuning.limit_cycle import Confirmed, confirm
 from tuning.limits import LIMITS, TuningLimits
-from tuning.reasons import WHY, fault_told, nothing_better, robustness, seconds_text, settings, why_calmer
+from tuning.reasons import WHY, fault_text, nothing_better, robustness, seconds_text, settings, why_calmer
 from tuning.ringing import ObservedRinging, sensitivity_at
 from tuning.rules import LAMBDA_PER_DELAY, TAU_C_PER_DELAY, effective_delay, simc
 from tuning.search import (
@@ -315,7 +315,7 @@ def _valve(
     """Settings with the least travel and error within the limits, for a loop with backlash or stick-slip."""
     if band(loop.valve) <= 0.0:
         return Proposal(Action.UNDECIDED, WHY["no_size"])
-    before, fault = confirm(loop), fault_told(loop)
+    before, fault = confirm(loop), fault_text(loop)
     if load is None:
         load = standard_load(loop, limits.most_steps)
     table = bench(loop, others, load, limits, indistinguishable)
@@ -366,12 +366,12 @@ def _smaller(after: Confirmed, before: Confirmed, most_growth: float) -> bool:
     return not grown and after.cycle.stem_travel <= before.cycle.stem_travel
 
 
-def _apart(candidates: list[Candidate], apart: float) -> list[Candidate]:
+def _distinct(candidates: list[Candidate], least_difference: float) -> list[Candidate]:
     """Candidates that differ from every better one by more than `apart`; the others would behave alike."""
     kept: list[Candidate] = []
     for c in candidates:
         here, *others = (np.log([abs(k.controller.kp) or 1.0, abs(k.controller.ti_s)]) for k in (c, *kept))
-        if all(np.abs(here - other).max() > apart for other in others):
+        if all(np.abs(here - other).max() > least_difference for other in others):
             kept.append(c)
     return kept
 
@@ -382,10 +382,12 @@ def _confirmed(
     """The best worthwhile candidate whose simulated limit cycle is none or smaller, on samples too."""
     first, limits = table.loops[0], table.limits
     worth = [c for c in candidates if _worth(c, first.controller, limits)]
-    worthy = _apart(worth, limits.apart)[: limits.confirmed]
-    samples = [(one, confirm(one)) for one in table.loops[1 : 1 + limits.samples_confirmed]] if worthy else []
+    distinct = _distinct(worth, limits.apart)[: limits.confirmed]
+    samples = (
+        [(one, confirm(one)) for one in table.loops[1 : 1 + limits.samples_confirmed]] if distinct else []
+    )
     growth = limits.cycle_growth if is_backlash(first.valve) else limits.cycle_growth_stick
-    for candidate in worthy:
+    for candidate in distinct:
         after = confirm(replace(table.loops[0], controller=candidate.controller))
         if _smaller(after, before, growth) and all(
             _smaller(confirm(replace(one, controller=candidate.controller)), old, growth)

@@ -59,9 +59,9 @@ def process_of(old: Pid, period_s: float) -> Integrator:
     """The integrator with dead time that rings at a period [s] with these settings: above that frequency its phase
     decreases faster than that of a lag with dead time through the same point."""
     there, ringing = at_period(old, period_s), 2.0 * math.pi / period_s
-    way = old.sign  # a direct-acting controller has a process of the opposite sign
-    dead_time_s = max(0.5 * math.pi + float(np.angle(way * there)), 0.0) / ringing
-    return Integrator(way * ringing / abs(there), dead_time_s)
+    sign = old.sign  # a direct-acting controller has a process of the opposite sign
+    dead_time_s = max(0.5 * math.pi + float(np.angle(sign * there)), 0.0) / ringing
+    return Integrator(sign * ringing / abs(there), dead_time_s)
 
 
 def from_ringing(old: Pid, period_s: float, share: float) -> list[Pid]:

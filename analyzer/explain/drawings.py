@@ -11,7 +11,7 @@ from identification.estimation.model import Fitted
 from identification.mismatch.catalogue import fault
 from identification.mismatch.location import Feature, Group, profile
 from identification.mismatch.outside import about
-from identification.mismatch.pictures import Drawing, Picture, busiest, by_stated_law
+from identification.mismatch.pictures import Drawing, Picture, by_stated_law, most_active
 from identification.mismatch.proof import course
 from identification.mismatch.where import located_in, won_over
 from identification.record import Floats, Mask
@@ -107,7 +107,7 @@ def close_part(e: Explained) -> slice:
     memory = CLOSE_MEMORIES * float(c[Slot.T] + c[Slot.L]) / s.dt_s
     length = min(int(np.clip(memory, LEAST_CLOSE, CLOSE)), s.pv.size)
     w = weight(e)
-    return busiest(np.cumsum(w), length) if w.any() else busiest(s.op, length, s.usable)
+    return most_active(np.cumsum(w), length) if w.any() else most_active(s.op, length, s.usable)
 
 
 def weight(e: Explained) -> Floats:
@@ -117,7 +117,7 @@ def weight(e: Explained) -> Floats:
         return np.concatenate((found.finding.where.astype(float), np.zeros(n)))[:n]
     if found.accepted:
         return np.maximum(won_over(found.p, found.plain, found.best)[0], 0.0)
-    return located_in(found.p, found.plain, e.case.recording).local if found.left > 0 else np.zeros(n)
+    return located_in(found.p, found.plain, e.case.recording).local if found.residual_nat > 0 else np.zeros(n)
 
 
 def misfit_panels(e: Explained) -> Panels:

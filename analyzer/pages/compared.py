@@ -196,7 +196,7 @@ def travel_field(
     """
     swings = f"limit cycle (darker: {moves} travels more)"
     keys = (("swings", swings), ("calm", f"no limit cycle{rest}"), ("unstable", "unstable"))
-    cells = np.abs(found.kp), found.ti_s, 3600.0 * found.travel, found.rests, found.unstable
+    cells = np.abs(found.kp), found.ti_s, 3600.0 * found.travel, found.at_rest, found.unstable
     return parts.Field("travel-map", title, "Kp [%/%]", "Ti [s]", *cells, tuple(places), keys)
 
 

@@ -98,7 +98,7 @@ def draw_map(ax: Axes, m: TravelMap, nominal: Pid, title: str, share: float = 0.
     ax.figure.colorbar(mesh, ax=ax, label="valve travel: OP amplitude / period [% OP / s]", extend="max")
     marks = []
     for mask, color, name in (
-        (m.rests, REST, "no limit cycle"),
+        (m.at_rest, REST, "no limit cycle"),
         (m.unstable, "0.55", "unstable without the valve's fault"),
     ):
         if mask.any():

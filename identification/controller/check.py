@@ -59,9 +59,9 @@ def op_step(op: Floats) -> float:
     return float(np.quantile(gaps, 0.1)) if gaps.size else 0.0
 
 
-def frozen_width(x: Trends, e: Floats, said: StatedSettings) -> float:
+def frozen_width(x: Trends, e: Floats, stated: StatedSettings) -> float:
     """Largest error [% PV] below which due moves of OP are missing and above which they occur; 0 without one."""
-    due = np.abs(due_moves(e, said.kp, said.ti)) > max(op_step(x.op), 1e-6)
+    due = np.abs(due_moves(e, stated.kp, stated.ti)) > max(op_step(x.op), 1e-6)
     still = np.diff(x.op, prepend=x.op[0]) == 0
     size = np.maximum(np.abs(e), np.abs(np.concatenate((e[:1], e[:-1]))))
     use, limits = due & x.usable, x.limits
@@ -76,22 +76,22 @@ def frozen_width(x: Trends, e: Floats, said: StatedSettings) -> float:
     return float(size[good[-1]]) if good.size else 0.0
 
 
-def gap(x: Trends, e: Floats, said: StatedSettings) -> Finding | None:
+def gap_finding(x: Trends, e: Floats, stated: StatedSettings) -> Finding | None:
     """Constant OP while the error is small: a law with a gap reproduces OP where the one without does not."""
-    length = span_length(x.op.size, said.ti, x.limits)
+    length = span_length(x.op.size, stated.ti, x.limits)
     n = (x.op.size // length) * length
     y = centred(x.op[:n], length)
 
-    def left(width: float, catches_up: bool) -> float:
-        path = gapped(e, said.kp, said.kp / said.ti, width, catches_up)
-        return typical(y - centred(path[:n], length), length)
+    def residual_at(width: float, catches_up: bool) -> float:
+        path = gapped(e, stated.kp, stated.kp / stated.ti, width, catches_up)
+        return median_residual(y - centred(path[:n], length), length)
 
     size = float(np.median(np.abs(e[x.usable]))) if x.usable.any() else 0.0
-    trials = [(left(size * w, c), size * w) for w in GAPS for c in (True, False)]
+    trials = [(residual_at(size * w, c), size * w) for w in GAPS for c in (True, False)]
     best, width = min(trials)
     still = np.diff(x.op, prepend=x.op[0]) == 0
-    if best > x.limits.gap_leaves * left(0.0, True):
-        width = frozen_width(x, e, said)
+    if best > x.limits.gap_leaves * residual_at(0.0, True):
+        width = frozen_width(x, e, stated)
     inside = still & (np.abs(e) < width)
     if inside.mean() < x.limits.gap_share:
         return None
@@ -104,7 +104,7 @@ def runs(still: Mask) -> list[tuple[int, int]]:
     return list(zip(np.flatnonzero(edge == 1), np.flatnonzero(edge == -1), strict=True))
 
 
-def asked(x: Trends) -> Mask:
+def overridden(x: Trends) -> Mask:
     """True where a move of SP or a limit of OP overrides the law, and at adjacent samples, shape (n,)."""
     least = x.limits.at_limit
     here = (
@@ -123,17 +123,17 @@ def lawless(x: Trends, found: ControlLaw) -> Mask:
     return out
 
 
-def ruled(x: Trends, e: Floats, said: StatedSettings, found: ControlLaw) -> Finding | None:
+def controller_logic(x: Trends, e: Floats, stated: StatedSettings, found: ControlLaw) -> Finding | None:
     """Spans in which something other than the law moves or holds OP."""
     off = lawless(x, found)
     if float(off.mean()) > x.limits.lawless_share and found.explained > 0.0:
         return Finding({"share": float(off.mean())}, off, "controller-logic")
-    return logic(x, e, said)
+    return constant_spans(x, e, stated)
 
 
-def logic(x: Trends, e: Floats, said: StatedSettings) -> Finding | None:
+def constant_spans(x: Trends, e: Floats, stated: StatedSettings) -> Finding | None:
     """Stretches in which OP is constant although the law requires moves, for any error."""
-    path, limits = np.cumsum(due_moves(e, said.kp, said.ti)), x.limits
+    path, limits = np.cumsum(due_moves(e, stated.kp, stated.ti)), x.limits
     least = limits.stuck_move * max(op_step(x.op), 0.02)
     where = np.zeros(x.op.size, dtype=bool)
     for first, last in runs((np.diff(x.op, prepend=x.op[0] + 1.0) == 0) & x.usable):
@@ -143,60 +143,61 @@ def logic(x: Trends, e: Floats, said: StatedSettings) -> Finding | None:
     return Finding({"share": share}, where, "controller-logic") if share > limits.stuck_share else None
 
 
-def typical(residual: Floats, length: int) -> float:
+def median_residual(residual: Floats, length: int) -> float:
     """Residual of the median span [% OP]."""
     return float(np.median(np.sqrt((residual.reshape(-1, length) ** 2).mean(axis=1))))
 
 
-def is_reproduced(x: Trends, said: StatedSettings, found: ControlLaw) -> bool:
+def is_reproduced(x: Trends, stated: StatedSettings, found: ControlLaw) -> bool:
     """Whether the stated law reproduces OP nearly as well as the identified one, overall and in the median span; on a
     thinned recording, whether it reproduces most of OP."""
     n, length, limits = found.residual.size, found.length, x.limits
     e, y = found.error(x.sp, x.pv)[:n], centred(x.op[:n], length)
-    left = y - said.kp * (centred(e, length) + centred(np.cumsum(e), length) / said.ti)
+    residual = y - stated.kp * (centred(e, length) + centred(np.cumsum(e), length) / stated.ti)
     lawful = trusted(found.residual, length, limits)
     moved = float(np.mean(y[lawful] ** 2))
-    if said.thinned(limits) and float(np.mean(left[lawful] ** 2)) < limits.thinned_leaves * moved:
+    if stated.thinned(limits) and float(np.mean(residual[lawful] ** 2)) < limits.thinned_leaves * moved:
         return True
-    whole = float(np.mean(left[lawful] ** 2)) < limits.same_law**2 * float(
+    whole = float(np.mean(residual[lawful] ** 2)) < limits.same_law**2 * float(
         np.mean(found.residual[lawful] ** 2)
     )
-    return whole and typical(left, length) < limits.same_law * typical(found.residual, length)
+    least = median_residual(found.residual, length)
+    return whole and median_residual(residual, length) < limits.same_law * least
 
 
-def settings(found: ControlLaw, said: StatedSettings, limits: ControllerLimits) -> Finding | None:
+def settings(found: ControlLaw, stated: StatedSettings, limits: ControllerLimits) -> Finding | None:
     """Identified settings that reproduce OP where the stated ones do not."""
     if found.explained < limits.law_explains or found.ki == 0 or found.kp / found.ki <= 0:
         return None
     ti = integral_time(found.kp, found.ki, found.residual.size)
-    off_kp = abs(math.log(max(found.kp / said.kp, 1e-6)))
-    off_ti = abs(math.log(max(ti / said.ti, 1e-6)))
-    if max(off_kp, off_ti) < (limits.setting_thinned if said.thinned(limits) else limits.setting):
+    off_kp = abs(math.log(max(found.kp / stated.kp, 1e-6)))
+    off_ti = abs(math.log(max(ti / stated.ti, 1e-6)))
+    if max(off_kp, off_ti) < (limits.setting_thinned if stated.thinned(limits) else limits.setting):
         return None
     values = {"kp": found.kp, "ti_samples": ti} if off_kp >= off_ti else {"ti_samples": ti, "kp": found.kp}
     return Finding(values, np.ones(found.residual.size, dtype=bool), "controller-settings")
 
 
-def judge(x: Trends, said: StatedSettings) -> tuple[Finding | None, ControlLaw | None]:
+def judge(x: Trends, stated: StatedSettings) -> tuple[Finding | None, ControlLaw | None]:
     """The first finding about clock or controller, and the identified law.
 
-    said : the stated settings. Confirmed ones are not reported. On a thinned recording only clearly wrong
+    stated : the stated settings. Confirmed ones are not reported. On a thinned recording only clearly wrong
     ones are, because the law is not visible in detail. If the integral acts between the samples, nothing is
     reported.
     """
-    limits, thinned = x.limits, said.thinned(x.limits)
-    if thinned and said.ti < limits.thinned_ti:
+    limits, thinned = x.limits, stated.thinned(x.limits)
+    if thinned and stated.ti < limits.thinned_ti:
         return None, None
-    found = recovered_law(x, said.ti, said.kp, late=not thinned)
+    found = recovered_law(x, stated.ti, stated.kp, late=not thinned)
     e = x.sp - first_order(x.pv, found.smoothed) + found.offset
-    wrong = None if said.confirmed or is_reproduced(x, said, found) else settings(found, said, limits)
+    wrong = None if stated.confirmed or is_reproduced(x, stated, found) else settings(found, stated, limits)
     if thinned:
         return wrong, found
     if found.late >= limits.late and found.explained > limits.law_explains:
         return Finding({LATE_SAMPLES: found.late}, np.ones(x.op.size, dtype=bool), "clock-offset"), found
-    law_now = StatedSettings(found.kp, found.kp / found.ki) if wrong is not None else said
-    frozen = gap(x, e, law_now)
+    law_now = StatedSettings(found.kp, found.kp / found.ki) if wrong is not None else stated
+    frozen = gap_finding(x, e, law_now)
     if frozen is not None:
         return frozen, found
-    other = ruled(replace(x, usable=x.usable & ~asked(x)), e, law_now, found)
+    other = controller_logic(replace(x, usable=x.usable & ~overridden(x)), e, law_now, found)
     return (other if other is not None else wrong), found

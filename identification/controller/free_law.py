@@ -1,6 +1,6 @@
 """The law of a record for which no settings are stated: the variant with the strongest evidence, and its settings.
 
-The variants of law_ways are fitted with free gains. An interval adds the scatter between parts of the record
+The variants of law_variants are fitted with free gains. An interval adds the scatter between parts of the record
 (delete-a-group jackknife, Shao and Wu 1989) and the share of OP that the law does not explain: moves of PV that no
 sample shows may be collinear with those that the samples show.
 """
@@ -19,12 +19,12 @@ from identification.controller.law_comparison import AS_WELL, ROUNDING, WORTH, s
 from identification.controller.law_variants import (
     STRAIGHT,
     PreparedRecord,
-    Seen,
+    VariantFit,
     bent_shapes,
     gains_of,
     prepared_record,
     terms_of,
-    usual_ways,
+    usual_variants,
     with_best_filter,
 )
 from identification.controller.pid_regression import SMALL, best_gains, fit_pi
@@ -84,52 +84,52 @@ def free_law(record: LoopRecord, scale_s: float) -> FreeLaw | None:
     seen = _clearest(x, start)
     if seen is None:
         return None
-    enough = AS_WELL * seen.left_over_all(seen.free) + ROUNDING
+    enough = AS_WELL * seen.residual_share(seen.free) + ROUNDING
     for along in SIMPLEST_FIRST:
         gains = best_gains(seen.moves.values(), seen.weight, along, np.zeros(3))
         pid = settings_of(gains, record.duration_s, start)
         alone = along is INTEGRAL and _is_integral(seen, record.dt_s)
-        if pid is not None and (alone or seen.left_over_all(gains) <= enough):
+        if pid is not None and (alone or seen.residual_share(gains) <= enough):
             return _law(x, seen, along, pid)
     return None
 
 
-def _is_integral(seen: Seen, dt_s: float) -> bool:
+def _is_integral(seen: VariantFit, dt_s: float) -> bool:
     """Whether the gain of the error is the delay, of at most a sample, of an integral without one."""
     kp, ki, _ = (float(g) for g in seen.free)
     return -dt_s * abs(ki) <= kp * math.copysign(1.0, ki) < 0.0
 
 
-def _law(x: PreparedRecord, seen: Seen, along: Floats, pid: Pid) -> FreeLaw:
+def _law(x: PreparedRecord, seen: VariantFit, along: Floats, pid: Pid) -> FreeLaw:
     """A law with its intervals."""
-    explained = 1.0 - seen.left_over_all(gains_of(pid))
+    explained = 1.0 - seen.residual_share(gains_of(pid))
     kp, ti_s = (
         _around(v, w) for v, w in zip((pid.kp, pid.ti_s), _widths(x, seen, along, explained), strict=True)
     )
     return FreeLaw(terms_of(x, pid, seen), explained, kp, replace(ti_s, unit="s"), _several(x, seen, along))
 
 
-def _clearest(x: PreparedRecord, start: Pid) -> Seen | None:
+def _clearest(x: PreparedRecord, start: Pid) -> VariantFit | None:
     """The simplest variant of the law; no other one reproduces OP clearly better."""
-    best: Seen | None = None
+    best: VariantFit | None = None
     for seen in _variants(x, start):
         lawful = seen.is_law(gains_of(start))
-        if lawful and (best is None or seen.poorness(seen.free) < best.poorness(best.free) - WORTH):
+        if lawful and (best is None or seen.misfit(seen.free) < best.misfit(best.free) - WORTH):
             best = seen
-        if best is not None and best.poorness(best.free) < math.log(SMALL) + WORTH:
+        if best is not None and best.misfit(best.free) < math.log(SMALL) + WORTH:
             break  # no residual is so small that another variant is clearly better
-    if best is None or best.way.pv_filter == 0.0:
+    if best is None or best.variant.pv_filter == 0.0:
         return best
-    near = with_best_filter(x, best.way, None)
-    return near if near is not None and near.poorness(near.free) < best.poorness(best.free) else best
+    near = with_best_filter(x, best.variant, None)
+    return near if near is not None and near.misfit(near.free) < best.misfit(best.free) else best
 
 
-def _variants(x: PreparedRecord, start: Pid) -> Iterator[Seen]:
-    bent = (usual_ways(x, shape, smoothing=False) for shape in bent_shapes(x, None))
-    return chain(usual_ways(x, STRAIGHT, start), *bent)
+def _variants(x: PreparedRecord, start: Pid) -> Iterator[VariantFit]:
+    bent = (usual_variants(x, shape, smoothing=False) for shape in bent_shapes(x, None))
+    return chain(usual_variants(x, STRAIGHT, start), *bent)
 
 
-def _widths(x: PreparedRecord, seen: Seen, along: Floats, explained: float) -> tuple[float, float]:
+def _widths(x: PreparedRecord, seen: VariantFit, along: Floats, explained: float) -> tuple[float, float]:
     """Half-widths of the 90 % intervals of the logs of gain and integral time."""
     edges = np.linspace(0, len(x.record), PARTS + 1).astype(int)
     k = np.arange(len(x.record))
@@ -148,13 +148,13 @@ def _logs(gains: Floats) -> tuple[float, float]:
     return math.log(kp) if kp else 0.0, math.log((kp or 1.0) / ki) if ki else 0.0
 
 
-def _gains_without(x: PreparedRecord, seen: Seen, along: Floats, out: Mask) -> Floats | None:
+def _gains_without(x: PreparedRecord, seen: VariantFit, along: Floats, out: Mask) -> Floats | None:
     """The gains of a variant without some samples, bool, shape (n,); None where the others show no law."""
-    rest = replace(x, out=x.out | out).seen(seen.rows, seen.way)
+    rest = replace(x, out=x.out | out).fit_variant(seen.rows, seen.variant)
     return None if rest is None else best_gains(rest.moves.values(), rest.weight, along, np.zeros(3))
 
 
-def _several(x: PreparedRecord, seen: Seen, along: Floats) -> bool:
+def _several(x: PreparedRecord, seen: VariantFit, along: Floats) -> bool:
     """Whether the gains in the lower and the upper half of OP, PV or SP differ by more than the usual resolution."""
     if x.out.all():
         return False

@@ -49,12 +49,12 @@ def gain_pieces(record: LoopRecord, stated: Pid) -> ScheduledGain | None:
         return None
     deciding = {"op": record.op[:-1], "pv": record.pv[1:], "sp": record.sp[1:]}
     found = [(*_best_edge(x[use], due, moved), name) for name, x in deciding.items()]
-    left, edge, below, above, over = min(found, key=lambda f: f[0])
+    residual, edge, below, above, over = min(found, key=lambda f: f[0])
     alone = whole - float(due @ moved) ** 2 / float(due @ due)
     same = any(1.0 / SAME <= factor <= SAME for factor in (below, above))
     if not same or min(below, above) <= 0.0 or max(below, above) < APART * min(below, above):
         return None
-    return ScheduledGain(over, edge, below, above) if left < min(GIVES * whole, BETTER * alone) else None
+    return ScheduledGain(over, edge, below, above) if residual < min(GIVES * whole, BETTER * alone) else None
 
 
 def _best_edge(x: Floats, due: Floats, moved: Floats) -> tuple[float, float, float, float]:
@@ -67,7 +67,7 @@ def _best_edge(x: Floats, due: Floats, moved: Floats) -> tuple[float, float, flo
     if not ends.size:
         return np.inf, 0.0, 1.0, 1.0
     below, above = both[ends] / size[ends], (both[-1] - both[ends]) / (size[-1] - size[ends])
-    left = float(d @ d) - below * both[ends] - above * (both[-1] - both[ends])
-    k = int(np.argmin(left))
+    residuals = float(d @ d) - below * both[ends] - above * (both[-1] - both[ends])
+    k = int(np.argmin(residuals))
     edge = 0.5 * float(values[ends[k]] + values[ends[k] + 1])
-    return float(left[k]), edge, float(below[k]), float(above[k])
+    return float(residuals[k]), edge, float(below[k]), float(above[k])

@@ -17,14 +17,14 @@ from identification.controller.law_variants import (
     STRAIGHT,
     LawVariant,
     PreparedRecord,
-    Seen,
+    VariantFit,
     bent_shapes,
     gains_of,
     prepared_record,
     recognized,
-    rough_ways,
+    rough_variants,
     shape_of,
-    usual_ways,
+    usual_variants,
     with_best_filter,
     with_shape,
 )
@@ -60,22 +60,22 @@ class LawsCompared:
     agree: bool = False
 
     @property
-    def left(self) -> float:
+    def residual_ratio(self) -> float:
         """Ratio of the residual of the stated law to that of the identified law [-]."""
         return (1.0 - self.explained_stated) / max(1.0 - self.explained, 1e-9)
 
 
-def _ways(x: PreparedRecord, stated: Pid) -> Iterator[Seen]:
+def _variants(x: PreparedRecord, stated: Pid) -> Iterator[VariantFit]:
     """All variants of the law, first with the stated error shape, then with unlisted properties."""
     own, gains = shape_of(stated), gains_of(stated)
-    yield from usual_ways(x, own, stated)
+    yield from usual_variants(x, own, stated)
     if stated.scan_s < x.record.dt_s:
-        yield from rough_ways(x, own)
+        yield from rough_variants(x, own)
     if own == STRAIGHT:
         for shape in bent_shapes(x, gains):
-            yield from chain(usual_ways(x, shape, smoothing=False), rough_ways(x, shape))
+            yield from chain(usual_variants(x, shape, smoothing=False), rough_variants(x, shape))
     else:
-        yield from usual_ways(x, STRAIGHT, stated)
+        yield from usual_variants(x, STRAIGHT, stated)
 
 
 def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompared | None:
@@ -86,34 +86,36 @@ def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompar
     """
     gains, x = gains_of(stated), prepared_record(record, period_s, stated)
     best, given = None, None
-    for seen in _ways(x, stated):
+    for seen in _variants(x, stated):
         if seen.reproduces_op(gains):
-            return LawsCompared(recognized(x, stated, seen, _way_needed(seen, given, stated)), 1.0, 1.0, True)
+            return LawsCompared(
+                recognized(x, stated, seen, _needed_variant(seen, given, stated)), 1.0, 1.0, True
+            )
         if not seen.is_law(gains):
             continue
-        if best is None or seen.poorness(seen.free) < best.poorness(best.free) - WORTH:
+        if best is None or seen.misfit(seen.free) < best.misfit(best.free) - WORTH:
             best = seen
-        if given is None or seen.poorness(gains) < given.poorness(gains):
+        if given is None or seen.misfit(gains) < given.misfit(gains):
             given = seen
-        if seen.way.pv_filter > given.way.pv_filter and _settled(best, given, gains):
+        if seen.variant.pv_filter > given.variant.pv_filter and _is_decided(best, given, gains):
             break
     if best is None or given is None:
         return None
-    if given.way.pv_filter >= SEEN_FILTER:
-        near = with_best_filter(x, given.way, gains)
+    if given.variant.pv_filter >= SEEN_FILTER:
+        near = with_best_filter(x, given.variant, gains)
         if near is not None and near.reproduces_op(gains):
-            return LawsCompared(recognized(x, stated, near, near.way), 1.0, 1.0, True)
-    found = _simplest(best, gains, record.duration_s, with_shape(stated, best.way.shape))
-    return None if found is None else _most_apart(best, given, gains, *found)
+            return LawsCompared(recognized(x, stated, near, near.variant), 1.0, 1.0, True)
+    found = _simplest(best, gains, record.duration_s, with_shape(stated, best.variant.shape))
+    return None if found is None else _clearest_comparison(best, given, gains, *found)
 
 
-def _way_needed(seen: Seen, before: Seen | None, stated: Pid) -> LawVariant:
+def _needed_variant(seen: VariantFit, before: VariantFit | None, stated: Pid) -> LawVariant:
     """The variant in which the stated law reproduces OP; with the stated error shape if that is about as good."""
     own, gains = shape_of(stated), gains_of(stated)
-    if seen.way.shape == own or before is None:
-        return seen.way
-    bent = before.poorness(gains) - seen.poorness(gains) > PLAINLY_BETTER
-    return seen.way if bent else replace(seen.way, shape=own)
+    if seen.variant.shape == own or before is None:
+        return seen.variant
+    bent = before.misfit(gains) - seen.misfit(gains) > PLAINLY_BETTER
+    return seen.variant if bent else replace(seen.variant, shape=own)
 
 
 def scheduled_over(record: LoopRecord, period_s: float, stated: Pid) -> ScheduledGain | None:
@@ -128,7 +130,7 @@ def scheduled_over(record: LoopRecord, period_s: float, stated: Pid) -> Schedule
         for low, high in PARTS:
             a, b = (float(np.quantile(x[record.usable], share)) for share in (low, high))
             within = replace(whole, out=whole.out | (x < a) | (x > b))
-            seen = within.plainly(shape_of(stated)) if b > a else None
+            seen = within.simplest_fit(shape_of(stated)) if b > a else None
             if seen is None or (stated.ki and max(seen.moves) * record.dt_s < 0.5 * stated.ti_s):
                 continue
             if seen.reproduces_op(gains):
@@ -143,21 +145,23 @@ def best_of(record: LoopRecord, period_s: float, laws: Sequence[Pid]) -> Pid:
     every scan recorded.
     """
     poor = np.full(len(laws), np.inf)
-    for seen in usual_ways(prepared_record(record, period_s, laws[0]), STRAIGHT, *laws, smoothing=False):
-        left = np.stack([seen.left(gains_of(law)) for law in laws])
-        poor = np.minimum(poor, np.log(np.maximum(left, ROUNDING)).mean(axis=1))
+    for seen in usual_variants(prepared_record(record, period_s, laws[0]), STRAIGHT, *laws, smoothing=False):
+        shares = np.stack([seen.residual_shares(gains_of(law)) for law in laws])
+        poor = np.minimum(poor, np.log(np.maximum(shares, ROUNDING)).mean(axis=1))
     best = int(np.argmin(poor))
     return laws[best] if poor[0] - poor[best] > PLAINLY_BETTER else laws[0]
 
 
-def _settled(best: Seen, given: Seen, gains: Floats) -> bool:
+def _is_decided(best: VariantFit, given: VariantFit, gains: Floats) -> bool:
     """Whether another law reproduces OP fully and the stated one is far off, so that more variants are
     useless. It is tested only if a longer filter of PV does not improve the stated one."""
-    left = best.left_over_all(best.free)
-    return left < SMALL and given.left_over_all(gains) > max(10.0 * left, GIVES)
+    share = best.residual_share(best.free)
+    return share < SMALL and given.residual_share(gains) > max(10.0 * share, GIVES)
 
 
-def _most_apart(best: Seen, given: Seen, gains: Floats, pid: Pid, law: Floats) -> LawsCompared | None:
+def _clearest_comparison(
+    best: VariantFit, given: VariantFit, gains: Floats, pid: Pid, law: Floats
+) -> LawsCompared | None:
     """The identified law and the stated one, over the increments that distinguish them most."""
     stated = {k: explained(m, gains) + blurred(m, gains) for k, m in given.moves.items()}
     laws = [
@@ -165,7 +169,7 @@ def _most_apart(best: Seen, given: Seen, gains: Floats, pid: Pid, law: Floats) -
         for (k, m), weight in zip(best.moves.items(), best.weight, strict=True)
         if weight > 0 and k in stated
     ]
-    return max(laws, key=lambda x: x.left * x.explained, default=None)
+    return max(laws, key=lambda x: x.residual_ratio * x.explained, default=None)
 
 
 def settings_of(gains: Floats, record_s: float, stated: Pid) -> Pid | None:
@@ -180,7 +184,7 @@ def settings_of(gains: Floats, record_s: float, stated: Pid) -> Pid | None:
     return None if integral_runs_back else replace(stated, kp=kp, ti_s=ti_s, td_s=max(kd / kp, 0.0))
 
 
-def _simplest(seen: Seen, gains: Floats, record_s: float, stated: Pid) -> tuple[Pid, Floats] | None:
+def _simplest(seen: VariantFit, gains: Floats, record_s: float, stated: Pid) -> tuple[Pid, Floats] | None:
     """The law that differs from the stated one in the fewest settings, and its gains."""
     p, i, d = np.eye(3)
     none = np.zeros(3)
@@ -193,10 +197,10 @@ def _simplest(seen: Seen, gains: Floats, record_s: float, stated: Pid) -> tuple[
         (np.stack((p + whole * d, i)), none),  # kp and ti
         (np.eye(3), none),
     ]
-    enough = AS_WELL * seen.left_over_all(seen.free) + 1e-6  # an exact law has only a rounding residual
+    enough = AS_WELL * seen.residual_share(seen.free) + 1e-6  # an exact law has only a rounding residual
     for along, held in trials:
         law = best_gains(seen.moves.values(), seen.weight, along, held)
         pid = settings_of(law, record_s, stated)
-        if pid is not None and seen.left_over_all(law) <= enough:
+        if pid is not None and seen.residual_share(law) <= enough:
             return pid, law
     return None

@@ -98,39 +98,39 @@ class LawVariant:
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class VariantFit:
     """A record under one variant of the law: products of increments by their length in samples, the weight of each
     length, the least-squares law, the variant, and its rows (pid_regression.rows_of)."""
 
     moves: dict[int, Floats]
     weight: Floats
     free: Floats
-    way: LawVariant
+    variant: LawVariant
     rows: Floats = field(repr=False)
 
     def is_law(self, gains: Floats) -> bool:
         """Whether the least-squares law can be that of a controller with the stated gains: without set point moves, a
         law of the opposite sign is the response of PV to OP."""
-        return self.way.sp_weight == 1.0 or bool(self.free[0] * gains[0] >= 0.0)
+        return self.variant.sp_weight == 1.0 or bool(self.free[0] * gains[0] >= 0.0)
 
-    def left(self, gains: Floats) -> Floats:
+    def residual_shares(self, gains: Floats) -> Floats:
         """Residual share of OP's variance under given gains at each length of increments [-]."""
         return np.array([1.0 - explained(m, gains) for m in self.moves.values()])
 
-    def left_over_all(self, gains: Floats) -> float:
+    def residual_share(self, gains: Floats) -> float:
         """The same, averaged over all lengths by their weights [-]."""
         moved = self.weight * np.array([m[3, 3] for m in self.moves.values()])
-        return float(moved @ self.left(gains) / moved.sum())
+        return float(moved @ self.residual_shares(gains) / moved.sum())
 
-    def poorness(self, gains: Floats) -> float:
+    def misfit(self, gains: Floats) -> float:
         """Misfit of given gains: mean logarithm of the residual, comparable between all variants of the law."""
-        return float(np.mean(np.log(SMALL + self.left(gains))))
+        return float(np.mean(np.log(SMALL + self.residual_shares(gains))))
 
     def reproduces_op(self, gains: Floats) -> bool:
         """Whether the gains reproduce OP about as well as any, and well enough."""
-        left, least = self.left(gains), self.left(self.free)
+        shares, least = self.residual_shares(gains), self.residual_shares(self.free)
         unsure = np.array([blurred(m, gains) for m in self.moves.values()])
-        return bool((left - unsure <= ENOUGH * least + SMALL).all() and least.min() < GIVES)
+        return bool((shares - unsure <= ENOUGH * least + SMALL).all() and least.min() < GIVES)
 
 
 def gains_of(c: Pid) -> Floats:
@@ -208,7 +208,7 @@ class PreparedRecord:
         """Rows of an error and its slope (pid_regression.rows_of)."""
         return rows_of(self.record, error, slope, self.scan_s)
 
-    def seen(self, rows: Floats, way: LawVariant) -> Seen | None:
+    def fit_variant(self, rows: Floats, variant: LawVariant) -> VariantFit | None:
         """The recording under one variant; None where no length shows a law."""
         every = len(self.record) // MOST_INCREMENTS
         of = {k: increments(rows, self.out, k, max(k // 8, every, 1), True) for k in self.lengths}
@@ -219,11 +219,11 @@ class PreparedRecord:
         free = best_gains(found.values(), weight, np.eye(3), np.zeros(3))
         if free[2] * free[0] < 0.0:  # no controller has such a derivative: it compensates for a wrong filter
             free = best_gains(found.values(), weight, np.eye(3)[:2], np.zeros(3))
-        return Seen(found, weight, free, way, rows)
+        return VariantFit(found, weight, free, variant, rows)
 
-    def plainly(self, shape: Shape) -> Seen | None:
+    def simplest_fit(self, shape: Shape) -> VariantFit | None:
         """The simplest variant with an error of that shape."""
-        return self.seen(self.rows(shaped(self.record.error, shape)), LawVariant(shape))
+        return self.fit_variant(self.rows(shaped(self.record.error, shape)), LawVariant(shape))
 
 
 def prepared_record(record: LoopRecord, scale_s: float, stated: Pid) -> PreparedRecord:
@@ -240,7 +240,9 @@ def slope_filters(dt_s: float, laws: Iterable[Pid]) -> tuple[float, ...]:
     return (*(float(1.0 / np.log1p(part)) for part in sorted(parts)), *SLOPE_FILTERS)
 
 
-def usual_ways(x: PreparedRecord, shape: Shape, *laws: Pid, smoothing: bool = True) -> Iterator[Seen]:
+def usual_variants(
+    x: PreparedRecord, shape: Shape, *laws: Pid, smoothing: bool = True
+) -> Iterator[VariantFit]:
     """The usual variants of laws on an error of that shape, simplest first; smoothing : also with filters of PV."""
     record, narrow = x.record, slope_filters(x.record.dt_s, laws)
     moves = float(np.ptp(record.sp)) > 0 and not record.sp_estimated
@@ -249,7 +251,7 @@ def usual_ways(x: PreparedRecord, shape: Shape, *laws: Pid, smoothing: bool = Tr
     for smooth, (late_pv, late_sp) in product(filters, LATE if moves else LATE[:2]):
         pv, sp = delayed(first_order(record.pv, smooth), late_pv), delayed(record.sp, late_sp)
         for rows, weight in _slopes(x, sp, pv, narrow, moves, shape):
-            found = x.seen(rows, LawVariant(shape, smooth, weight))
+            found = x.fit_variant(rows, LawVariant(shape, smooth, weight))
             if found is not None:
                 yield found
 
@@ -274,17 +276,17 @@ def _slopes(
         yield np.vstack((x.rows(shaped(sp - pv, shape), slope), sp)), None
 
 
-def rough_ways(x: PreparedRecord, shape: Shape) -> Iterator[Seen]:
+def rough_variants(x: PreparedRecord, shape: Shape) -> Iterator[VariantFit]:
     """Variants that ignore changes of PV from sample to sample: a derivative, or a filter, used other PV values
     between the samples."""
     record, pv = x.record, x.record.pv
-    beside = 0.5 * (np.concatenate((pv[:1], pv[:-1])) + np.concatenate((pv[1:], pv[-1:])))
-    slope = np.gradient(-beside, record.dt_s)
-    rows = [np.vstack((x.rows(shaped(record.error, shape), slope), pv - beside))]
+    neighbour_mean = 0.5 * (np.concatenate((pv[:1], pv[:-1])) + np.concatenate((pv[1:], pv[-1:])))
+    slope = np.gradient(-neighbour_mean, record.dt_s)
+    rows = [np.vstack((x.rows(shaped(record.error, shape), slope), pv - neighbour_mean))]
     if float(np.ptp(record.sp)) > 0:
         rows.append(np.vstack((rows[0], record.sp)))
     for each, weight in zip(rows, (1.0, None), strict=False):
-        found = x.seen(each, LawVariant(shape, sp_weight=weight))
+        found = x.fit_variant(each, LawVariant(shape, sp_weight=weight))
         if found is not None:
             yield found
 
@@ -306,8 +308,8 @@ def _best_gap(x: PreparedRecord, size: float, inside: float, gains: Floats | Non
     """The gap with which the given gains, or the least-squares law, reproduce OP best [% PV]; 0 if none is better."""
 
     def poor(width: float) -> float:
-        seen = x.plainly((width, inside, False) if width > 0.0 else STRAIGHT)
-        return np.inf if seen is None else seen.poorness(seen.free if gains is None else gains)
+        seen = x.simplest_fit((width, inside, False) if width > 0.0 else STRAIGHT)
+        return np.inf if seen is None else seen.misfit(seen.free if gains is None else gains)
 
     tried = {w: poor(w) for w in (0.0, *(size * w for w in GAPS))}
     best = min(tried, key=tried.__getitem__)
@@ -320,21 +322,21 @@ def _best_gap(x: PreparedRecord, size: float, inside: float, gains: Floats | Non
     return 0.5 * (low + high)
 
 
-def recognized(x: PreparedRecord, stated: Pid, seen: Seen, way: LawVariant) -> Pid:
-    """A stated controller completed by what the record shows: the properties `way` of the variant seen, which agrees
+def recognized(x: PreparedRecord, stated: Pid, seen: VariantFit, variant: LawVariant) -> Pid:
+    """A stated controller completed by what the record shows: the properties of a variant, which agrees
     with the stated gains, and the visible limits of OP and of its rate."""
-    way = _clearer(x, seen, way, stated)
-    if way.pv_filter >= SEEN_FILTER and not stated.pv_filter_s:
-        way = replace(way, pv_filter=_best_filter(x, way, gains_of(stated)))
-    return terms_of(x, stated, replace(seen, way=way))
+    variant = _clearer(x, seen, variant, stated)
+    if variant.pv_filter >= SEEN_FILTER and not stated.pv_filter_s:
+        variant = replace(variant, pv_filter=_best_filter(x, variant, gains_of(stated)))
+    return terms_of(x, stated, replace(seen, variant=variant))
 
 
-def terms_of(x: PreparedRecord, c: Pid, seen: Seen) -> Pid:
+def terms_of(x: PreparedRecord, c: Pid, seen: VariantFit) -> Pid:
     """A controller with the terms of a variant, and with the visible limits of OP and of its rate."""
-    record, way, c = x.record, seen.way, with_shape(c, seen.way.shape)
-    if way.pv_filter >= SEEN_FILTER and not c.pv_filter_s:
-        c = replace(c, pv_filter_s=way.pv_filter * record.dt_s)
-    weight = _set_point_weight(x, seen, gains_of(c)) if way.sp_weight is None else way.sp_weight
+    record, variant, c = x.record, seen.variant, with_shape(c, seen.variant.shape)
+    if variant.pv_filter >= SEEN_FILTER and not c.pv_filter_s:
+        c = replace(c, pv_filter_s=variant.pv_filter * record.dt_s)
+    weight = _set_point_weight(x, seen, gains_of(c)) if variant.sp_weight is None else variant.sp_weight
     if weight < PLAIN_WEIGHT and c.kp and c.sp_weight == 1.0:
         c = replace(c, sp_weight=weight)
     if fastest(record.op).any():
@@ -345,51 +347,51 @@ def terms_of(x: PreparedRecord, c: Pid, seen: Seen) -> Pid:
     return replace(c, op_lo=float(max([c.op_lo, *low[:1]])), op_hi=float(min([c.op_hi, *high[:1]])))
 
 
-def _set_point_weight(x: PreparedRecord, seen: Seen, gains: Floats) -> float:
+def _set_point_weight(x: PreparedRecord, seen: VariantFit, gains: Floats) -> float:
     """The set point weight of the gain, from OP's moves with SP and within WITH_SP samples after it that the law with
     the full weight leaves [-]; 1 where other signals act on OP too."""
     if seen.rows.shape[0] != 6 or x.record.feed is not None or gains[0] == 0.0:
         return 1.0
     moved, use = np.diff(seen.rows, axis=1), ~(x.out[1:] | x.out[:-1])
-    left = (moved[3] - gains @ moved[:3])[use]
+    residual = (moved[3] - gains @ moved[:3])[use]
     sp = np.stack([delayed(moved[5], k)[use] for k in range(WITH_SP + 1)], axis=1)
-    with_sp = float(np.linalg.lstsq(sp, left, rcond=1e-9)[0].sum())
+    with_sp = float(np.linalg.lstsq(sp, residual, rcond=1e-9)[0].sum())
     return float(np.clip(1.0 + with_sp / gains[0], 0.0, 1.0))
 
 
-def _clearer(x: PreparedRecord, seen: Seen, way: LawVariant, stated: Pid) -> LawVariant:
+def _clearer(x: PreparedRecord, seen: VariantFit, variant: LawVariant, stated: Pid) -> LawVariant:
     """The properties of the variant seen, or those with a filter of PV with which the stated gains
     reproduce OP clearly better. If little of OP is noise, gains agree with the record under any filter."""
-    own = seen.poorness(gains_of(stated))
+    own = seen.misfit(gains_of(stated))
     if stated.td_s or stated.pv_filter_s or own < np.log(SMALL) + PLAINLY_BETTER:
-        return way
-    found = {f: _poorness(x, way, gains_of(stated), f) for f in PV_FILTERS if f > way.pv_filter}
-    best = min(found, key=found.__getitem__, default=way.pv_filter)
-    return replace(way, pv_filter=best) if found.get(best, own) < own - PLAINLY_BETTER else way
+        return variant
+    found = {f: _misfit(x, variant, gains_of(stated), f) for f in PV_FILTERS if f > variant.pv_filter}
+    best = min(found, key=found.__getitem__, default=variant.pv_filter)
+    return replace(variant, pv_filter=best) if found.get(best, own) < own - PLAINLY_BETTER else variant
 
 
-def with_best_filter(x: PreparedRecord, way: LawVariant, gains: Floats | None) -> Seen | None:
+def with_best_filter(x: PreparedRecord, variant: LawVariant, gains: Floats | None) -> VariantFit | None:
     """A variant with the filter of PV, near its own, with which the gains, or the least-squares law, reproduce OP
     best."""
-    return _filtered(x, way, _best_filter(x, way, gains))
+    return _filtered(x, variant, _best_filter(x, variant, gains))
 
 
-def _filtered(x: PreparedRecord, way: LawVariant, smooth: float) -> Seen | None:
+def _filtered(x: PreparedRecord, variant: LawVariant, smooth: float) -> VariantFit | None:
     """A variant with another filter of PV [samples]."""
     error = x.record.sp - first_order(x.record.pv, smooth)
-    return x.seen(x.rows(shaped(error, way.shape)), replace(way, pv_filter=smooth))
+    return x.fit_variant(x.rows(shaped(error, variant.shape)), replace(variant, pv_filter=smooth))
 
 
-def _poorness(x: PreparedRecord, way: LawVariant, gains: Floats | None, smooth: float) -> float:
-    """Misfit of the gains, or of the least-squares law, as Seen.poorness, behind another filter of PV [samples]."""
-    seen = _filtered(x, way, smooth)
-    return np.inf if seen is None else seen.poorness(seen.free if gains is None else gains)
+def _misfit(x: PreparedRecord, variant: LawVariant, gains: Floats | None, smooth: float) -> float:
+    """VariantFit.misfit of the gains, or of the least-squares law, behind another filter of PV [samples]."""
+    seen = _filtered(x, variant, smooth)
+    return np.inf if seen is None else seen.misfit(seen.free if gains is None else gains)
 
 
-def _best_filter(x: PreparedRecord, way: LawVariant, gains: Floats | None) -> float:
+def _best_filter(x: PreparedRecord, variant: LawVariant, gains: Floats | None) -> float:
     """The filter of PV, near that of a variant, with which the gains, or the least-squares law, reproduce OP best
     [samples]; the variant's own if there is a derivative, which also has a filter."""
     if gains is not None and gains[2]:
-        return way.pv_filter
-    near = way.pv_filter * np.geomspace(0.5, 2.0, FILTERS_NEAR)
-    return float(min(near, key=lambda smooth: _poorness(x, way, gains, smooth)))
+        return variant.pv_filter
+    near = variant.pv_filter * np.geomspace(0.5, 2.0, FILTERS_NEAR)
+    return float(min(near, key=lambda smooth: _misfit(x, variant, gains, smooth)))

@@ -110,14 +110,14 @@ def law(x: Trends, length: int, late: float, smoothed: float = 0.0) -> ControlLa
         kp, ki, offset, residual = regress(e[:n], x.op[:n], length, keep)
         keep = fit & trusted(residual, length, x.limits)
     moved = centred(x.op[:n], length)
-    left = float((residual[keep] ** 2).mean()) if keep.any() else math.inf
+    mean_square = float((residual[keep] ** 2).mean()) if keep.any() else math.inf
     power = float((moved[keep] ** 2).mean()) if keep.any() else 1.0
     return ControlLaw(
         kp,
         ki,
         late,
-        math.sqrt(left),
-        1.0 - left / max(power, 1e-12),
+        math.sqrt(mean_square),
+        1.0 - mean_square / max(power, 1e-12),
         length,
         residual,
         smoothed,
@@ -149,8 +149,8 @@ def recovered_law(x: Trends, ti_samples: float, stated_kp: float = 1.0, late: bo
     if math.isinf(scatter(best)):
         return at(0.0)
     for step in (0.5, 0.25, 0.125, 0.06) if best.smoothed else (0.5, 0.25):
-        told = late and step >= LATE_STEP
-        later = [at(best.late + way * step, best.smoothed) for way in (-1, 1) if told]
+        search_late = late and step >= LATE_STEP
+        later = [at(best.late + way * step, best.smoothed) for way in (-1, 1) if search_late]
         slower = [at(best.late, best.smoothed * (1 + way * step)) for way in (-1, 1) if best.smoothed]
         best = min([best, *later, *slower], key=scatter)
     return best
@@ -187,11 +187,11 @@ def feedback_share(op: Floats, pv: Floats) -> float:
     moved = op[k] - op[k - 1]
     own = [np.ones(k.size), op[k - 1], *(op[k - i] - op[k - i - 1] for i in OWN)]
     seen = [pv[k], *(pv[k] - pv[k - i] for i in SEEN)]
-    alone, together = _left(moved, own), _left(moved, own + seen)
+    alone, together = _residual_squares(moved, own), _residual_squares(moved, own + seen)
     return 1.0 - together / alone if alone > 0.0 else 0.0
 
 
-def _left(y: Floats, columns: list[Floats]) -> float:
+def _residual_squares(y: Floats, columns: list[Floats]) -> float:
     """Residual sum of squares of a regression."""
     x = np.stack(columns, axis=1)
     x = x / np.maximum(np.abs(x).max(axis=0), 1e-12)

@@ -153,9 +153,9 @@ def fit_pi(record: LoopRecord, period_s: float) -> ControllerFit | None:
 def best_gains(of: Iterable[Floats], weight: Floats, free: Floats, held: Floats) -> Floats:
     """Gains, shape (3,): `held` plus the best combination of the rows of `free`, shape (k, 3)."""
     total = np.einsum("i,ijk->jk", weight, np.stack([m[:4, :4] for m in of]))
-    gram, asked = free @ total[:3, :3] @ free.T, free @ (total[:3, 3] - total[:3, :3] @ held)
+    gram, rhs = free @ total[:3, :3] @ free.T, free @ (total[:3, 3] - total[:3, :3] @ held)
     scale = np.sqrt(np.maximum(np.diag(gram), 0.0)) + 1e-150
-    along = np.linalg.lstsq(gram / np.outer(scale, scale), asked / scale, rcond=1e-10)[0] / scale
+    along = np.linalg.lstsq(gram / np.outer(scale, scale), rhs / scale, rcond=1e-10)[0] / scale
     return np.asarray(held + along @ free)
 
 

@@ -124,19 +124,19 @@ def _likeliest(fits: list[Fitted]) -> Fitted:
     return max(ends, key=lambda fit: fit.log_likelihood)
 
 
-def fit_backlash(linear: Fitted, period_s: float, hopeful: float | None = None) -> Fitted:
+def fit_backlash(linear: Fitted, period_s: float, screening_nat: float | None = None) -> Fitted:
     """The best backlash followed by a lag: a screening, then the full search if the screening finds anything.
 
-    linear : the best fit behind an ideal valve; period_s : time scale of the search [s]; hopeful : gain in log
+    linear : the best fit behind an ideal valve; period_s : time scale of the search [s]; screening_nat : gain in log
     likelihood [nat] of a quick screening above which the full search follows; None: the screening is thorough and the
     limit is SCREENED.
     """
     problem = linear.p
     reach = problem.reach
     screened = [sticking(share * reach, 0.0) for share in SCREEN_SHARES]
-    followed = len(screened) if hopeful is None else 1
+    followed = len(screened) if screening_nat is None else 1
     best = _likeliest(_chosen(linear, screened, period_s, followed))
-    if best.log_likelihood - linear.log_likelihood < (SCREENED if hopeful is None else hopeful):
+    if best.log_likelihood - linear.log_likelihood < (SCREENED if screening_nat is None else screening_nat):
         return best
     followed = FOLLOWED_SHORT if problem.y.size < SHORT else 1
     begun = []
@@ -146,28 +146,28 @@ def fit_backlash(linear: Fitted, period_s: float, hopeful: float | None = None) 
     return max(best, _likeliest(begun), key=lambda fit: fit.log_likelihood)
 
 
-def better_linear(linear: Fitted, play: Fitted) -> Fitted:
+def better_linear(linear: Fitted, backlash: Fitted) -> Fitted:
     """The better of the linear fit and a linear fit that starts from the dynamics found behind backlash.
 
     An ideal valve is backlash of width zero, so this start makes the comparison fair. If both are equally likely, the
     linear fit from its own search is returned.
     """
-    trial = descend(play.moved(valve=IDEAL))
+    trial = descend(backlash.moved(valve=IDEAL))
     return trial if trial.log_likelihood > linear.log_likelihood + CLEAR else linear
 
 
-def fit_stick_slip(play: Fitted, period_s: float) -> Fitted:
+def fit_stick_slip(backlash: Fitted, period_s: float) -> Fitted:
     """The best stick-slip (J > 0) followed by a lag: a coarse scan of the whole range and a fine scan near the
     backlash.
 
-    play : the best backlash, near the stickband in width, because both set the travel of OP between slips. It is up
+    backlash : the best one, near the stickband in width, because both set the travel of OP between slips. It is up
     to half as wide again where the slip jump is most of the stickband; narrower bands have their own finalists.
     period_s : time scale of the search [s].
     """
-    short = play.p.y.size < SHORT
-    begun = _chosen(play, _coarse(play), period_s, FOLLOWED_SHORT if short else FOLLOWED)
+    short = backlash.p.y.size < SHORT
+    begun = _chosen(backlash, _coarse(backlash), period_s, FOLLOWED_SHORT if short else FOLLOWED)
     narrow, laws = _grid(NARROW_WIDTHS, FINE_JUMPS), (RESTS, HALTS, SLIDES)
-    fits = [_likeliest(begun), *local_minima(play, laws), *local_minima(play, laws, narrow)]
+    fits = [_likeliest(begun), *local_minima(backlash, laws), *local_minima(backlash, laws, narrow)]
     return refined(max(fits, key=lambda fit: fit.log_likelihood))
 
 
@@ -192,10 +192,10 @@ def _grid(widths: tuple[float, ...], jumps: tuple[float, ...]) -> Floats:
     return np.array(list(product(np.arange(*widths), np.arange(*jumps))))
 
 
-def _coarse(play: Fitted) -> list[StemLaw]:
+def _coarse(backlash: Fitted) -> list[StemLaw]:
     """Stickbands up to the range of OP, with stems that rest and stems that slide."""
-    reach = play.p.reach
-    near = play.valve.stickband / reach
+    reach = backlash.p.reach
+    near = backlash.valve.stickband / reach
     widths = {round(s, 4) for s in MIDDLE + LARGE} | {near, 1.1 * near}
     return [
         sticking(width * reach, jump, tolerance)
@@ -206,7 +206,10 @@ def _coarse(play: Fitted) -> list[StemLaw]:
 
 
 def local_minima(
-    play: Fitted, tolerances: tuple[float, ...], grid: Floats | None = None, later: tuple[float, ...] = LATER
+    backlash: Fitted,
+    tolerances: tuple[float, ...],
+    grid: Floats | None = None,
+    later: tuple[float, ...] = LATER,
 ) -> list[Fitted]:
     """The most likely stick-slips near a backlash or another stick-slip: local minima of the best few of each
     behaviour.
@@ -215,20 +218,21 @@ def local_minima(
     grid : shape (m, 2), stickbands as multiples of the backlash width and slip jumps as shares of the stickband;
     later : dead times added to that of the backlash fit [blocks].
     """
-    problem = play.p
-    pairs = np.array([play.valve.stickband, 1.0]) * (_grid(FINE_WIDTHS, FINE_JUMPS) if grid is None else grid)
-    t, deads = play.time_constant_s, np.maximum(play.dead_time_s + np.array(later) * problem.dt_s, 0.0)
+    problem = backlash.p
+    relative = _grid(FINE_WIDTHS, FINE_JUMPS) if grid is None else grid
+    pairs, t = np.array([backlash.valve.stickband, 1.0]) * relative, backlash.time_constant_s
+    deads = np.maximum(backlash.dead_time_s + np.array(later) * problem.dt_s, 0.0)
     out, pv, begins = [], white_pv(problem, generic_noise()), [(t, float(dead)) for dead in deads]
     for tolerance in tolerances:
-        left = _scan(pv, pairs, tolerance, t, deads)
-        best = [sticking(pairs[i, 0], pairs[i, 1], tolerance) for i in np.argsort(left)[:FINALISTS]]
+        variances = _scan(pv, pairs, tolerance, t, deads)
+        best = [sticking(pairs[i, 0], pairs[i, 1], tolerance) for i in np.argsort(variances)[:FINALISTS]]
         fits = _ranked(problem, generic_noise(), best, begins)
-        out += [_bottom(descend(fit)) for fit in fits]
+        out += [_local_minimum(descend(fit)) for fit in fits]
     likeliest = sorted(out, key=lambda fit: -fit.log_likelihood)[:FOLLOWED]
-    return [_bottom(fit) for fit in likeliest]
+    return [_local_minimum(fit) for fit in likeliest]
 
 
-def _bottom(fit: Fitted) -> Fitted:
+def _local_minimum(fit: Fitted) -> Fitted:
     """Move stickband and slip jump to their local minimum, then descend in the other constants."""
     dynamics = fit.time_constant_s, fit.dead_time_s
     valve = settled(white_pv(fit.p, fit.ar), fit.valve, fit.loss, dynamics)
@@ -254,13 +258,15 @@ def _scan(pv: WhitePv, pairs: Floats, tolerance: float, time_constant_s: float, 
         whole = respond(whitened_stem(stem - stem.mean(), pv.ar), Lag(pole, 1.0, 0.0, 0))
         for dead_s in deads_s:
             lag = unit_lag(time_constant_s, dead_s, pv.dt_s)
-            products, fx = _later(whole, lag, pv.rows, decay, x)
+            products, fx = _delayed_response(whole, lag, pv.rows, decay, x)
             out[i] = min(out[i], variance_left(products, (fv, fx, f1, ft, ff), pv.sums, level)[0])
     return out
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
-def _later(whole: Floats, lag: Lag, rows: Floats, decay: Floats, out: Floats) -> tuple[Products, float]:
+def _delayed_response(
+    whole: Floats, lag: Lag, rows: Floats, decay: Floats, out: Floats
+) -> tuple[Products, float]:
     """Write the response at one dead time into `out`, from the one without; return its products and that with the
     decay, summed in any order. The stem is assumed to be at rest at the start.
     """
@@ -287,38 +293,39 @@ WIDTHS = np.geomspace(0.1, 60.0, 29)
 of a positioner to a valve whose linkage is loose."""
 
 
-def width_profile(linear: Fitted, play: Fitted) -> Floats:
+def width_profile(linear: Fitted, backlash: Fitted) -> Floats:
     """Log likelihood of backlash at each of WIDTHS over that of an ideal valve [nat], shape of WIDTHS.
 
     Each width has its best process, under the better of two noise models: that of the backlash fit and the generic
     one. The best backlash lies between two widths: it counts for both, less a nat for a whole step of them, so that
     two records of one valve always agree on one width.
 
-    linear, play : the fits to one problem behind an ideal valve and behind the best backlash.
+    linear, backlash : the fits to one problem behind an ideal valve and behind the best backlash.
     """
     problem = linear.p
     blocks = problem.with_blocks(position=None)
     out, reach = np.zeros(WIDTHS.size), float(np.ptp(problem.blocks.op))
-    asked = np.flatnonzero((WIDTH_SEEN * reach < WIDTHS) & (WIDTH_WHOLE * reach > WIDTHS))
-    if asked.size == 0:
+    profiled = np.flatnonzero((WIDTH_SEEN * reach < WIDTHS) & (WIDTH_WHOLE * reach > WIDTHS))
+    if profiled.size == 0:
         return out
-    ideal, least, own = _ideal(blocks, linear, play, linear.ar), np.full(asked.size, np.inf), math.inf
-    for ar in (play.ar, generic_noise()):
+    ideal, least, own = _ideal(blocks, linear, backlash, linear.ar), np.full(profiled.size, np.inf), math.inf
+    for ar in (backlash.ar, generic_noise()):
         pv = white_pv(blocks, ar)
-        ideal = min(ideal, _ideal(blocks, linear, play, ar))
-        least = np.minimum(least, _swept(pv, WIDTHS[asked], play))
-        own = min(own, float(_swept(pv, np.array([play.valve.stickband]), play)[0]))
-    out[asked] = 0.5 * play.count * np.log(ideal / least)
-    steps = np.abs(np.log(WIDTHS / max(play.valve.stickband, 1e-9))) / math.log(WIDTHS[1] / WIDTHS[0])
-    beside = asked[steps[asked] < 1.0]
-    out[beside] = np.maximum(out[beside], 0.5 * play.count * math.log(ideal / own) - steps[beside] ** 2)
-    out[asked[-1] + 1 :] = out[asked[-1]]
+        ideal = min(ideal, _ideal(blocks, linear, backlash, ar))
+        least = np.minimum(least, _swept(pv, WIDTHS[profiled], backlash))
+        own = min(own, float(_swept(pv, np.array([backlash.valve.stickband]), backlash)[0]))
+    out[profiled] = 0.5 * backlash.count * np.log(ideal / least)
+    steps = np.abs(np.log(WIDTHS / max(backlash.valve.stickband, 1e-9))) / math.log(WIDTHS[1] / WIDTHS[0])
+    adjacent = profiled[steps[profiled] < 1.0]
+    own_nat = 0.5 * backlash.count * math.log(ideal / own)
+    out[adjacent] = np.maximum(out[adjacent], own_nat - steps[adjacent] ** 2)
+    out[profiled[-1] + 1 :] = out[profiled[-1]]
     return out
 
 
-def _ideal(problem: Problem, linear: Fitted, play: Fitted, ar: Floats) -> float:
+def _ideal(problem: Problem, linear: Fitted, backlash: Fitted, ar: Floats) -> float:
     """Innovations variance behind an ideal valve under one noise model."""
-    begins = [_dynamics(linear), _dynamics(play)]
+    begins = [_dynamics(linear), _dynamics(backlash)]
     return search(behind(white_pv(problem, ar), IDEAL), begins, PROFILE_HALVINGS)[1]
 
 
@@ -326,13 +333,13 @@ def _dynamics(fit: Fitted) -> Dynamics:
     return fit.time_constant_s, fit.dead_time_s
 
 
-def _swept(pv: WhitePv, widths: Floats, play: Fitted) -> Floats:
+def _swept(pv: WhitePv, widths: Floats, backlash: Fitted) -> Floats:
     """Innovations variance behind backlash of increasing widths, computed from the best width outwards both ways."""
     out = np.empty(widths.size)
-    first = int(np.argmin(np.abs(np.log(widths / max(play.valve.stickband, 1e-3)))))
-    for way in (range(first, widths.size), range(first - 1, -1, -1)):
-        near = _dynamics(play)
-        for k in way:
+    first = int(np.argmin(np.abs(np.log(widths / max(backlash.valve.stickband, 1e-3)))))
+    for indices in (range(first, widths.size), range(first - 1, -1, -1)):
+        near = _dynamics(backlash)
+        for k in indices:
             prepared = behind(pv, sticking(widths[k], 0.0))
-            near, out[k], _, _ = search(prepared, [near, _dynamics(play)], PROFILE_HALVINGS)
+            near, out[k], _, _ = search(prepared, [near, _dynamics(backlash)], PROFILE_HALVINGS)
     return out

@@ -38,7 +38,7 @@ class BacklashUnderLine:
     """The joint model: the fit of its process and backlash, `worn`, and the likeliest with an ideal valve, `ideal`,
     and the gain in log likelihood of the first in each half-cycle [nat], shape (t,), outliers limited."""
 
-    play: Fitted
+    backlash: Fitted
     worn: SmoothFit
     ideal: SmoothFit
     gained: Floats
@@ -54,7 +54,7 @@ class BacklashUnderLine:
         return agreement_of(self.gained) if self.gained.size > 3 else None
 
 
-def beside_line(
+def fit_backlash_under_line(
     problem: Problem, begins: Sequence[Dynamics], valves: Sequence[StemLaw], period_s: float
 ) -> BacklashUnderLine:
     """Backlash under a load with a line of a period [s].

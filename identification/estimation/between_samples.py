@@ -104,8 +104,8 @@ def op_at_scans(fit: Fitted, scans: Scans, paths: int = PATHS) -> Floats:
 
 def without_noise(x: Floats) -> Floats:
     """A load [% PV], shape (n,), without its white noise: the mean of the forward and the backward prediction."""
-    left = [(float(np.mean(_tracked(x, g)[1] ** 2)), g) for g in _GAINS]
-    gains = min(left)[1]
+    losses = [(float(np.mean(_tracked(x, g)[1] ** 2)), g) for g in _GAINS]
+    gains = min(losses)[1]
     return 0.5 * (_tracked(x, gains)[0] + _tracked(x[::-1].copy(), gains)[0][::-1])
 
 
@@ -124,8 +124,8 @@ def _tracked(x: Floats, gains: Gains) -> tuple[Floats, Floats]:
 def _predictor(rows: Rows, loop: LoopAtScan, scans: int) -> tuple[Gains, float]:
     """The gains with the best prediction of the next row, and the standard deviation of PV's noise [% PV]."""
     none = np.zeros((rows.pv.size, scans))
-    left, gains = min((float(np.mean(_stepped(rows, loop, g, none)[1] ** 2)), g) for g in _GAINS)
-    return gains, math.sqrt((1.0 - gains[0]) * left)
+    loss, gains = min((float(np.mean(_stepped(rows, loop, g, none)[1] ** 2)), g) for g in _GAINS)
+    return gains, math.sqrt((1.0 - gains[0]) * loss)
 
 
 @njit(cache=True)

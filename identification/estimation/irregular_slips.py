@@ -16,8 +16,7 @@ from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.slip_beam import Noise, Response, SlipDistances, decoded, log_chance
 from identification.record import Floats
 from identification.simulation.lag import unit_lag
-from identification.simulation.valve import StemLaw, sticking
-from identification.simulation.valve import play as play_stem
+from identification.simulation.valve import StemLaw, backlash_stem, sticking
 
 WIDTHS = (0.78, 0.88, 0.98, 1.12)
 """Stickbands tried, in widths of the best-fitting backlash [of the backlash]: on 32 simulated stems of dry
@@ -39,7 +38,7 @@ and is identified."""
 HOT = (8.0, 4.0, 2.0, 1.0)
 """Times the innovations' variance in the first rounds, in which the process is not known yet."""
 FEWEST = 6  # Slips of a path at least: three cycles
-RESTS = 0.9
+LONGEST_REST = 0.9
 """Longest rest of a stem while the process is not known: a stem at rest explains nothing [periods]."""
 STEPS = (0.15, 0.08, 0.04)  # Relative steps of the search for the friction in the end
 DEAD_STEPS = 8.0
@@ -71,7 +70,7 @@ class SlipPath(NamedTuple):
         return float(np.mean(self.fit.p.blocks.position))  # type: ignore[arg-type]
 
     @property
-    def worth(self) -> float:
+    def log_likelihood(self) -> float:
         """Log likelihood of fit and slips [nat]."""
         return self.fit.log_likelihood + self.chance
 
@@ -107,31 +106,31 @@ def _slips(stem: Floats) -> int:
     return int((np.diff(stem) != 0).sum())
 
 
-def _gain(play: Fitted, band: float, share: float, half: int) -> float:
+def _gain(backlash: Fitted, band: float, share: float, half: int) -> float:
     """The gain at which a friction's slips move PV as far in half a period (`half` blocks) as PV moves.
 
     0 unless it is far smaller than the gain of the backlash fit.
     """
-    centred = play.p.centred
-    stem = residual(play.moved(valve=sticking(band, share), gain=-1.0)) - centred
+    centred = backlash.p.centred
+    stem = residual(backlash.moved(valve=sticking(band, share), gain=-1.0)) - centred
     moved = (float(np.std(x[half:] - x[:-half])) if 0 < half < x.size else 0.0 for x in (centred, stem))
     pv, swing = moved
-    found = math.copysign(pv / swing, play.gain) if swing > 0.0 else 0.0
-    return found if abs(found) < abs(play.gain) / ABSURD else 0.0
+    found = math.copysign(pv / swing, backlash.gain) if swing > 0.0 else 0.0
+    return found if abs(found) < abs(backlash.gain) / ABSURD else 0.0
 
 
-def _screened(play: Fitted, noise: Floats, rest: int, gains: Gains) -> list[_Trial]:
+def _screened(backlash: Fitted, noise: Floats, rest: int, gains: Gains) -> list[_Trial]:
     """Promising frictions and dead times near a backlash fit, each with its decoded stem, best first, under a
     separate noise model."""
-    problem = play.p
-    e = whitened(disturbance(play), noise, every_lag(noise.size))[noise.size :]
+    problem = backlash.p
+    e = whitened(disturbance(backlash), noise, every_lag(noise.size))[noise.size :]
     sigma2 = float(np.mean(e[problem.usable[noise.size :]] ** 2))
-    mean, out = float(play_stem(problem.blocks.op, play.valve.stickband).mean()), list[_Trial]()
+    mean, out = float(backlash_stem(problem.blocks.op, backlash.valve.stickband).mean()), list[_Trial]()
     for later in LATER:
         for (width, share), gain in gains.items():
             if gain:
-                band = width * play.valve.stickband
-                fit = play.moved(dead_time_s=play.dead_time_s + later * problem.dt_s, gain=gain)
+                band = width * backlash.valve.stickband
+                fit = backlash.moved(dead_time_s=backlash.dead_time_s + later * problem.dt_s, gain=gain)
                 law, least = sticking(band, share), _bound(out, band, share)
                 path, score = _decoded(fit, mean, law, rest, Noise(noise, sigma2), SCREENED, least)
                 out = _chosen([*out, _Trial(score, _slips(path), band, share, later, gain, path)])
@@ -163,37 +162,37 @@ def _chosen(tried: list[_Trial]) -> list[_Trial]:
 
 def _path(fit: Fitted, valve: StemLaw, stem: Floats) -> SlipPath:
     """The process fitted behind a decoded stem as if that were recorded."""
-    told = fit.moved(valve=valve).within(position=stem, decoded=True)
-    return SlipPath(descend(told), log_chance(told.p.blocks.op, stem, valve.breakaway))
+    given_stem = fit.moved(valve=valve).within(position=stem, decoded=True)
+    return SlipPath(descend(given_stem), log_chance(given_stem.p.blocks.op, stem, valve.breakaway))
 
 
-def _decoded_anew(path: SlipPath, fit: Fitted, law: StemLaw, rest: int, hot: float) -> Floats:
+def _decoded_again(path: SlipPath, fit: Fitted, law: StemLaw, rest: int, hot: float) -> Floats:
     """The most probable stem under a fit near a path, shape of OP; hot : factor of the innovations variance."""
     return _decoded(fit, path.mean, law, rest, Noise(fit.ar, hot * fit.loss), CARRIED)[0]
 
 
-def _followed(play: Fitted, begun: _Trial, rest: int) -> SlipPath:
+def _followed(backlash: Fitted, begun: _Trial, rest: int) -> SlipPath:
     """Fit process and stem alternately from a trial; return the most probable path."""
     valve, stem = sticking(begun.band, begun.share), begun.stem
-    later_s = begun.later * play.p.dt_s
-    fit = play.moved(dead_time_s=play.dead_time_s + later_s, gain=begun.gain)
+    later_s = begun.later * backlash.p.dt_s
+    fit = backlash.moved(dead_time_s=backlash.dead_time_s + later_s, gain=begun.gain)
     best = path = _path(fit, valve, stem)
-    hopeless = play.log_likelihood - HOPELESS * play.count
+    hopeless = backlash.log_likelihood - HOPELESS * backlash.count
     for k in range(1, ROUNDS):
         longest, hot = rest if k == 1 else stem.size, HOT[min(k - 1, len(HOT) - 1)]
-        stem = _decoded_anew(path, path.fit, valve, longest, hot)
+        stem = _decoded_again(path, path.fit, valve, longest, hot)
         if _slips(stem) < FEWEST:
             break
         path = _path(path.fit, valve, stem)
-        best = max(best, path, key=lambda p: p.worth)
-        if k > 1 and path.worth < hopeless:
+        best = max(best, path, key=lambda p: p.log_likelihood)
+        if k > 1 and path.log_likelihood < hopeless:
             break
     return best
 
 
 def _settled(best: SlipPath) -> SlipPath:
     """Move stickband, jump and dead time by decreasing steps to the most probable path."""
-    return compass(None, best, -best.worth, _moved, MOVES, STEPS, worth=WORTH, most=MOST_MOVES)[0]
+    return compass(None, best, -best.log_likelihood, _moved, MOVES, STEPS, worth=WORTH, most=MOST_MOVES)[0]
 
 
 def _moved(_: None, best: SlipPath, move: tuple[int, int, int], step: float) -> tuple[SlipPath, float]:
@@ -206,51 +205,51 @@ def _moved(_: None, best: SlipPath, move: tuple[int, int, int], step: float) -> 
         return best, math.inf
     gain = best.fit.gain * v.slip_jump / (band * share)  # a slip moves PV by gain times jump
     fit, law = best.fit.moved(dead_time_s=dead_s, gain=gain), sticking(band, share)
-    stem = _decoded_anew(best, fit, law, problem.blocks.op.size, 1.0)
+    stem = _decoded_again(best, fit, law, problem.blocks.op.size, 1.0)
     if _slips(stem) < FEWEST:
         return best, math.inf
     path = _path(fit, law, stem)
-    return path, -path.worth
+    return path, -path.log_likelihood
 
 
-def fit_irregular(play: Fitted, noise: Floats, period_s: float, any_gain: bool = True) -> SlipPath | None:
+def fit_irregular(backlash: Fitted, noise: Floats, period_s: float, any_gain: bool = True) -> SlipPath | None:
     """The most probable path of a sticking stem in a cycling loop; None where no path is as likely as backlash.
 
-    play : the best backlash, fitted in blocks, without a recorded stem; noise : shape (order,), a noise model that
+    backlash : the best one, fitted in blocks, without a recorded stem; noise : shape (order,), a noise model that
     favours no valve, used at the start; period_s : period of the cycle [s]; any_gain : whether gains far below that
     of the backlash fit are also tried when its own gain finds no path. If another stick-slip is known, they lead to
     narrower bands with longer dead times.
     """
-    if play.gain == 0.0:
+    if backlash.gain == 0.0:
         return None
-    problem = play.p
-    rest = max(int(RESTS * period_s / problem.step_s), 1)
-    bands, half = play.valve.stickband, rest // (problem.blocks.factor * problem.blocks.steps) // 2
-    usual: Gains = {(w, s): play.gain for w in WIDTHS for s in JUMPS}
-    best = _likeliest(play, noise, rest, usual)
+    problem = backlash.p
+    rest = max(int(LONGEST_REST * period_s / problem.step_s), 1)
+    bands, half = backlash.valve.stickband, rest // (problem.blocks.factor * problem.blocks.steps) // 2
+    usual: Gains = {(w, s): backlash.gain for w in WIDTHS for s in JUMPS}
+    best = _likeliest(backlash, noise, rest, usual)
     if best is None and any_gain:
-        smaller = {(w, s): _gain(play, w * bands, s, half) for w, s in usual}
-        best = _likeliest(play, noise, rest, smaller)
+        smaller = {(w, s): _gain(backlash, w * bands, s, half) for w, s in usual}
+        best = _likeliest(backlash, noise, rest, smaller)
     return None if best is None else _settled(best)
 
 
-def near_path(play: Fitted, path: SlipPath) -> Fitted:
+def near_path(backlash: Fitted, path: SlipPath) -> Fitted:
     """A fit to the backlash fit's problem with a path's process and mean friction: a start for regular slips."""
     found = path.fit
     t, dead, gain = found.time_constant_s, found.dead_time_s, found.gain
     share = min(found.valve.slip_jump / max(found.valve.stickband, 1e-9), 1.0)
     valve = sticking(found.valve.stickband, share)
-    moved = play.moved(gain=gain, time_constant_s=t, dead_time_s=dead, valve=valve)
+    moved = backlash.moved(gain=gain, time_constant_s=t, dead_time_s=dead, valve=valve)
     return replace(moved, slow=found.slow)
 
 
-def _likeliest(play: Fitted, noise: Floats, rest: int, gains: Gains) -> SlipPath | None:
+def _likeliest(backlash: Fitted, noise: Floats, rest: int, gains: Gains) -> SlipPath | None:
     """The most probable path from the best trials; None where none is as likely as backlash."""
-    paths = [_followed(play, t, rest) for t in _screened(play, noise, rest, gains)]
-    best = max(paths, key=lambda p: p.worth, default=None)
-    return None if best is None or best.worth < play.log_likelihood else best
+    paths = [_followed(backlash, t, rest) for t in _screened(backlash, noise, rest, gains)]
+    best = max(paths, key=lambda p: p.log_likelihood, default=None)
+    return None if best is None or best.log_likelihood < backlash.log_likelihood else best
 
 
-def path_evidence(path: SlipPath, rival: Fitted) -> float:
+def path_evidence(path: SlipPath, alternative: Fitted) -> float:
     """Log likelihood [nat] of a path and its slips over a fit of the same problem without it."""
-    return evidence(path.fit, rival) + path.chance
+    return evidence(path.fit, alternative) + path.chance

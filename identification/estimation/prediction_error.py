@@ -161,12 +161,12 @@ def curvature(p: Problem, found: Residual) -> tuple[Floats, Floats, Floats]:
     moves = sensitivities(p, model, found.ar, found.simulated) * np.sqrt(p.weight)
     own, groups = found.columns, found.ar.size
     inner = found.gram + 1e-10 * np.trace(found.gram) / max(groups, 1) * np.eye(groups)
-    beside = own @ moves.T
+    coupling = own @ moves.T
     gram, slope = moves @ moves.T, moves @ found.white
     if groups:
-        cross = np.linalg.lstsq(inner, np.column_stack((beside, own @ found.white)), rcond=1e-13)[0]
-        gram -= beside.T @ cross[:, :-1]
-        slope -= beside.T @ cross[:, -1]
+        cross = np.linalg.lstsq(inner, np.column_stack((coupling, own @ found.white)), rcond=1e-13)[0]
+        gram -= coupling.T @ cross[:, :-1]
+        slope -= coupling.T @ cross[:, -1]
     for i, param in enumerate(model.params):
         if param.slot in PRIOR:
             at_start = param.slot == Slot.START
@@ -233,8 +233,8 @@ def innovations_of(p: Problem, found: Residual) -> Floats:
     """Innovations [% PV], shape (n,), including those with zero weight."""
     if not found.loss < FAR**2:
         return np.full(p.y.size, FAR)
-    left = p.judged_part(p.y - found.simulated)
-    return whitened(left, found.ar, p.edges)  # type: ignore[no-any-return]
+    residual = p.judged_part(p.y - found.simulated)
+    return whitened(residual, found.ar, p.edges)  # type: ignore[no-any-return]
 
 
 def deviations(p: Problem, fit: Fitted, held: Collection[int] = ()) -> Floats:

@@ -120,10 +120,10 @@ def variance_left(products: Products, faded: Faded, sums: Floats, level: float) 
     cross[3], gram[0, 3], gram[1, 3], gram[2, 3], gram[3, 3] = faded
     beta = solved(gram, cross)
     count = int(sums[3])
-    left = max((power - np.dot(beta, cross)) / max(count, 1), 1e-14)
+    variance = max((power - np.dot(beta, cross)) / max(count, 1), 1e-14)
     beta[1] /= level
     beta[2] /= level
-    return left, count, beta
+    return variance, count, beta
 
 
 Dynamics = tuple[float, float]

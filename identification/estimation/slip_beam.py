@@ -66,8 +66,8 @@ def _normal(x: float) -> float:
 def slip_chance(distance: float, farthest: float, breakaway: float) -> float:
     """Probability that a stem slips between the farthest distance so far without a slip and a farther one."""
     scatter = SCATTER * breakaway
-    borne = _normal((farthest - breakaway) / scatter)
-    return min((_normal((distance - breakaway) / scatter) - borne) / max(1.0 - borne, 1e-12), 1.0)
+    passed = _normal((farthest - breakaway) / scatter)
+    return min((_normal((distance - breakaway) / scatter) - passed) / max(1.0 - passed, 1e-12), 1.0)
 
 
 @njit(cache=True)
@@ -90,7 +90,7 @@ Indices = NDArray[np.int64]
 STEM, X, TOTAL, SCORE, LATE, FAR_LOW, FAR_HIGH, PLACED = 0, 1, 2, 3, 4, 5, 6, 7
 """Columns of a path's numbers: stem, response, its sum over the block, score, stem that acts on PV now, farthest
 distance below and above since the last slip; then stem positions still within the dead time, and residuals."""
-EVENT, RESTED, COMING, PENDING, DUE = 0, 1, 2, 3, 4
+EVENT, LAST_SLIP, NEXT_SAMPLE, PENDING, DUE = 0, 1, 2, 3, 4
 """Columns of a path's marks: last event, sample of the last slip, next sample, number of slips within the dead time;
 then the samples at which they act on PV."""
 
@@ -110,7 +110,7 @@ class SlipBlock(NamedTuple):
     last: int
     low: float
     high: float
-    left: float
+    remaining: float
     of_x: float
     of_u: float
 
@@ -144,7 +144,7 @@ def best_paths(b: Beam, other: Beam, count: int, most: int, near: float) -> int:
 
 
 @njit(cache=True)
-def room(rows: int, order: int) -> Beam:
+def empty_beam(rows: int, order: int) -> Beam:
     return Beam(np.zeros((rows, PLACED + WAITING + order)), np.zeros((rows, DUE + WAITING), np.int64))
 
 
@@ -157,7 +157,7 @@ class Events(NamedTuple):
 
 
 @njit(cache=True, inline="always")
-def _answered(own: Floats, marks: Indices, k: int, r: Response) -> None:
+def _advance_response(own: Floats, marks: Indices, k: int, r: Response) -> None:
     """Advance a path's PV response by one sample."""
     own[TOTAL] += own[X]
     before = own[LATE]
@@ -170,35 +170,37 @@ def _answered(own: Floats, marks: Indices, k: int, r: Response) -> None:
 
 
 @njit(cache=True)
-def _slipped(b: Beam, events: Events, at: tuple[int, int, int, int], place: float, r: Response) -> None:
+def _add_slip(b: Beam, events: Events, at: tuple[int, int, int, int], place: float, r: Response) -> None:
     """Write path `at[0]` as `at[1]` with another stem position from sample `at[2]` on, recorded as event `at[3]`."""
     h, to, k, event = at
     copy_path(b, to, b, h)
     own, marks = b.numbers[to], b.marks[to]
-    own[STEM], marks[RESTED] = place, k
+    own[STEM], marks[LAST_SLIP] = place, k
     own[FAR_LOW] = own[FAR_HIGH] = 0.0
     own[PLACED + marks[PENDING]], marks[DUE + marks[PENDING]] = place, k + r.lag.delay
     marks[PENDING] += 1
     events.parent[event], events.moment[event], events.place[event] = marks[EVENT], k, place
     marks[EVENT] = event
-    _answered(own, marks, k, r)
-    marks[COMING] = k + 1
+    _advance_response(own, marks, k, r)
+    marks[NEXT_SAMPLE] = k + 1
 
 
 @njit(cache=True)
 def shares_of(r: Response, factor: int) -> tuple[float, float, float]:
-    """left, of_x and of_u of a block (`Block`)."""
-    left, of_x = 1.0, 0.0
+    """remaining, of_x and of_u of a block (`SlipBlock`)."""
+    remaining, of_x = 1.0, 0.0
     for _ in range(factor):
-        of_x += left
-        left *= r.lag.pole
-    return left, of_x, factor - of_x
+        of_x += remaining
+        remaining *= r.lag.pole
+    return remaining, of_x, factor - of_x
 
 
 @njit(cache=True, inline="always")
-def _rests(numbers: Floats, marks: Indices, h: int, block: SlipBlock, f: SlipDistances) -> bool:
+def _is_unchanged(numbers: Floats, marks: Indices, h: int, block: SlipBlock, f: SlipDistances) -> bool:
     """Whether a path is unchanged over a block: its stem does not slip, and no earlier slip starts to act on PV."""
-    if marks[h, COMING] != block.first or block.first == 0 or block.last - 1 - marks[h, RESTED] > f.rest:
+    if marks[h, NEXT_SAMPLE] != block.first or block.first == 0:
+        return False
+    if block.last - 1 - marks[h, LAST_SLIP] > f.rest:
         return False
     if marks[h, PENDING] > 0 and marks[h, DUE] < block.last:
         return False
@@ -208,7 +210,7 @@ def _rests(numbers: Floats, marks: Indices, h: int, block: SlipBlock, f: SlipDis
 
 
 @njit(cache=True)
-def _through(
+def _advance_path(
     b: Beam,
     events: Events,
     known: tuple[int, int],
@@ -224,27 +226,27 @@ def _through(
     """
     (count, slips), own, marks = known, b.numbers[h], b.marks[h]
     least = f.breakaway * (1.0 - FAR * SCATTER)
-    for k in range(marks[COMING], last):
-        if k - marks[RESTED] > f.rest:
-            own[SCORE], marks[RESTED] = own[SCORE] - STUCK, k
+    for k in range(marks[NEXT_SAMPLE], last):
+        if k - marks[LAST_SLIP] > f.rest:
+            own[SCORE], marks[LAST_SLIP] = own[SCORE] - STUCK, k
         gap = op[k] - own[STEM]
         far, side = abs(gap), FAR_HIGH if gap > 0 else FAR_LOW
         if k > 0 and far > own[side] and far > least:
             chance = slip_chance(far, own[side], f.breakaway)
             room = count < b.marks.shape[0] and slips < MOST_EVENTS and marks[PENDING] < WAITING
             if chance > RARE and room:
-                _slipped(b, events, (h, count, k, slips), op[k] - math.copysign(f.sliding, gap), r)
+                _add_slip(b, events, (h, count, k, slips), op[k] - math.copysign(f.sliding, gap), r)
                 b.numbers[count, SCORE] += math.log(chance)
                 count, slips = count + 1, slips + 1
             own[SCORE] += math.log(max(1.0 - chance, 1e-12))
             own[side] = far
-        _answered(own, marks, k, r)
-    marks[COMING] = last
+        _advance_response(own, marks, k, r)
+    marks[NEXT_SAMPLE] = last
     return count, slips
 
 
 @njit(cache=True)
-def divided(
+def advance_paths(
     b: Beam,
     events: Events,
     known: tuple[int, int],
@@ -257,26 +259,26 @@ def divided(
     (count, slips), numbers, marks = known, b.numbers, b.marks
     h = 0
     while h < count:
-        if _rests(numbers, marks, h, block, f):
+        if _is_unchanged(numbers, marks, h, block, f):
             x, u = numbers[h, X], numbers[h, LATE]
             numbers[h, TOTAL] = block.of_x * x + block.of_u * u
-            numbers[h, X] = block.left * x + (1.0 - block.left) * u
-            marks[h, COMING] = block.last
+            numbers[h, X] = block.remaining * x + (1.0 - block.remaining) * u
+            marks[h, NEXT_SAMPLE] = block.last
         else:
-            count, slips = _through(b, events, (count, slips), h, block.last, op, f, r)
+            count, slips = _advance_path(b, events, (count, slips), h, block.last, op, f, r)
         h += 1
     return count, slips
 
 
 @njit(cache=True)
 def judge_block(
-    b: Beam, count: int, left: float, block: int, factor: int, r: Response, n: Noise, counts: bool
+    b: Beam, count: int, deviation: float, block: int, factor: int, r: Response, n: Noise, counts: bool
 ) -> None:
-    """Score all paths by their innovation of a block, of which `left` is PV less its slow terms."""
+    """Score all paths by their innovation of a block, of which `deviation` is PV less its slow terms."""
     order, past = n.ar.size, PLACED + WAITING
     numbers, now = b.numbers, block % order
     for h in range(count):
-        residual = left - r.gain * numbers[h, TOTAL] / factor
+        residual = deviation - r.gain * numbers[h, TOTAL] / factor
         numbers[h, TOTAL] = 0.0
         if counts:
             e = residual
@@ -287,7 +289,7 @@ def judge_block(
 
 
 @njit(cache=True)
-def _begun(b: Beam, op: Floats, first: float, breakaway: float) -> int:
+def _initial_paths(b: Beam, op: Floats, first: float, breakaway: float) -> int:
     """Paths from stem positions from which the stem must slip; return their number."""
     early = op[: max(op.size // 3, 1)]
     high, low, count = early.max(), early.min(), 0
@@ -303,7 +305,7 @@ def _begun(b: Beam, op: Floats, first: float, breakaway: float) -> int:
 
 
 @njit(cache=True)
-def _traced(events: Events, event: int, n: int) -> Floats:
+def _stem_of_path(events: Events, event: int, n: int) -> Floats:
     """The stem of the path that ends with an event, shape (n,)."""
     stem, last = np.empty(n), n
     while event >= 0:
@@ -332,9 +334,9 @@ def decoded(
     """
     factor, near = op.size // y.size, SAME * f.breakaway
     rows = 6 * most + PLACES
-    b, other = room(rows, n.ar.size), room(rows, n.ar.size)
+    b, other = empty_beam(rows, n.ar.size), empty_beam(rows, n.ar.size)
     events = Events(np.empty(MOST_EVENTS, np.int64), np.zeros(MOST_EVENTS, np.int64), np.empty(MOST_EVENTS))
-    count = _begun(b, op, (y[0] - r.slow[0]) / r.gain, f.breakaway)
+    count = _initial_paths(b, op, (y[0] - r.slow[0]) / r.gain, f.breakaway)
     events.parent[:count], events.place[:count] = -1, b.numbers[:count, STEM]
     slips, shares = count, shares_of(r, factor)
     for block in range(y.size):
@@ -343,7 +345,7 @@ def decoded(
         for u in op[first:last]:
             low, high = min(low, u), max(high, u)
         at = SlipBlock(first, last, low, high, *shares)
-        count, slips = divided(b, events, (count, slips), at, op, f, r)
+        count, slips = advance_paths(b, events, (count, slips), at, op, f, r)
         judge_block(b, count, y[block] - r.slow[block], block, factor, r, n, counts[block])
         if count > 2 * most or (block + 1) % LOOKED == 0:
             count = best_paths(b, other, count, most, near)
@@ -351,4 +353,4 @@ def decoded(
             if b.numbers[0, SCORE] < least:
                 return op[:0], -math.inf
     best = int(np.argmax(b.numbers[:count, SCORE]))
-    return _traced(events, b.marks[best, EVENT], op.size), float(b.numbers[best, SCORE])
+    return _stem_of_path(events, b.marks[best, EVENT], op.size), float(b.numbers[best, SCORE])

@@ -236,9 +236,9 @@ def _case(problem: Problem, law: StemLaw, period_s: float, count: int) -> _Case:
     low = [math.log(0.1 * dt_s), 0.0, math.log(0.5 * dt_s), -1.5, -1.5]
     high = [math.log(most_t), most_dead / dt_s, math.log(1e3 * problem.duration_s), 3.0, 3.0]
     if count > LOAD:
-        away, heights = math.log(LINE_AWAY), count - LINE + 1
-        low += [-away, math.log(LINE_KEPT), *heights * [-1.0]]
-        high += [away, math.log(10.0 * periods), *heights * [8.0]]
+        ratio, heights = math.log(LINE_AWAY), count - LINE + 1
+        low += [-ratio, math.log(LINE_KEPT), *heights * [-1.0]]
+        high += [ratio, math.log(10.0 * periods), *heights * [8.0]]
     ranges = np.array([low, high])
     return _Case(problem.centred, stem, _judged(problem.usable), dt_s, ranges, period_s)
 
@@ -246,13 +246,13 @@ def _case(problem: Problem, law: StemLaw, period_s: float, count: int) -> _Case:
 def _descended(case: _Case, starts: Sequence[Floats]) -> _Point:
     """The most likely result of several starts: all take a few steps, the best of them descend to the end."""
 
-    def went(begun: _Point, steps: int) -> _Point:
+    def continued(begun: _Point, steps: int) -> _Point:
         rule = Descent(steps, 2 * steps, case.at.size, SETTLED, 10.0, 5.0, steps)
         return _down(case, begun, rule)  # type: ignore[no-any-return]
 
     begun = (_point(case, np.clip(s, case.ranges[0], case.ranges[1])) for s in starts)
-    near = sorted((went(p, FIRST_STEPS) for p in begun), key=lambda p: p.loss)
-    return min((went(p, SMOOTH_STEPS) for p in near[:FOLLOWED]), key=lambda p: p.loss)
+    near = sorted((continued(p, FIRST_STEPS) for p in begun), key=lambda p: p.loss)
+    return min((continued(p, SMOOTH_STEPS) for p in near[:FOLLOWED]), key=lambda p: p.loss)
 
 
 def _fit(problem: Problem, law: StemLaw, case: _Case, p: _Point) -> SmoothFit:

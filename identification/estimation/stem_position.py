@@ -27,26 +27,27 @@ WIDTHS = tuple(float(w) for w in np.geomspace(0.03, 1.2, 60))
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class ValveFromPosition:
     """A valve identified from its position: its backlash, and its stick-slip if any."""
 
-    play: StemLaw
-    jumping: StemLaw | None
+    backlash: StemLaw
+    stick_slip: StemLaw | None
 
 
-def left(op: Floats, position: Floats, law: StemLaw) -> float:
+def residual_variance(op: Floats, position: Floats, law: StemLaw) -> float:
     """Mean square residual of a valve against a position, with a free offset [% of span squared]."""
     return float(np.var(position - walk(op, law, first_slip(op, law))))
 
 
-def closed_in(op: Floats, position: Floats, width: float) -> StemLaw:
+def refined_backlash(op: Floats, position: Floats, width: float) -> StemLaw:
     """The backlash after its width [% OP] is refined by decreasing steps."""
 
-    def tried(op: Floats, width: float, way: int, step: float) -> tuple[float, float]:
-        other = width * (1 + way * step)
-        return other, left(op, position, sticking(other, 0.0))
+    def stepped(op: Floats, width: float, sign: int, step: float) -> tuple[float, float]:
+        other = width * (1 + sign * step)
+        return other, residual_variance(op, position, sticking(other, 0.0))
 
-    width, _ = compass(op, width, left(op, position, sticking(width, 0.0)), tried, (1, -1), STEPS, 1e-9)
+    start = residual_variance(op, position, sticking(width, 0.0))
+    width, _ = compass(op, width, start, stepped, (1, -1), STEPS, 1e-9)
     return sticking(width, 0.0)
 
 
@@ -69,15 +70,15 @@ def slips(op: Floats, position: Floats) -> Floats:
     turn = np.flatnonzero(np.diff(np.concatenate(([0.0], going, [0.0]))) != 0)
     out = []
     for first, last in pairwise(turn):
-        way = going[first]
-        if way != 0 and last < position.size - 1 and first > 0:
+        sign = going[first]
+        if sign != 0 and last < position.size - 1 and first > 0:
             before = float(np.mean(position[max(first - 2, 0) : first + 1]))
             after = float(np.mean(position[last : last + 3]))
-            out.append((way * (op[first + 1] - before), way * (op[last] - after), way * (after - before)))
+            out.append((sign * (op[first + 1] - before), sign * (op[last] - after), sign * (after - before)))
     return np.array(out, dtype=np.float64).reshape(-1, 3)
 
 
-def seen(op: Floats, position: Floats) -> Seen | None:
+def valve_from_position(op: Floats, position: Floats) -> ValveFromPosition | None:
     """Backlash or stick-slip between a recorded OP and a recorded stem.
 
     op, position : shape (n,), OP and stem [% of span]. None where the stem follows OP, or where neither backlash nor
@@ -85,18 +86,19 @@ def seen(op: Floats, position: Floats) -> Seen | None:
     """
     low, high = np.quantile(op, [0.02, 0.98])
     reach, offset = float(high - low), float(np.median(position - op))
-    apart = float(np.var(position - op))
-    if reach <= 0 or apart <= 0:
+    difference = float(np.var(position - op))
+    if reach <= 0 or difference <= 0:
         return None
-    best = min((w * reach for w in WIDTHS), key=lambda w: left(op, position, sticking(w, 0.0)))
-    play = closed_in(op, position, best)
+    best = min((w * reach for w in WIDTHS), key=lambda w: residual_variance(op, position, sticking(w, 0.0)))
+    backlash = refined_backlash(op, position, best)
     found = slips(op, position - offset)
     large = found[found[:, 2] > 0.5 * np.max(found[:, 2], initial=0.0)]
     band = 0.5 * least_move(position)
-    way = float(np.abs(np.diff(walk(position, StemLaw(band, band), float(position[0])))).sum())
-    by_slips = min(float(found[:, 2].sum()) / max(way, 1e-9), 1.0)
+    travel = float(np.abs(np.diff(walk(position, StemLaw(band, band), float(position[0])))).sum())
+    by_slips = min(float(found[:, 2].sum()) / max(travel, 1e-9), 1.0)
     if len(large) >= SLIPS and by_slips > BY_SLIPS:
         go, rest = float(np.median(large[:, 0])), float(np.median(large[:, 1]))
         if go > max(rest, 0.0):
-            return Seen(play, sticking(go + rest, (go - rest) / (go + rest)))
-    return Seen(play, None) if left(op, position, play) < (1.0 - LEAST_SHARE) * apart else None
+            return ValveFromPosition(backlash, sticking(go + rest, (go - rest) / (go + rest)))
+    explained = residual_variance(op, position, backlash) < (1.0 - LEAST_SHARE) * difference
+    return ValveFromPosition(backlash, None) if explained else None

@@ -48,7 +48,7 @@ def closed_candidates(trial: Trial, sign: float, from_rest: bool) -> list[Fitted
             if right:
                 found.append(max(right, key=lambda f: f.log_likelihood))
     found.sort(key=lambda f: f.criterion)
-    return [_on_its_noise(f) for f in found]
+    return [_with_noise_model(f) for f in found]
 
 
 def _lags(kind: Kind, lag: float) -> tuple[float, ...]:
@@ -61,7 +61,7 @@ def _is_slow(fit: Fitted) -> bool:
     return 2.0 * fit.trial.block_s < sum(fit.lags_s) + fit.dead_s and max(fit.lags_s) < most
 
 
-def _on_its_noise(fit: Fitted) -> Fitted:
+def _with_noise_model(fit: Fitted) -> Fitted:
     """The fit with a noise model of its residual, for its intervals; its constants stay those of the simulation."""
     noise = wander_of(fit.trial.pv - fit.simulated, fit.trial.usable)
     e = fit.trial.pv - fit.simulated

@@ -39,7 +39,7 @@ class Trial:
     op: Floats
     dt_s: float
     factor: int
-    beside: tuple[Floats, ...] = ()
+    neighbours: tuple[Floats, ...] = ()
 
     @property
     def block_s(self) -> float:
@@ -58,14 +58,14 @@ class Trial:
         return self.op.size * self.dt_s
 
 
-def trial_of(record: LoopRecord, factor: int, beside: tuple[Floats, ...] = ()) -> Trial:
+def trial_of(record: LoopRecord, factor: int, neighbours: tuple[Floats, ...] = ()) -> Trial:
     """A record in blocks of `factor` samples, without bad samples; the neighbours' OPs on the record's clock."""
     n = len(record) // factor
     good = record.at_work[: n * factor].reshape(n, factor)
     pv = record.pv[: n * factor].reshape(n, factor)
     usable = np.asarray(good.all(axis=1))
     op = np.ascontiguousarray(record.op[: n * factor])
-    cut = tuple(np.ascontiguousarray(x[: n * factor]) for x in beside)
+    cut = tuple(np.ascontiguousarray(x[: n * factor]) for x in neighbours)
     return Trial(np.asarray(pv.mean(axis=1)), usable, op, record.dt_s, factor, cut)
 
 
@@ -74,8 +74,8 @@ def stem_of(op: Floats, width: float, slack: float) -> Floats:
     if width <= 0.0:
         return op
     moved = np.flatnonzero(op != op[0])
-    way = 1.0 if moved.size and op[moved[0]] > op[0] else -1.0
-    return stem_position(op, Backlash(width), float(op[0] + way * (slack - 0.5 * width)))
+    direction = 1.0 if moved.size and op[moved[0]] > op[0] else -1.0
+    return stem_position(op, Backlash(width), float(op[0] + direction * (slack - 0.5 * width)))
 
 
 def answers(kind: Kind, stem: Floats, trial: Trial, lags_s: tuple[float, ...], dead_s: float) -> list[Floats]:

@@ -79,7 +79,7 @@ def runs_of(mask: Mask) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
-def by_hand(record: LoopRecord, manual: Mask) -> tuple[Experiment, ...]:
+def in_manual(record: LoopRecord, manual: Mask) -> tuple[Experiment, ...]:
     """Experiments in spans in which only an operator or a script moves OP; manual, True there, shape (n,)."""
     found = (_in_span(record, first, last) for first, last in runs_of(manual & record.at_work))
     return tuple(x for x in found if x is not None)
@@ -94,7 +94,7 @@ def _in_span(record: LoopRecord, first: int, last: int) -> Experiment | None:
     if last - first < SAMPLES or size < LEAST_MOVE or float(np.ptp(pv)) == 0.0:
         return None
     large = moves[np.abs(op[moves] - op[moves - 1]) > LEAST_PART * size]
-    if switched_by_pv(op, pv, moves) or _restless(op, moves):
+    if switched_by_pv(op, pv, moves) or _moves_often(op, moves):
         return None
     span = int(moves[-1] - moves[0])
     reach = max(REACH * span, SAMPLES) if moves.size > 1 else last - first
@@ -103,7 +103,7 @@ def _in_span(record: LoopRecord, first: int, last: int) -> Experiment | None:
     return Experiment(course, first + begin, first + end, max(large.size, 1), size)
 
 
-def _restless(op: Floats, moves: Places) -> bool:
+def _moves_often(op: Floats, moves: Places) -> bool:
     """Whether OP moves up and down at most samples, unlike an operator or a test; a ramp moves in one direction."""
     up = float((op[moves] > op[moves - 1]).mean()) if moves.size else 1.0
     return moves.size > RESTLESS * op.size and 0.1 < up < 0.9
@@ -116,9 +116,9 @@ def switched_by_pv(op: Floats, pv: Floats, moves: Places) -> bool:
     up = op[moves] > op[moves - 1]
     spread = float(np.ptp(pv)) or 1.0
     at = [pv[moves - 1][up], pv[moves - 1][~up]]
-    apart = abs(float(np.median(at[0]) - np.median(at[1]))) if all(x.size for x in at) else 0.0
+    difference = abs(float(np.median(at[0]) - np.median(at[1]))) if all(x.size for x in at) else 0.0
     scatter = max((robust_deviation(x - np.median(x)) for x in at), default=spread)
-    return scatter < SWITCHED_AT * max(apart, 0.1 * spread)
+    return scatter < SWITCHED_AT * max(difference, 0.1 * spread)
 
 
 def _course(op: Floats, moves: Places, large: Places, has_stem: bool) -> Course:

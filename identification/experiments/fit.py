@@ -28,10 +28,10 @@ DEAD_SHARES = (0.0, 0.1, 0.3, 0.6, 1.0, 1.6, 2.5)  # Dead times that are screene
 STARTS = 3  # Screened lags that are followed
 TWO_LAGS = ((0.9, 0.3, 0.6), (0.7, 0.6, 0.3), (1.0, 0.1, 1.0))
 """Where the search for two lags begins, in terms of the best lag with dead time [of lag, lag, dead time]."""
-PLAY_STARTS = ((0.1, 0.5), (0.3, 0.9))
+BACKLASH_STARTS = ((0.1, 0.5), (0.3, 0.9))
 """Backlash, and the part of it that the first move takes up, at the start of the search [of OP's range, of
 the backlash]."""
-WITH_PLAY = 2  # Best candidates that are tried with backlash if OP reverses [candidates]
+WITH_BACKLASH = 2  # Best candidates that are tried with backlash if OP reverses [candidates]
 RARE = 2.3
 """Additional gain that an inverse response needs over other candidates: one process in ten has one [nat]."""
 RAMP_FROM = 1.5
@@ -52,8 +52,8 @@ class Shape:
     kind: Kind
     drift: bool = False
     start: bool = False
-    play: bool = False
-    beside: tuple[int, ...] = ()
+    backlash: bool = False
+    neighbours: tuple[int, ...] = ()
 
     @property
     def is_ramp(self) -> bool:
@@ -69,12 +69,12 @@ class Shape:
     def times(self) -> int:
         """Number of times searched for: lags, dead time, backlash with its first slack, one lag per neighbour."""
         own = 0 if self.kind is Kind.NO_ANSWER else TIMES[self.kind] + 1
-        return own + 2 * self.play + len(self.beside)
+        return own + 2 * self.backlash + len(self.neighbours)
 
     @property
     def constants(self) -> int:
         """Number of constants without the noise's."""
-        return self.times + self.answers + 1 + self.drift + self.start + len(self.beside)
+        return self.times + self.answers + 1 + self.drift + self.start + len(self.neighbours)
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +138,7 @@ def columns(trial: Trial, shape: Shape, times: Floats) -> Floats:
     if shape.answers:
         at = own + 1
         stem = trial.op
-        if shape.play:
+        if shape.backlash:
             width = math.exp(times[at])
             stem = stem_of(trial.op, width, float(np.clip(times[at + 1], 0.0, 1.0)) * width)
         ordered = tuple(sorted(lags, reverse=True))
@@ -151,8 +151,8 @@ def columns(trial: Trial, shape: Shape, times: Floats) -> Floats:
         begun = np.ones(trial.op.size)
         begun[0] = 0.0  # before the record OP had another value, at which PV was at rest
         out.append(answers(shape.kind, begun, trial, ordered, float(times[own]))[0])
-    for place, log_lag in zip(shape.beside, times[times.size - len(shape.beside) :], strict=True):
-        op = trial.beside[place]
+    for place, log_lag in zip(shape.neighbours, times[times.size - len(shape.neighbours) :], strict=True):
+        op = trial.neighbours[place]
         out.append(respond(op - op[0], unit_lag(math.exp(log_lag), 0.0, trial.dt_s), trial.factor))
     return np.column_stack(out)
 
@@ -177,11 +177,11 @@ def bounds_of(trial: Trial, shape: Shape) -> tuple[Floats, Floats]:
     high = [math.log(LONGEST_LAG * long)] * own
     if shape.answers:
         low, high = [*low, 0.0], [*high, 0.5 * long]
-    if shape.play:
+    if shape.backlash:
         travel = float(np.ptp(trial.op))
         low, high = [*low, math.log(1e-3 * travel), 0.0], [*high, math.log(0.9 * travel), 1.0]
-    low += [math.log(trial.dt_s)] * len(shape.beside)
-    high += [math.log(long)] * len(shape.beside)
+    low += [math.log(trial.dt_s)] * len(shape.neighbours)
+    high += [math.log(long)] * len(shape.neighbours)
     return np.array(low), np.array(high)
 
 
@@ -194,12 +194,12 @@ def descended(trial: Trial, shape: Shape, start: Floats, noise: Wander, late: bo
         free[TIMES[shape.kind]] = late
         scale[TIMES[shape.kind]] = max(0.2 * times[TIMES[shape.kind]], trial.dt_s)
 
-    def left(t: Floats) -> Floats:
+    def residuals(t: Floats) -> Floats:
         return projected(trial, shape, placed(times, free, t), noise)[0]
 
     if free.any():
         found = least_squares(
-            left,
+            residuals,
             times[free],
             bounds=(low[free], high[free]),
             x_scale=scale[free],
@@ -238,8 +238,8 @@ def screened(trial: Trial, noise: Wander) -> list[Floats]:
     for lag in lags:
         tried = [np.array([math.log(lag), share * lag]) for share in DEAD_SHARES]
         tried = [t for t in tried if t[1] < 0.5 * trial.duration_s]
-        left = [float((projected(trial, shape, t, noise)[0] ** 2).sum()) for t in tried]
-        found.append((min(left), tried[int(np.argmin(left))]))
+        losses = [float((projected(trial, shape, t, noise)[0] ** 2).sum()) for t in tried]
+        found.append((min(losses), tried[int(np.argmin(losses))]))
     found.sort(key=lambda x: x[0])
     return [times for _, times in found[:STARTS]]
 
@@ -259,43 +259,43 @@ def best_of(trial: Trial, shape: Shape, starts: list[Floats], noise: Wander) -> 
 
 def with_term(fit: Fitted, shape: Shape, more: list[float]) -> Fitted:
     """A fit of a shape with one more term, started from the given fit."""
-    at = fit.times.size - len(fit.shape.beside)
-    own = np.insert(fit.times, [at] * len(more), more) if not shape.beside else np.append(fit.times, more)
+    at = fit.times.size - len(fit.shape.neighbours)
+    own = np.insert(fit.times, [at] * len(more), more) if not shape.neighbours else np.append(fit.times, more)
     return best_of(fit.trial, shape, [own], fit.wander)
 
 
 def candidates(trial: Trial) -> tuple[list[Fitted], Fitted]:
     """All candidates with a response, least criterion first, and the best without a response."""
-    still = min((_still(trial, drift) for drift in (False, True)), key=lambda f: f.criterion)
+    still = min((_without_response(trial, drift) for drift in (False, True)), key=lambda f: f.criterion)
     white = Wander()
     tried = (descended(trial, Shape(Kind.LAG, drift=True), s, white) for s in screened(trial, white))
     plain = settled(max(tried, key=lambda f: f.log_likelihood))
-    found = [plain, _less_drift(plain)]
+    found = [plain, _without_drift(plain)]
     for kind in (Kind.TWO_LAGS, Kind.INTEGRATOR, Kind.INVERSE):
         shape = Shape(kind, drift=True)
         richer = best_of(trial, shape, starts_of(kind, plain), plain.wander)
-        found += [richer, _less_drift(richer)]
-    found = sorted(filter(_makes_sense, found), key=lambda f: f.criterion)
-    return sorted([*found, *_with_more(found)], key=lambda f: f.criterion), still
+        found += [richer, _without_drift(richer)]
+    found = sorted(filter(_is_plausible, found), key=lambda f: f.criterion)
+    return sorted([*found, *_with_more_terms(found)], key=lambda f: f.criterion), still
 
 
-def _still(trial: Trial, drift: bool) -> Fitted:
+def _without_response(trial: Trial, drift: bool) -> Fitted:
     return settled(descended(trial, Shape(Kind.NO_ANSWER, drift=drift), np.zeros(0), Wander()))
 
 
-def _less_drift(fit: Fitted) -> Fitted:
+def _without_drift(fit: Fitted) -> Fitted:
     """The same shape without drift."""
     return best_of(fit.trial, replace(fit.shape, drift=False), [fit.times], fit.wander)
 
 
-def _makes_sense(fit: Fitted) -> bool:
+def _is_plausible(fit: Fitted) -> bool:
     """Whether an inverse response really starts in the opposite direction, and no lag is so long that it is an
     integrator."""
     led = fit.shape.kind is Kind.INVERSE and fit.linear[0] * fit.linear[1] >= 0.0
     return not led and max(fit.lags_s, default=0.0) < RAMP_FROM * fit.trial.duration_s
 
 
-def _with_more(found: list[Fitted]) -> list[Fitted]:
+def _with_more_terms(found: list[Fitted]) -> list[Fitted]:
     """The best candidates, and the best of each kind that may be confused with theirs, with more terms: a start away
     from rest, backlash where OP reverses, and neighbours that lower the criterion."""
     best, more = found[0], []
@@ -305,14 +305,14 @@ def _with_more(found: list[Fitted]) -> list[Fitted]:
         more += [best_of(f.trial, replace(f.shape, start=True), [f.times], f.wander) for f in bases]
     if backlash_identifiable(best.trial.op):
         travel = float(np.ptp(best.trial.op))
-        for base in {id(f): f for f in (*bases, *found[:WITH_PLAY])}.values():
-            shape = replace(base.shape, play=True)
-            worn = (with_term(base, shape, [math.log(w * travel), s]) for w, s in PLAY_STARTS)
+        for base in {id(f): f for f in (*bases, *found[:WITH_BACKLASH])}.values():
+            shape = replace(base.shape, backlash=True)
+            worn = (with_term(base, shape, [math.log(w * travel), s]) for w, s in BACKLASH_STARTS)
             more.append(max(worn, key=lambda f: f.log_likelihood))
     best = min(best, *more, key=lambda f: f.criterion) if more else best
-    for place in range(len(best.trial.beside)):
+    for place in range(len(best.trial.neighbours)):
         log_lag = float(best.times[0]) if best.lags_s else math.log(0.1 * best.trial.duration_s)
-        shape = replace(best.shape, beside=(*best.shape.beside, place))
+        shape = replace(best.shape, neighbours=(*best.shape.neighbours, place))
         coupled = with_term(best, shape, [log_lag])
         if coupled.criterion < best.criterion:
             best = coupled

@@ -113,11 +113,11 @@ def along_dead_time(fit: Fitted, step_s: float) -> list[Fitted]:
     replace dead time far beyond the curvature at one optimum."""
     own, out = TIMES[fit.shape.kind], [fit]
     most = 0.5 * fit.trial.duration_s
-    for way in (-1.0, 1.0):
+    for direction in (-1.0, 1.0):
         at = fit
         for _ in range(DEAD_TIMES):
             times = at.times.copy()
-            times[own] = min(max(times[own] + way * step_s, 0.0), most)
+            times[own] = min(max(times[own] + direction * step_s, 0.0), most)
             if times[own] == at.times[own]:
                 break
             at = descended(fit.trial, fit.shape, times, fit.wander, late=False)
@@ -136,23 +136,23 @@ def averaged(found: Sequence[Fitted], closed: bool = False) -> Averaged:
     """
     best = found[0]
     tried = [(f, spread_of(f)) for f in found if f is best or _counts(f, best)]
-    told = [(f, s) for f, s in tried if f is best or s.log_gain < LOOSE]
-    weight, at, own = _mixture(told, closed)
+    precise = [(f, s) for f, s in tried if f is best or s.log_gain < LOOSE]
+    weight, at, own = _mixture(precise, closed)
     mean = weight @ at
     wide = np.sqrt(weight @ (own**2 + (at - mean) ** 2))
     dead = ninety(weight, at[:, 2], own[:, 2])
     deviation_s = (dead.high - dead.low) / (2.0 * NINETY)
     sign = math.copysign(1.0, best.gain)
-    spread = Spread(float(wide[0]), float(wide[1]), deviation_s, told[0][1].covariance)
+    spread = Spread(float(wide[0]), float(wide[1]), deviation_s, precise[0][1].covariance)
     return Averaged(sign * math.exp(mean[0]), math.exp(mean[1]), dead, spread)
 
 
-def _mixture(told: Sequence[tuple[Fitted, Spread]], closed: bool) -> tuple[Floats, Floats, Floats]:
+def _mixture(precise: Sequence[tuple[Fitted, Spread]], closed: bool) -> tuple[Floats, Floats, Floats]:
     """Weights, shape (m,), log gains, log sums of lags and dead times [s], shape (m, 3), and their deviations."""
     rows, inner, weight = [], [], []
     # OP moved at an unknown time between two samples, and the record shows the move at the second
-    unseen_s = told[0][0].trial.dt_s
-    for share, (f, s) in zip(weights_of([f for f, _ in told]), told, strict=True):
+    unseen_s = precise[0][0].trial.dt_s
+    for share, (f, s) in zip(weights_of([f for f, _ in precise]), precise, strict=True):
         if share < COUNTS:
             continue
         step_s = max(DEAD_STEP * s.dead_s, 0.05 * unseen_s)
@@ -220,15 +220,15 @@ def _rest(fit: Fitted, spread: Spread) -> dict[str, Estimate]:
         share = fit.linear[1] / fit.linear[0]
         half = NINETY * deviation[first + 1] / abs(fit.linear[0])
         out["zero_s"] = Estimate(abs(share), abs(share) - half, abs(share) + half, "s")
-    if shape.play:
+    if shape.backlash:
         place = TIMES[shape.kind] + 1
         out["backlash_pct"] = _factor(math.exp(fit.times[place]), deviation[place], "% of OP")
     if shape.drift:  # for an integrator it is OP's balance
         per_h = 2.0 * 3600.0 / fit.trial.duration_s
         value, half = per_h * fit.linear[at - first], per_h * NINETY * deviation[at]
         out["drift_pct_per_h"] = Estimate(float(value), float(value - half), float(value + half), "%/h")
-    for place in range(len(shape.beside)):
-        column = fit.linear.size - len(shape.beside) + place
+    for place in range(len(shape.neighbours)):
+        column = fit.linear.size - len(shape.neighbours) + place
         value, half = float(fit.linear[column]), NINETY * float(deviation[first + column])
-        out[f"neighbour_{shape.beside[place]}_gain"] = Estimate(value, value - half, value + half, "%/%")
+        out[f"neighbour_{shape.neighbours[place]}_gain"] = Estimate(value, value - half, value + half, "%/%")
     return out

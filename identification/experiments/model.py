@@ -38,7 +38,7 @@ recorder.spike."""
 LONE_SHARE = 0.5
 """The same over the range of all other values [of PV's range]: a single value that goes by less is noise that
 does little."""
-STANDS = 5  # Samples of constant OP about an isolated other value that is excluded [samples]
+CONSTANT_SAMPLES = 5  # Samples of constant OP about an isolated other value that is excluded [samples]
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,24 +84,24 @@ def process_of(kind: Kind, e: Mapping[str, Estimate]) -> Process:
 
 def lone_in(record: LoopRecord) -> tuple[Mask, Mask]:
     """Isolated single values of PV, and of an OP that is otherwise constant before and after; shape (n,) each."""
-    factor, stands = LONE, STANDS
+    factor, count = LONE, CONSTANT_SAMPLES
     pv = isolated_values(record.pv, record.at_work, factor, LONE_SHARE)
     op = isolated_values(record.op, record.at_work, factor, LEAST_PART)
     for k in np.flatnonzero(op):
-        around = np.r_[record.op[max(k - stands, 0) : k], record.op[k + 1 : k + 1 + stands]]
+        around = np.r_[record.op[max(k - count, 0) : k], record.op[k + 1 : k + 1 + count]]
         op[k] = float(np.ptp(around)) == 0.0
     return pv, op
 
 
-def modelled(record: LoopRecord, x: Experiment, beside: Sequence[Floats] = ()) -> Modelled:
-    """The model of one experiment of a record; beside, OPs of neighbours on the record's clock, shape (n,) each.
+def modelled(record: LoopRecord, x: Experiment, neighbours: Sequence[Floats] = ()) -> Modelled:
+    """The model of one experiment of a record; neighbours, OPs of others on the record's clock, shape (n,) each.
 
     Raises NotAssessedError where PV does not respond to OP, or the sign of the gain is uncertain.
     """
     part = record.span(x.first, x.last)
     lone_pv, lone_op = lone_in(part)
     part = replace(part, bad=part.bad | lone_pv, op=without_lone(part.op, lone_op))
-    others = tuple(b[x.first : x.last] for b in beside if float(np.ptp(b[x.first : x.last])) > 0.0)
+    others = tuple(b[x.first : x.last] for b in neighbours if float(np.ptp(b[x.first : x.last])) > 0.0)
     found, nat = _candidates(part, x, others)
     best, mean = found[0], averaged(found, x.course.closed)
     if nat < ANSWERS or NINETY * mean.spread.log_gain > MOST_GAIN:
@@ -149,8 +149,8 @@ def _in_blocks(
         raise NotAssessedError(f"{need} in the {x.course}")
     if x.course.closed:
         found = closed_candidates(trial, shown_sign(trial), x.course is Course.WARM_UP)
-        left = math.inf if not found else float(np.var(found[0].trial.pv - found[0].simulated))
-        good = left < (1.0 - EXPLAINED) * float(np.var(trial.pv))
+        residual = math.inf if not found else float(np.var(found[0].trial.pv - found[0].simulated))
+        good = residual < (1.0 - EXPLAINED) * float(np.var(trial.pv))
         return found, ANSWERS if good else 0.0
     found, still = candidates(trial)
     return found, found[0].score - still.score
@@ -183,12 +183,12 @@ def pooled(found: Sequence[Modelled]) -> Pooled:
     sign = math.copysign(1.0, surest.mean.gain)
     names = ("slope_pct_per_s",) if ramp else ("gain", "lags_s")
     gain = [(math.log(abs(m.mean.gain)), m.mean.spread.log_gain) for m in used]
-    mean, deviation, weights = together(gain)
+    mean, deviation, weights = weighted_mean(gain)
     out[names[0]] = _around_log(out[names[0]], sign, mean, deviation)
     if not ramp:
-        mean, deviation, _ = together([(math.log(m.mean.lags_s), m.mean.spread.log_lags) for m in used])
+        mean, deviation, _ = weighted_mean([(math.log(m.mean.lags_s), m.mean.spread.log_lags) for m in used])
         out["lags_s"] = _around_log(out["lags_s"], 1.0, mean, deviation)
-    mean, deviation, _ = together([(m.mean.dead.value, max(m.mean.spread.dead_s, 1e-9)) for m in used])
+    mean, deviation, _ = weighted_mean([(m.mean.dead.value, max(m.mean.spread.dead_s, 1e-9)) for m in used])
     late = NINETY * deviation
     out["dead_time_s"] = Estimate(mean, max(mean - late, 0.0), mean + late, "s")
     return Pooled(surest.kind, out, tuple(weights.tolist()), tuple(used))
@@ -199,7 +199,7 @@ def _around_log(old: Estimate, sign: float, mean: float, deviation: float) -> Es
     return Estimate(sign * math.exp(mean), min(low, high), max(low, high), old.unit)
 
 
-def together(found: Sequence[tuple[float, float]]) -> tuple[float, float, Floats]:
+def weighted_mean(found: Sequence[tuple[float, float]]) -> tuple[float, float, Floats]:
     """Weighted mean of numbers with their deviations, its deviation, and the weights, shape (m,), which sum to 1."""
     value, wide = (np.array(x) for x in zip(*found, strict=True))
     inverse = wide**-2.0

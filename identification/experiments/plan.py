@@ -20,7 +20,7 @@ OVER_WANDER = 16.0
 interval is then 10 %."""
 OVER_SAMPLE = 4.0
 """The same over PV's noise from sample to sample: the samples of the rise determine the dead time."""
-OVER_PLAY = 3.0  # Step of a test over the width of backlash or stickband: a step within it moves nothing
+OVER_BACKLASH = 3.0  # Step of a test over the width of backlash or stickband: a step within it moves nothing
 FIRST_STEP = 3.0  # First step of a test of a loop of unknown gain [% of OP]: what plants allow without asking
 LEAST_STEP = 1.0  # Least step of a test [% of OP]: positioners resolve a few tenths of a percent
 MARGIN = 5.0  # Distance from OP's limits that a test keeps [% of OP]
@@ -61,7 +61,7 @@ class Plan:
     wander_pct: float
     answer_pct: float | None
     gain_within: float | None
-    play_within: float | None
+    backlash_within: float | None
     bounded: bool
 
     @property
@@ -92,19 +92,20 @@ def planned(record: LoopRecord, known: Known) -> Plan:
     gain = abs(known.gain) if known.gain else None
     answer = max(OVER_WANDER * wander, OVER_SAMPLE * noise)
     wanted = FIRST_STEP if gain is None else answer / gain
-    wanted = max(wanted, OVER_PLAY * known.width_pct, LEAST_STEP)
+    wanted = max(wanted, OVER_BACKLASH * known.width_pct, LEAST_STEP)
     middle = float(np.median(op[-max(op.size // 20, 1) :])) if op.size else 50.0
     room = max(100.0 - MARGIN - middle, middle - MARGIN)
-    bearable = math.inf if gain is None or known.integrating else MOST_ANSWER / gain
-    step = min(wanted, max(0.5 * room, 0.0), bearable)
-    way = 1.0 if middle + 2.0 * step <= 100.0 - MARGIN else -1.0
+    largest = math.inf if gain is None or known.integrating else MOST_ANSWER / gain
+    step = min(wanted, max(0.5 * room, 0.0), largest)
+    direction = 1.0 if middle + 2.0 * step <= 100.0 - MARGIN else -1.0
     step = float(f"{max(step, 0.1):.2g}")
     moves = RAMPS if known.integrating else MOVES
-    levels = tuple(round(middle + way * step * x, 2) for x in np.cumsum((0.0, *moves)))
+    levels = tuple(round(middle + direction * step * x, 2) for x in np.cumsum((0.0, *moves)))
     seen = None if gain is None else gain * step
     if known.integrating and seen is not None and seen > MOST_ANSWER:
         hold_s = known.dead_s + known.lag_s * MOST_ANSWER / seen
         seen = MOST_ANSWER
     within = None if seen is None or seen == 0.0 else NINETY * wander / seen
-    play = None if within is None or known.width_pct <= 0.0 else 2.0 * within * step / known.width_pct
-    return Plan(step, levels, hold_s, noise, wander, seen, within, play, step < 0.9 * wanted)
+    width = known.width_pct
+    backlash = None if within is None or width <= 0.0 else 2.0 * within * step / width
+    return Plan(step, levels, hold_s, noise, wander, seen, within, backlash, step < 0.9 * wanted)

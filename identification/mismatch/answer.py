@@ -77,12 +77,12 @@ def answer(found: Explanation, s: Recording) -> Answer:
     effects, outside, note, caution = effects_of(found, s), None, words.note(found), ""
     silent = unanswered(found) if is_by_fit(found) else ""
     lacking = silent or (too_short(found, s) if is_by_fit(found) else "")
-    at = located_in(found.p, found.best if found.left > 0 else found.plain, s)
+    at = located_in(found.p, found.best if found.residual_nat > 0 else found.plain, s)
     verdict, block = verdict_of(found, effects, lacking, bool(silent), at)
     if lacking and (verdict, block) == ("unexplained", "none"):
         note = f"Not identified: {lacking}."
     if effects:
-        one_move = words.TOLD["one_move"] if found.unproven else open_gain_note(found, effects)
+        one_move = words.TEXTS["one_move"] if found.unproven else open_gain_note(found, effects)
         caution = lacking or one_move
     if verdict == "unexplained" and found.outside is not None:
         row, fit = found.outside.row, found.outside.fit
@@ -97,7 +97,7 @@ def answer(found: Explanation, s: Recording) -> Answer:
         (1.0 - (found.proven.overall[1].fit_pct or 0.0) / 100.0) ** 2,
         note,
         caution,
-        words.cycles_told(found) if by_cycles(found) else "",
+        words.cycles_text(found) if by_cycles(found) else "",
         outside,
     )
 
@@ -108,10 +108,10 @@ def verdict_of(
     """The verdict and its block; a residual, or what the record cannot determine, has no name."""
     if found.refuted and not found.accepted and is_by_fit(found):
         return "unexplained", "none"
-    if (found.left > 0 or is_stack(found)) and is_by_fit(found):
+    if (found.residual_nat > 0 or is_stack(found)) and is_by_fit(found):
         if found.outside is not None:
             return "unexplained", found.outside.row.block
-        features = words.TOLD["features"]
+        features = words.TEXTS["features"]
         return "unexplained", features[at.carrying[0].name]["lives"] if at.carrying else "process"
     if effects and not (insensitive and effects[0].block in (Block.VALVE, Block.PROCESS)):
         return effects[0].name, effects[0].block
@@ -139,7 +139,7 @@ def unanswered(found: Explanation) -> str:
     found = found.by_innovations or found
     loaded = any(row.block == Block.LOAD for row in found.best.model.added)  # counted relative to the gain
     moves = gain_by_op(found.p, found.plain if loaded else found.best)
-    return "" if moves >= ANSWERS else words.TOLD["insensitive"]
+    return "" if moves >= ANSWERS else words.TEXTS["insensitive"]
 
 
 def too_short(found: Explanation, s: Recording) -> str:
@@ -147,14 +147,14 @@ def too_short(found: Explanation, s: Recording) -> str:
     lag, length = float(found.plain.model.c[Slot.T]), s.pv.size * s.dt_s
     if s.kind in INTEGRATING or any(v.replaces for v in found.best.model.added):
         return ""
-    return "" if length >= TIME_CONSTANTS * lag else words.too_short_told(TIME_CONSTANTS, length, lag)
+    return "" if length >= TIME_CONSTANTS * lag else words.too_short_text(TIME_CONSTANTS, length, lag)
 
 
 def open_gain_note(found: Explanation, effects: tuple[EffectFound, ...]) -> str:
     """What an experiment cannot determine of a supply whose flow at rest is free; empty for others."""
     at_rest = next((e.parameters[AT_REST.name] for e in effects if AT_REST.name in e.parameters), None)
     open_ended = at_rest is not None and at_rest.low < 0.0 < at_rest.high
-    return words.TOLD["wanders"] if open_ended and found.p.by_simulation else ""
+    return words.TEXTS["wanders"] if open_ended and found.p.by_simulation else ""
 
 
 def effects_of(found: Explanation, s: Recording) -> tuple[EffectFound, ...]:
@@ -173,9 +173,10 @@ def effects_of(found: Explanation, s: Recording) -> tuple[EffectFound, ...]:
         for row in found.best.model.added
     ]
     for first in physics[:1]:
-        share, told = found.proven.share_in_band, {} if found.cycles is None else dict(found.cycles.told)
-        if told.keys() == {q.name for q in found.best.model.added[0].params}:
-            first.parameters.update(told)
+        share = found.proven.share_in_band
+        estimates = {} if found.cycles is None else dict(found.cycles.estimates)
+        if estimates.keys() == {q.name for q in found.best.model.added[0].params}:
+            first.parameters.update(estimates)
         held_out_share = share if share > 0.0 else None
         physics[0] = replace(first, held_out_share=held_out_share, alternatives=alternatives(found))
     return (*physics, *gates) if found.finding is None else (*gates, *physics)
@@ -222,8 +223,8 @@ def alternatives(found: Explanation) -> tuple[str, ...]:
         return ()
     winner = found.accepted[0]
     least = max(winner.penalised - TIE, 0.0)
-    beside_none = len(winner.fit.names) == 1  # else its gain is not over the baseline model
-    close = [c.name for c in found.first if beside_none and c.penalised > least]
+    is_single = len(winner.fit.names) == 1  # else its gain is not over the baseline model
+    close = [c.name for c in found.first if is_single and c.penalised > least]
     names = dict.fromkeys((*close, *EFFECTS[winner.name].indistinguishable))
     return tuple(n for n in names if n not in found.best.names)
 

@@ -13,7 +13,7 @@ from identification.estimation.problem import Problem, problem
 from identification.estimation.search import plain_processes
 from identification.limits import LIMITS, ExplainLimits, RecorderLimits
 from identification.mismatch.recording import Recording
-from identification.mismatch.reference import left_freely
+from identification.mismatch.reference import flexible_residual
 from identification.record import Floats, Mask
 from identification.signals.correlation import correlated
 from identification.signals.robust import robust_weights
@@ -70,7 +70,7 @@ def prepared(
     calm = replace(p, weight=robust_weights(first.e, p.weight > 0))
     fit = descended(calm, first.model, FULL_STEPS)
     if experiment:
-        calm = replace(calm, memory=correlated(left_freely(calm, fit)[calm.weight > 0]))
+        calm = replace(calm, memory=correlated(flexible_residual(calm, fit)[calm.weight > 0]))
         fit = replace(fit, count=calm.independent(fit.e))
     return calm, fit
 

@@ -24,7 +24,7 @@ SPREAD = 0.15
 ONE_MOVE = 0.8
 """Share of OP's travel in two parts of twenty of the record from which it is one experiment without
 spread."""
-SOUND_VALVE = 0.1
+FAULT_FREE_PCT = 0.1
 """Backlash or stickband below which a valve has no fault [% OP]. Source: the narrowest dead band that a
 positioner can be set to (Siemens, SIPART PS2 operating instructions, A5E00074631, parameter DEBA: 0.1 to 10
 %)."""
@@ -41,8 +41,8 @@ def passes(x: Round, better: Fitted, effect: Effect) -> bool:
     The past of a time-bound effect does not predict its future, so no span is held out.
     """
     p, worse = x.p, x.near
-    sound = effect.friction in WEARS and better.model.c[Slot.STICKBAND] < SOUND_VALVE
-    if sound or runs_out(p, better):
+    is_fault_free = effect.friction in WEARS and better.model.c[Slot.STICKBAND] < FAULT_FREE_PCT
+    if is_fault_free or runs_out(p, better):
         return False
     if effect.needs == "steps":
         return at_inlet(p, worse)

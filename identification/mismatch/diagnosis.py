@@ -27,10 +27,10 @@ from identification.mismatch.effect import TIE, Ends, Friction
 from identification.mismatch.explanation import (
     ROUNDS,
     Explanation,
-    agreed,
     beyond_the_grid,
     by_cycles,
     carried_over,
+    combined_explanation,
     ends,
 )
 from identification.mismatch.friction import from_cycles, is_friction
@@ -40,11 +40,11 @@ from identification.mismatch.reference import Prediction, best_prediction
 from identification.mismatch.selection import (
     Candidate,
     Progress,
-    compete,
     integrating_or_first_order,
     longest_first,
     penalised,
     penalty,
+    ranked_candidates,
     silent,
 )
 from identification.mismatch.starts import Round, round_of
@@ -52,12 +52,12 @@ from identification.models import Stiction
 from identification.record import Floats
 from identification.simulation.parameters import Slot
 
-LEFT_OVER = 12.0
+LEAST_RESIDUAL = 12.0
 """Gain of the reference's prediction of the last fit's innovations, from which a residual is reported [nat].
 Source: proofs/concealed: of 120 explained loops the largest was 10.2, with a fault of the controller 15."""
-LEFT_SHARE = 0.05
+RESIDUAL_SHARE = 0.05
 """The same over the gain of the named effects: a name is kept if the residual is small compared with it."""
-RIVAL_SHARE = 0.4
+UNTIMED_SHARE = 0.4
 """Part of the gain of timed effects that an untimed reference predicts on held-out data, from which they give
 no name. Source: proofs/concealed: of loops whose gain drifts or whose supply varies the largest was .13, of
 gains that travel wears half had .4."""
@@ -70,10 +70,10 @@ of the gain of a load that recorded PV switches."""
 PROVEN = 3  # Candidates that are put to the proof, best first, until one passes: bounds the time
 
 
-def explain(s: Recording, tell: Progress = silent, user_model: Floats | None = None) -> Explanation:
+def explain(s: Recording, progress: Progress = silent, user_model: Floats | None = None) -> Explanation:
     """Explain the difference between a baseline model and a recording.
 
-    tell : called with each step, to show progress; user_model : constants of the user's own model, shape (SIZE,), an
+    progress : called with each step; user_model : constants of the user's own model, shape (SIZE,), an
     additional start for the baseline fit.
     """
     held = unlogged(s.stamp_s, s.pv.size, s.dt_s, s.limits.recorder)
@@ -85,7 +85,7 @@ def explain(s: Recording, tell: Progress = silent, user_model: Floats | None = N
     inputs, usable = inputs_of(replace(s, pv=pv)), without_spikes(s.pv, s.usable, s.limits.recorder)
     clip = transmitter_end(recorder, pv)
     plain_loop = partial(prepared, inputs, pv - inputs.level, usable, user_model, clip, s.limits)
-    tell("baseline model")
+    progress("baseline model")
     p, plain = plain_loop()
     found = Explanation(
         p,
@@ -101,20 +101,21 @@ def explain(s: Recording, tell: Progress = silent, user_model: Floats | None = N
     )
     if any(ends(x) is Ends.ALL for x in (recorder, controller)):
         return carried_over(found)
-    explained = beyond_the_grid(physics(found, tell, s))
+    explained = beyond_the_grid(with_physical_effects(found, progress, s))
     if not is_experiment(s):
-        return shown(carried_over(explained))
+        return without_zero_effects(carried_over(explained))
     p, plain = plain_loop(experiment=True)
-    by_misfit = beyond_the_grid(physics(replace(found, p=p, plain=plain, best=plain), tell, s))
-    return shown(agreed(explained, carried_over(by_misfit)))
+    found = replace(found, p=p, plain=plain, best=plain)
+    by_misfit = beyond_the_grid(with_physical_effects(found, progress, s))
+    return without_zero_effects(combined_explanation(explained, carried_over(by_misfit)))
 
 
-def shown(found: Explanation) -> Explanation:
+def without_zero_effects(found: Explanation) -> Explanation:
     """The explanation without effects whose size interval includes zero: there is no evidence of them."""
     kept = int(by_cycles(found))
     rows = zip(found.accepted[kept:], found.best.model.added[kept:], strict=True)
     void = [c for c, row in rows if holds_zero(found.p, found.best, row)]
-    return carried_over(found.less(void)) if void else found
+    return carried_over(found.without_effects(void)) if void else found
 
 
 def recorder_finding_of(s: Recording) -> Finding | None:
@@ -147,18 +148,18 @@ def transmitter_end(recorder: Finding | None, pv: Floats) -> Clip | None:
     return Clip(value, Slot.CLIP_HI if upper else Slot.CLIP_LO, recorder.where)
 
 
-def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
+def with_physical_effects(found: Explanation, progress: Progress, s: Recording) -> Explanation:
     """Add the effects of the catalogue that pass, and the gain [nat] of what remains beyond them: nothing in a record
     without every scan, where OP between the rows predicts PV too."""
     p, best = integrating_or_first_order(found.p, found.plain, s)
-    found, last = one_by_one(replace(found, p=p, plain=best, best=best), tell, s)
+    found, last = one_by_one(replace(found, p=p, plain=best, best=best), progress, s)
     if len(found.accepted) > 1:
-        found = as_a_set(found, tell, s)
-    left = unnamed_residual(found, last) if s.every_scan or is_experiment(s) else Prediction()
-    return replace(found, left=left.gain, left_by=left.way)
+        found = tested_as_set(found, progress, s)
+    residual = unnamed_residual(found, last) if s.every_scan or is_experiment(s) else Prediction()
+    return replace(found, residual_nat=residual.gain, residual_by=residual.influence)
 
 
-def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explanation, list[Candidate]]:
+def one_by_one(found: Explanation, progress: Progress, s: Recording) -> tuple[Explanation, list[Candidate]]:
     """Effects added while one passes, first a valve identified from the cycles, and the candidates of the last round.
 
     An effect without a name uses recorded PV. It is excluded in a loop that cycles, because delayed PV
@@ -168,15 +169,16 @@ def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explan
     moves the valve between the rows too, and what the model lacks there takes other names.
     """
     candidates = list[Candidate]()
-    has_rivals = s.cycles is None and not s.free_valve and not is_experiment(s) and s.every_scan
+    has_competitors = s.cycles is None and not s.free_valve and not is_experiment(s) and s.every_scan
+    rows = (*CANDIDATES, *COMPETING_EFFECTS) if has_competitors else CANDIDATES
     for _ in range(ROUNDS if s.cycles is None or s.every_scan else 1):
         x = round_of(found.p, found.best, s)
-        candidates = compete(x, (*CANDIDATES, *COMPETING_EFFECTS) if has_rivals else CANDIDATES, tell)
+        candidates = ranked_candidates(x, rows, progress)
         if s.cycles is not None and not found.accepted:
             candidates = with_cycles(x, s.cycles, candidates)
         if not found.first:
             found = replace(found, first=tuple(c for c in candidates if c.name in EFFECTS))
-        winner = chosen(x, found, candidates)
+        winner = accepted_candidate(x, found, candidates)
         if winner is None:
             break
         if winner.name in OUTSIDE:
@@ -186,14 +188,14 @@ def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explan
     return found, candidates
 
 
-def chosen(x: Round, found: Explanation, candidates: list[Candidate]) -> Candidate | None:
+def accepted_candidate(x: Round, found: Explanation, candidates: list[Candidate]) -> Candidate | None:
     """The accepted candidate of a round. An effect without a name, which uses recorded PV, is accepted only if it is
     far better than the effects so far and than every named effect."""
     winner = None if found.accepted else shown_by_cycles(x.s, candidates)
-    winner = winner or proven(x, candidates)
+    winner = winner or best_proven(x, candidates)
     if winner is None or winner.name not in OUTSIDE:
         return winner
-    named = proven(x, [c for c in candidates if c.name in EFFECTS])
+    named = best_proven(x, [c for c in candidates if c.name in EFFECTS])
     little = winner.penalised <= OUTSIDE_SHARE * gain(found.best, found.plain)
     near = named is not None and named.penalised >= OUTSIDE_NEAR * winner.penalised
     return named if little or near else winner
@@ -216,14 +218,14 @@ def shown_by_cycles(s: Recording, candidates: Sequence[Candidate]) -> Candidate 
     """
     if s.cycles is None:
         return None
-    rubs = [c for c in candidates if is_friction(c.name)]
+    worn = [c for c in candidates if is_friction(c.name)]
     sticks = isinstance(s.cycles.valve, Stiction)
-    alike = [c for c in rubs if (about(c.name).friction is Friction.STICKS) == sticks]
-    same = [c for c in alike if {q.name for q in c.row.params} == s.cycles.told.keys()]
-    return next(iter([*same, *alike, *rubs]), None)
+    same_kind = [c for c in worn if (about(c.name).friction is Friction.STICKS) == sticks]
+    same_numbers = [c for c in same_kind if {q.name for q in c.row.params} == s.cycles.estimates.keys()]
+    return next(iter([*same_numbers, *same_kind, *worn]), None)
 
 
-def proven(x: Round, candidates: list[Candidate]) -> Candidate | None:
+def best_proven(x: Round, candidates: list[Candidate]) -> Candidate | None:
     """The best candidate that has a positive penalised gain and passes the proof.
 
     In an experiment a time-bound effect is accepted only if no lasting effect gains anything: a load course can
@@ -238,17 +240,17 @@ def proven(x: Round, candidates: list[Candidate]) -> Candidate | None:
     return next((c for c in tried if passes(x, c.fit, about(c.name))), None)
 
 
-def as_a_set(found: Explanation, tell: Progress, s: Recording) -> Explanation:
+def tested_as_set(found: Explanation, progress: Progress, s: Recording) -> Explanation:
     """Test several effects again as a set: replace one by another, remove those made redundant. A valve that the
     cycles show is kept."""
-    told = shown_by_cycles(s, found.accepted[:1]) is not None
-    if not told:
-        tell("other sets of effects")
-        found = replacement_step(found, tell, s)
-    return without_redundant(found, int(told))
+    has_valve = shown_by_cycles(s, found.accepted[:1]) is not None
+    if not has_valve:
+        progress("other sets of effects")
+        found = replacement_step(found, progress, s)
+    return without_redundant(found, int(has_valve))
 
 
-def replacement_step(found: Explanation, tell: Progress, s: Recording) -> Explanation:
+def replacement_step(found: Explanation, progress: Progress, s: Recording) -> Explanation:
     """Replace each effect once by another effect or another variant that gains more together with the others.
 
     Effects are added one at a time, so the first may have been accepted instead of two that act together. In an
@@ -259,15 +261,15 @@ def replacement_step(found: Explanation, tell: Progress, s: Recording) -> Explan
     found = replace(found, p=x.p)
     for old in found.accepted:
         lasts = x.p.by_simulation and not EFFECTS[old.name].timed
-        beside = replace(x, near=found.less([old]).best)
-        least = max(gain(found.best, beside.near) - penalty(x.p, old.row) + TIE, 0.0)
+        rest = replace(x, near=found.without_effects([old]).best)
+        least = max(gain(found.best, rest.near) - penalty(x.p, old.row) + TIE, 0.0)
         others = (
             c
-            for c in compete(beside, CANDIDATES, tell, least)
+            for c in ranked_candidates(rest, CANDIDATES, progress, least)
             if (c.name, c.row.label) != (old.name, old.row.label) and not (lasts and EFFECTS[c.name].timed)
         )
         first = next(others, None)
-        if first is not None and first.penalised > least and passes(beside, first.fit, EFFECTS[first.name]):
+        if first is not None and first.penalised > least and passes(rest, first.fit, EFFECTS[first.name]):
             best = descended(x.p, first.fit.model, FULL_STEPS)
             kept = (c for c in found.accepted if c is not old)
             found = replace(found, best=best, accepted=(*kept, first))
@@ -280,7 +282,7 @@ def without_redundant(found: Explanation, kept: int) -> Explanation:
     An effect may have been accepted instead of one that was added later.
     """
     for old in found.accepted[kept:]:
-        rest = found.less([old])
+        rest = found.without_effects([old])
         if rest.accepted and gain(found.best, rest.best) < penalty(found.p, old.row):
             found = rest
     return found
@@ -294,14 +296,14 @@ def unnamed_residual(found: Explanation, candidates: list[Candidate]) -> Predict
     absorb any model error, and what can be predicted without time is not bound to time.
     """
     won = gain(found.best, found.plain)
-    left = best_prediction(found.p, found.best)
-    if left.gain <= max(LEFT_OVER, LEFT_SHARE * won):
-        left = Prediction()
+    residual = best_prediction(found.p, found.best)
+    if residual.gain <= max(LEAST_RESIDUAL, RESIDUAL_SHARE * won):
+        residual = Prediction()
     if found.accepted and all(about(c.name).timed for c in found.accepted):
-        rival = best_prediction(found.p, found.plain, clock=False)
-        left = rival if rival.gain > max(RIVAL_SHARE * won, LEFT_OVER) else left
+        untimed = best_prediction(found.p, found.plain, clock=False)
+        residual = untimed if untimed.gain > max(UNTIMED_SHARE * won, LEAST_RESIDUAL) else residual
     if not found.accepted and any(c.row.needs == "steps" and c.penalised > 0 for c in candidates):
-        left = Prediction(left.way, max(left.gain, candidates[0].penalised))
+        residual = Prediction(residual.influence, max(residual.gain, candidates[0].penalised))
     if found.outside is not None:
-        left = Prediction(left.way, max(left.gain, found.outside.penalised))
-    return left
+        residual = Prediction(residual.influence, max(residual.gain, found.outside.penalised))
+    return residual

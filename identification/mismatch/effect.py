@@ -50,7 +50,7 @@ class Block(StrEnum):
 class Friction(StrEnum):
     """Role of an effect in the search for a sticking valve."""
 
-    PLAY = "play"
+    BACKLASH = "backlash"
     """The fine scan of stick-slip starts at its best fit."""
     STICKS = "sticks"
     """It is scanned finely where a hint is found."""

@@ -58,13 +58,13 @@ class Explanation:
 
     recorder, controller : their findings; p : the problem that the fits solve; plain, best : fits without and with
     the effects; accepted : the accepted candidates, in the order of the best fit; first : the candidates of the first
-    round; law : the identified control law; late_s : lateness of PV that was removed [s]; left : gain of the unnamed
-    residual, 0 where there is none, and left_by : the class of the reference that predicts it (reference.py); proof :
-    plain and best on held-out data; refuted : names of effects that fit the first part but not the rest; unproven :
-    whether OP moved only once, so that no data remain for a proof; cycles : the faulty valve that the loop's cycles
-    show; band : the loop's band, and every_scan, as in Recording; others : misfits on other recordings, if some were
-    held out whole; by_innovations : in an experiment, the explanation by innovations alone; outside : an effect
-    outside the catalogue that explains it better than any named one.
+    round; law : the identified control law; late_s : lateness of PV that was removed [s]; residual_nat : gain of the
+    unnamed residual, 0 where there is none, and residual_by : the class of the reference that predicts it
+    (reference.py); proof : plain and best on held-out data; refuted : names of effects that fit the first part but
+    not the rest; unproven : whether OP moved only once, so that no data remain for a proof; cycles : the faulty valve
+    that the loop's cycles show; band : the loop's band, and every_scan, as in Recording; others : misfits on other
+    recordings, if some were held out whole; by_innovations : in an experiment, the explanation by innovations alone;
+    outside : an effect outside the catalogue that explains it better than any named one.
     """
 
     p: Problem = field(repr=False)
@@ -76,8 +76,8 @@ class Explanation:
     controller: Finding | None = None
     law: ControlLaw | None = None
     late_s: float = 0.0
-    left: float = 0.0
-    left_by: str = ""
+    residual_nat: float = 0.0
+    residual_by: str = ""
     proof: HeldOut | None = None
     refuted: tuple[str, ...] = ()
     unproven: bool = False
@@ -100,11 +100,11 @@ class Explanation:
             raise ValueError("an explanation that was not put to the proof")
         return self.proof
 
-    def less(self, given_up: Sequence[Candidate]) -> Explanation:
+    def without_effects(self, removed_effects: Sequence[Candidate]) -> Explanation:
         """The explanation without some of its effects, the others refitted."""
-        model = without(self.best.model, (c.row for c in given_up))
+        model = without(self.best.model, (c.row for c in removed_effects))
         best = descended(self.p, model, FULL_STEPS)
-        gone = {c.name for c in given_up}
+        gone = {c.name for c in removed_effects}
         return replace(self, best=best, accepted=tuple(c for c in self.accepted if c.name not in gone))
 
     @property
@@ -129,7 +129,7 @@ def beyond_the_grid(found: Explanation) -> Explanation:
     if step <= 0.0:
         return found
     count, kept, least = len(found.accepted), found, found.p.limits.recorder.grid_mark * step
-    while count > int(by_cycles(found)) and mark(kept) < least:
+    while count > int(by_cycles(found)) and joint_change(kept) < least:
         count -= 1
         kept = first_effects(found, count)
     return kept
@@ -146,7 +146,7 @@ def is_stack(found: Explanation) -> bool:
     return len(found.accepted) >= ROUNDS and not found.p.by_simulation
 
 
-def mark(found: Explanation) -> float:
+def joint_change(found: Explanation) -> float:
     """Standard deviation of the joint change that the effects make in the simulated PV [% PV]."""
     plain, best = (simulate(found.p.inputs, fit.model.c) for fit in (found.plain, found.best))
     return float(np.std(best - plain))
@@ -195,32 +195,35 @@ def adds_enough(found: Explanation, proof: HeldOut) -> bool:
 
 def first_effects(found: Explanation, count: int) -> Explanation:
     """The explanation with its first `count` effects only; the others, and findings made with them, are removed."""
-    return replace(found.less(found.accepted[count:]), outside=None)
+    return replace(found.without_effects(found.accepted[count:]), outside=None)
 
 
-def agreed(told: Explanation, by_misfit: Explanation) -> Explanation:
+def combined_explanation(ahead: Explanation, by_misfit: Explanation) -> Explanation:
     """Combine an experiment's explanation by innovations, refitted to simulation error, with that by simulation
     misfit.
 
     The nearer one is chosen. Innovations must confirm an explanation by misfit with a gain of one constant's penalty.
     The residual is what both miss: a wandering load is no model error, and innovations show none.
     """
-    left = min(told.left, by_misfit.left)
-    p = replace(by_misfit.p, inputs=replace(by_misfit.p.inputs, step_at=told.p.inputs.step_at))
-    anew = descended(p, told.best.model, FULL_STEPS)
-    other = replace(told, p=p, plain=by_misfit.plain, best=anew, left=left, by_innovations=told)
+    residual = min(ahead.residual_nat, by_misfit.residual_nat)
+    p = replace(by_misfit.p, inputs=replace(by_misfit.p.inputs, step_at=ahead.p.inputs.step_at))
+    refitted = descended(p, ahead.best.model, FULL_STEPS)
+    other = replace(
+        ahead, p=p, plain=by_misfit.plain, best=refitted, residual_nat=residual, by_innovations=ahead
+    )
     other = carried_over(by_importance(other))
-    inputs = replace(told.p.inputs, step_at=by_misfit.p.inputs.step_at)
-    seen = descended(replace(told.p, inputs=inputs), by_misfit.best.model, FULL_STEPS)
-    is_seconded = gain(seen, told.plain) > ONE_CONSTANT
-    return nearer(other, replace(by_misfit, left=left, by_innovations=told)) if is_seconded else other
+    inputs = replace(ahead.p.inputs, step_at=by_misfit.p.inputs.step_at)
+    seen = descended(replace(ahead.p, inputs=inputs), by_misfit.best.model, FULL_STEPS)
+    is_seconded = gain(seen, ahead.plain) > ONE_CONSTANT
+    seconded = replace(by_misfit, residual_nat=residual, by_innovations=ahead)
+    return nearer(other, seconded) if is_seconded else other
 
 
 def by_importance(found: Explanation) -> Explanation:
     """Sort the effects by the increase of the simulation misfit without each."""
     if len(found.accepted) < 2:
         return found
-    missed, model = {c.name: found.less([c]).best.loss for c in found.accepted}, found.best.model
+    missed, model = {c.name: found.without_effects([c]).best.loss for c in found.accepted}, found.best.model
     added = tuple(sorted(model.added, key=lambda row: -missed[row.name]))
     accepted = tuple(sorted(found.accepted, key=lambda c: -missed[c.name]))
     return replace(found, best=replace(found.best, model=replace(model, added=added)), accepted=accepted)
@@ -243,7 +246,7 @@ def on_other(found: Explanation, s: Recording, window: int) -> OnOther:
     and the better model without its effects."""
     best = found.best.model
 
-    def left(c: Floats) -> Misfit:
+    def misfit_of(c: Floats) -> Misfit:
         data = to_data("", found.p.inputs, c, found.best.names, found.late_s, None)
         if not (window and found.proven.placed):
             return misfit(s.pv, anchored(s.pv, carried(data, s.op, s.pv, s.dt_s), window), window)
@@ -253,17 +256,17 @@ def on_other(found: Explanation, s: Recording, window: int) -> OnOther:
         return misfit(s.pv, here.level + course(problem(here, y, s.usable), c, window, True), window)
 
     models = (found.plain.model.c, found.proven.drawn[0], best.c, without(best, best.added).c)
-    own, drawn, better, cleared = (left(c) for c in models)
+    own, drawn, better, cleared = (misfit_of(c) for c in models)
     return OnOther(min(own, drawn, key=lambda x: x.rmse), better, cleared, s.pv.size)
 
 
-def together(parts: Sequence[Misfit], samples: Sequence[int]) -> Misfit:
+def pooled_misfit(parts: Sequence[Misfit], samples: Sequence[int]) -> Misfit:
     """Misfits of several recordings combined, with equal weight per sample."""
     n = np.array(samples, dtype=np.float64)
     rmse = np.array([m.rmse for m in parts])
     moves = np.array([m.rmse / max(1.0 - (m.fit_pct or 0.0) / 100.0, 1e-9) for m in parts])
-    left, own = (float(np.sqrt(np.sum(n * x**2) / n.sum())) for x in (rmse, moves))
-    return Misfit(left, 100.0 * (1.0 - left / max(own, 1e-12)))
+    rms, own = (float(np.sqrt(np.sum(n * x**2) / n.sum())) for x in (rmse, moves))
+    return Misfit(rms, 100.0 * (1.0 - rms / max(own, 1e-12)))
 
 
 def window_of(found: Explanation, s: Recording) -> int:
@@ -282,7 +285,10 @@ def compared(found: Explanation, others: Sequence[Recording]) -> tuple[HeldOut, 
     for windows, placed in ((over_all, False), (own, found.proven.placed)):
         each = tuple(on_other(found, s, window) for s, window in zip(others, windows, strict=True))
         samples = [x.samples for x in each]
-        held = together([x.baseline for x in each], samples), together([x.explained for x in each], samples)
+        held = (
+            pooled_misfit([x.baseline for x in each], samples),
+            pooled_misfit([x.explained for x in each], samples),
+        )
         window = round(windows[0] * others[0].dt_s / p.inputs.dt_s)
         plain, better = (misfit(p.y, course(p, c, window, placed), window) for c in drawn)
         seen = plain, better
@@ -304,7 +310,8 @@ def proven_on(found: Explanation, others: Sequence[Recording]) -> Explanation:
     names = tuple(c.name for c in found.accepted)
     cycling = by_cycles(found) and any(s.cycles is not None for s in others)
     samples = [x.samples for x in each]
-    there, bare = (together([getattr(x, k) for x in each], samples).rmse for k in ("explained", "without"))
+    there = pooled_misfit([x.explained for x in each], samples).rmse
+    bare = pooled_misfit([x.without for x in each], samples).rmse
     if (proof.share > 0.0 and proof.follows and there < bare) or cycling:
         return replace(found, proof=proof, others=each, unproven=False)
     if all(EFFECTS[name].timed for name in names):

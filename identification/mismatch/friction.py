@@ -53,7 +53,7 @@ CARRIED_ON = 0.9
 """Sum of squares with another position over that with the continued stem, from which the stem is placed
 again."""
 
-WEARS = (Friction.PLAY, Friction.STICKS)
+WEARS = (Friction.BACKLASH, Friction.STICKS)
 """Roles of the effects of a worn valve."""
 OF_CYCLES = (Slot.T, Slot.L, Slot.K, Slot.STICKBAND, Slot.JUMP, Slot.COAST)
 """Parameters that the cycles determine."""
@@ -69,19 +69,19 @@ def is_friction(name: str) -> bool:
     return about(name).friction in WEARS
 
 
-def fit_sticking(p: Problem, play: Fitted, row: Variant, rows: tuple[Variant, ...]) -> Fitted:
+def fit_sticking(p: Problem, backlash: Fitted, row: Variant, rows: tuple[Variant, ...]) -> Fitted:
     """The best sticking valve of the form `row`, with `rows`, near a fit whose last row is backlash: its stem is
     searched as in the batch run, or with its mass, and followed to the end with all other effects."""
-    model = Model((*rows, row), row.set_in(play.model.c))
+    model = Model((*rows, row), row.set_in(backlash.model.c))
     has_mass = any(q.slot == Slot.STEM_T for q in row.params)
-    begun = _with_mass(p, model) if has_mass else _as_a_night(p, play, model)
+    begun = _with_mass(p, model) if has_mass else _scanned_starts(p, backlash, model)
     return min((descended(p, m, 2 * SCREEN_STEPS) for m in begun), key=lambda fit: fit.loss)
 
 
-def _as_a_night(p: Problem, play: Fitted, model: Model) -> list[Model]:
+def _scanned_starts(p: Problem, backlash: Fitted, model: Model) -> list[Model]:
     """Starts at the local optima of stickband and jump from a batch-run scan."""
-    behind, c = _behind(p, play.model.c), model.c
-    near = replace(play, p=behind, ar=generic_noise(), slow=np.zeros(4)).moved(
+    behind, c = _behind(p, backlash.model.c), model.c
+    near = replace(backlash, p=behind, ar=generic_noise(), slow=np.zeros(4)).moved(
         time_constant_s=min(float(c[Slot.T]), behind.bounds[0]),
         valve=sticking(float(c[Slot.STICKBAND]), 0.0),
     )
@@ -116,8 +116,8 @@ def _with_mass(p: Problem, model: Model) -> list[Model]:
 def _heavier(p: Problem, model: Model, move: tuple[int, ...], step: float) -> tuple[Model, float]:
     """A stem with mass with another stickband, jump, natural time and dead time, and its loss."""
     c = model.c.copy()
-    for slot, way in zip((Slot.STICKBAND, Slot.JUMP, Slot.STEM_T), move, strict=False):
-        c[slot] *= math.exp(step * way)
+    for slot, sign in zip((Slot.STICKBAND, Slot.JUMP, Slot.STEM_T), move, strict=False):
+        c[slot] *= math.exp(step * sign)
     c[Slot.L] = max(c[Slot.L] + move[3] * step * DEAD_STEPS * p.inputs.dt_s, 0.0)
     if c[Slot.JUMP] > c[Slot.STICKBAND]:
         return model, math.inf
@@ -146,22 +146,22 @@ def from_cycles(x: Round, seen: SeenInCycles, rows: tuple[Variant, ...]) -> list
 
 def _valve_for(row: Variant, valve: Backlash | Stiction) -> Valve:
     """The identified valve in the form of a catalogue row; None if the row has another motion."""
-    if about(row.name).friction is Friction.PLAY:
+    if about(row.name).friction is Friction.BACKLASH:
         return Backlash(valve.width if isinstance(valve, Backlash) else valve.stickband)
     return valve if isinstance(valve, Stiction) and row.label == valve.motion else None
 
 
 def _begun(p: Problem, near: Fitted, seen: SeenInCycles, valve: Valve) -> Floats:
     """Constants of a fit with process and valve from the cycles, shape (SIZE + own,)."""
-    c, told = near.model.c.copy(), as_parameters(seen.process, valve)
+    c, identified = near.model.c.copy(), as_parameters(seen.process, valve)
     for slot in OF_CYCLES:
-        c[slot] = told[slot]
+        c[slot] = identified[slot]
     c[Slot.START] = p.y[0]
     c[Slot.BIAS] = float(np.mean(p.y)) - c[Slot.K] * float(np.mean(p.inputs.op) - p.inputs.middle)
     return c
 
 
-def simulated_anew(p: Problem, c: Floats, window: int) -> Floats:
+def simulated_reestimated(p: Problem, c: Floats, window: int) -> Floats:
     """PV's deviation [% PV], shape (n,), for constants, shape (SIZE + own,), the stem re-estimated every `window`
     samples; as simulate() without friction."""
     inputs = p.inputs
@@ -189,7 +189,7 @@ def behind_placed(p: Problem, c: Floats, window: int) -> tuple[Problem, Floats]:
 
 
 @njit(cache=True)
-def _left(
+def _residual_squares(
     op: Floats,
     y: Floats,
     first: int,
@@ -240,13 +240,17 @@ def stem_placed(
     stem, x = op[0], op[0]
     for i in range(ends.size - 1):
         first, last = ends[i], ends[i + 1]
-        least, stem_on, x_on = _left(op, y, first, last, dead, pole, gain, friction, mass, stem, x, out)
+        least, stem_on, x_on = _residual_squares(
+            op, y, first, last, dead, pole, gain, friction, mass, stem, x, out
+        )
         least *= CARRIED_ON
         for j in range(PLACES):
             place = op[first] + friction.breakaway * (2.0 * j / (PLACES - 1) - 1.0)
-            left, stem_j, x_j = _left(op, y, first, last, dead, pole, gain, friction, mass, place, x, trial)
-            if left < least:
-                least, stem_on, x_on = left, stem_j, x_j
+            squares, stem_j, x_j = _residual_squares(
+                op, y, first, last, dead, pole, gain, friction, mass, place, x, trial
+            )
+            if squares < least:
+                least, stem_on, x_on = squares, stem_j, x_j
                 out[first:last] = trial[first:last]
         stem, x = stem_on, x_on
     return out

@@ -68,7 +68,7 @@ def turns(op: Floats, least: float) -> tuple[Floats, Floats]:
     be used: under feedback it depends on the very innovation that is to be located.
     """
     n = op.size
-    way, since = np.zeros(n), np.zeros(n)
+    direction, since = np.zeros(n), np.zeros(n)
     low, high, now, at = op[0], op[0], 0.0, 0
     for k in range(n):
         low, high = min(low, op[k]), max(high, op[k])
@@ -80,8 +80,8 @@ def turns(op: Floats, least: float) -> tuple[Floats, Floats]:
             low = high
         elif now < 0.0:
             high = low
-        way[k], since[k] = now, k - at
-    return way, since
+        direction[k], since[k] = now, k - at
+    return direction, since
 
 
 def least_turn(op: Floats) -> float:
@@ -129,7 +129,7 @@ def groups(pv: Floats, op: Floats, dt_s: float, late: int, memory: int) -> tuple
     feedback of every later OP.
     """
     o, before = delayed(op, late + PAST), delayed(pv, PAST)
-    way, since = turns(o, least_turn(o))
+    direction, since = turns(o, least_turn(o))
     since_s, window = since * dt_s, min(max(memory // 4, 1), pv.size)
     travel = np.abs(o - delayed(o, window)) / (window * dt_s)
     fading = np.exp(-since_s / (max(memory, 2) * dt_s))
@@ -139,9 +139,9 @@ def groups(pv: Floats, op: Floats, dt_s: float, late: int, memory: int) -> tuple
     found = [
         Group("pv_level", piecewise_linear_basis(before), before),
         Group("op_level", piecewise_linear_basis(o), o),
-        Group("op_direction", way[:, None], way),
-        Group("op_rate", np.stack([rate, rate * way], axis=1), travel, way),
-        Group("after_reversals", np.stack([fading, fading * way], axis=1), since_s, way),
+        Group("op_direction", direction[:, None], direction),
+        Group("op_rate", np.stack([rate, rate * direction], axis=1), travel, direction),
+        Group("after_reversals", np.stack([fading, fading * direction], axis=1), since_s, direction),
         Group("time_in_record", piecewise_linear_basis(index), index),
     ]
     if limit.sum() >= LIMIT_SAMPLES:
@@ -211,8 +211,8 @@ def directions(columns: list[Floats]) -> list[Floats]:
     out = []
     for i, own in enumerate(centred):
         others = np.concatenate([c for j, c in enumerate(centred) if j != i] or [own[:, :0]], axis=1)
-        left = own - _along(_basis(others), own)
-        out.append(_basis(left, np.linalg.norm(own, axis=0).max()))
+        residual = own - _along(_basis(others), own)
+        out.append(_basis(residual, np.linalg.norm(own, axis=0).max()))
     return out
 
 
@@ -297,13 +297,13 @@ def located(e: Floats, pv: Floats, op: Floats, judged: Mask, dt_s: float, late: 
     count = int(judged.sum())
     wanted = max(BLOCK_MEMORIES * memory, SHORTEST_BLOCK)
     blocks = min(max(int(count / wanted), FEWEST_BLOCKS), MOST_BLOCKS)
-    found, local, left = groups(pv, op, dt_s, late, memory), np.zeros(e.size), e[judged]
-    if count // blocks < max(memory, SHORTEST_BLOCK) or float(np.ptp(left)) == 0.0:
+    found, local, errors = groups(pv, op, dt_s, late, memory), np.zeros(e.size), e[judged]
+    if count // blocks < max(memory, SHORTEST_BLOCK) or float(np.ptp(errors)) == 0.0:
         return Located((), local, found)
-    columns, y = [g.columns[judged] for g in found], standardized(left)
+    columns, y = [g.columns[judged] for g in found], standardized(errors)
     bases, flat = directions(columns), np.concatenate(columns, axis=1)
     whole = _basis(flat - flat.mean(axis=0))
-    scaled = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
+    scaled = errors / max(float(np.sqrt(np.mean(errors**2))), 1e-300)
     features = []
     for g, basis, p, excess in zip(found, bases, *chances(bases, y, blocks), strict=True):
         own, by = ((basis.T @ y) ** 2).sum(axis=0) / y.shape[0], int(np.argmax(excess))

@@ -23,7 +23,7 @@ HURRIED = (0.2, 0.6)
 """Duration below which a move counts as fast, at the start of the search, in time constants; ours."""
 HURRY_DRAWN = 5.0
 """Length of its picture, in the same unit."""
-WAYS = tuple(0.8 * 1.12**i for i in range(25))
+RETURN_TIMES = tuple(0.8 * 1.12**i for i in range(25))
 """Recycle delays at which the search begins, in time constants; ours: a returning change is as wide as one."""
 PLACES, BANDS = tuple(0.05 * i for i in range(2, 19)), (0.5, 3.0)
 """Positions at which a switch is searched, in the span of PV, and bands [% PV]; ours: a start converges from a
@@ -91,7 +91,7 @@ RECYCLE = Effect(
                 Param(Slot.RETURNED, "returned", "", -2.0, 2.0, title="Share that comes back"),
                 Param(Slot.RETURNS_S, "returns_s", "s", 0.5, 20.0, "T", True, title="Return time"),
             ),
-            tuple({Slot.RETURNS_S: way} for way in WAYS),
+            tuple({Slot.RETURNS_S: time} for time in RETURN_TIMES),
             linear=Slot.RETURNED,
         ),
     ),

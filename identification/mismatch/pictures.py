@@ -258,7 +258,7 @@ def load_over_time(d: Drawing) -> Picture:
     return course_picture(d, LOAD, load)
 
 
-def busiest(x: Floats, length: int, usable: Mask | None = None) -> slice:
+def most_active(x: Floats, length: int, usable: Mask | None = None) -> slice:
     """The stretch of that many samples in which a signal moves most, without unusable samples."""
     length = min(length, x.size)
     travel = np.abs(np.diff(x, prepend=x[0]))
@@ -277,7 +277,7 @@ def biggest_move(x: Floats, length: int, usable: Mask) -> slice:
     return slice(first, first + length)
 
 
-def around(where: Mask, length: int) -> slice:
+def around_run(where: Mask, length: int) -> slice:
     """A stretch about the longest run of a mask."""
     found = runs(where)
     if not found:
@@ -315,12 +315,12 @@ def law_window(s: Recording, ti: float) -> int:
 
 
 def by_stated_law(s: Recording, where: Mask | None = None) -> Picture | None:
-    """OP about a mask's longest stretch (the busiest if None) and as the stated settings would have moved it.
+    """OP about a mask's longest stretch (the most active if None) and as the stated settings would have moved it.
 
     None without SP or settings.
     """
     if s.sp is None or s.stated is None:
         return None
     length = law_window(s, s.stated.ti)
-    part = busiest(s.op, length, s.usable) if where is None else around(where[: s.op.size], length)
+    part = most_active(s.op, length, s.usable) if where is None else around_run(where[: s.op.size], length)
     return rebuilt_course(s, part, {"stated": (s.sp - s.pv, s.stated)})

@@ -22,7 +22,7 @@ from identification.estimation.problem import Problem
 from identification.estimation.search import simulated_best
 from identification.mismatch.candidate_proof import held_out_gain
 from identification.mismatch.effect import ONE_CONSTANT
-from identification.mismatch.friction import behind_placed, simulated_anew
+from identification.mismatch.friction import behind_placed, simulated_reestimated
 from identification.mismatch.starts import early_part, fitted_early
 from identification.record import Floats, Mask
 from identification.signals.filters import in_band, without_lines
@@ -205,7 +205,7 @@ class HeldOut:
 
 def course(p: Problem, c: Floats, window: int, placed: bool) -> Floats:
     """PV's deviation [% PV], shape (n,), as drawn and judged: anchored in windows, the stem re-estimated or not."""
-    return anchored(p.y, simulated_anew(p, c, window) if placed else simulate(p.inputs, c), window)
+    return anchored(p.y, simulated_reestimated(p, c, window) if placed else simulate(p.inputs, c), window)
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,7 +236,7 @@ class Criterion:
 
     def free(self, c: Floats) -> Floats:
         """PV simulated by constants, shape (SIZE,)."""
-        return simulated_anew(self.p, c, self.window) if self.placed else simulate(self.p.inputs, c)
+        return simulated_reestimated(self.p, c, self.window) if self.placed else simulate(self.p.inputs, c)
 
     def misfit(self, c: Floats, part: slice = slice(None)) -> Misfit:
         """Misfit of constants, shape (SIZE,), in a part of PV."""
@@ -284,9 +284,9 @@ class Criterion:
 def refitted(p: Problem, model: Model, judged: Mask) -> Floats:
     """Constants of a model with the baseline part refitted to the least simulation error in a part of the record,
     bool, shape (n,); those of effects are kept."""
-    told = tuple(replace(row, params=()) for row in model.added)
+    fixed_rows = tuple(replace(row, params=()) for row in model.added)
     q = replace(p, edges=NO_NOISE, weight=judged.astype(float))
-    return descended(q, Model(told, model.c), FULL_STEPS).model.c
+    return descended(q, Model(fixed_rows, model.c), FULL_STEPS).model.c
 
 
 def banded(p: Problem, band: Band, early: Pair, cycle: int) -> InBand:
@@ -295,15 +295,15 @@ def banded(p: Problem, band: Band, early: Pair, cycle: int) -> InBand:
     in each `cycle` samples, if not 0."""
     inside, cut = replace(p, band=band), early_part(p)[1]
 
-    def left(models: list[Model]) -> Floats:
+    def least_error(models: list[Model]) -> Floats:
         constants = [c for m in models for c in (m.c, refitted(inside, m, early.judged))]
         errors = [p.y - simulate(p.inputs, c) for c in constants]
         if cycle and models[0].added:
-            placed = [again_behind(inside, c, early.judged, cycle) for c in constants]
-            errors += [p.y - simulated_anew(p, c, cycle) for c in (*constants, *placed)]
+            placed = [refitted_behind_stem(inside, c, early.judged, cycle) for c in constants]
+            errors += [p.y - simulated_reestimated(p, c, cycle) for c in (*constants, *placed)]
         return min((in_band(e, *band) for e in errors), key=lambda e: float(np.std(e[:cut])))
 
-    plain = left([early.plain, early.simulated])
+    plain = least_error([early.plain, early.simulated])
     c = early.better.c.copy()
     for slot in (Slot.K, Slot.T, Slot.L):
         c[slot] = early.simulated.c[slot]
@@ -311,7 +311,7 @@ def banded(p: Problem, band: Band, early: Pair, cycle: int) -> InBand:
     begun = (
         [early.better] if replaced or not early.better.added else [early.better, replace(early.better, c=c)]
     )
-    better = left(begun) if early.better.added else plain
+    better = least_error(begun) if early.better.added else plain
     moves = float(np.std(in_band(p.y, *band)[cut:]))
     sizes = [float(np.std(e[cut:])) for e in (plain, better)]
     misfits = [Misfit(size, 100.0 * (1.0 - size / max(moves, 1e-12))) for size in sizes]
@@ -321,7 +321,7 @@ def banded(p: Problem, band: Band, early: Pair, cycle: int) -> InBand:
     )
 
 
-def again_behind(p: Problem, c: Floats, judged: Mask, window: int) -> Floats:
+def refitted_behind_stem(p: Problem, c: Floats, judged: Mask, window: int) -> Floats:
     """Constants whose process is refitted behind the stem that is re-estimated in windows."""
     behind, free = behind_placed(p, c, window)
     found = refitted(behind, Model((), free), judged)
@@ -359,22 +359,24 @@ def held_out(
     fits = first, first if better is worse else fitted_early(p, better)
     _, cut = early_part(p)
     early = pair_of(p, fits, p.usable & (np.arange(p.y.size) < cut))
-    told = early, pair_of(p, (worse, better), p.usable), held_out_gain(p, fits)
-    found = _compared(p, told, cycle, better is worse, every_scan)
+    models = early, pair_of(p, (worse, better), p.usable), held_out_gain(p, fits)
+    found = _compared(p, models, cycle, better is worse, every_scan)
     return found if band is None else replace(found, in_band=banded(p, band, early, cycle))
 
 
 def _compared(
-    p: Problem, told: tuple[Pair, Pair, float], cycle: int, same: bool, every_scan: bool
+    p: Problem, models: tuple[Pair, Pair, float], cycle: int, same: bool, every_scan: bool
 ) -> HeldOut:
     """The comparison over the whole, or over windows where it carries over there alone."""
-    whole = replace(Criterion(p).compared(*told), every_scan=every_scan)
+    whole = replace(Criterion(p).compared(*models), every_scan=every_scan)
     if whole.carries or same:
         return whole
-    c = told[0].plain.c
+    c = models[0].plain.c
     memory = WINDOW_TIMES * float(c[Slot.T] + c[Slot.L]) / p.inputs.dt_s
-    windowed = replace(Criterion(p, max(int(memory), WINDOW_SAMPLES)).compared(*told), every_scan=every_scan)
+    windowed = replace(
+        Criterion(p, max(int(memory), WINDOW_SAMPLES)).compared(*models), every_scan=every_scan
+    )
     if cycle:
-        anew = replace(Criterion(p, cycle, True).compared(*told), every_scan=every_scan)
-        return windowed if windowed.carries and windowed.share > anew.share else anew
+        reestimated = replace(Criterion(p, cycle, True).compared(*models), every_scan=every_scan)
+        return windowed if windowed.carries and windowed.share > reestimated.share else reestimated
     return windowed if windowed.carries else whole

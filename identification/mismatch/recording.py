@@ -29,7 +29,7 @@ class SeenInCycles:
 
     stretches : number of independent trials, each between two OP reversals, or without a cycle between stem moves;
     agreeing : share of them in which PV fits this valve better than a free one [-]; cycle_s : mean length of two of
-    them [s]; cycling : whether they are between OP reversals; told : the valve's figures by name, with 90 %
+    them [s]; cycling : whether they are between OP reversals; estimates : the valve's figures by name, with 90 %
     intervals, as in the batch run.
     """
 
@@ -39,7 +39,7 @@ class SeenInCycles:
     agreeing: float
     cycle_s: float
     cycling: bool = True
-    told: Mapping[str, Estimate] = field(default_factory=dict)
+    estimates: Mapping[str, Estimate] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,7 +55,7 @@ FINER = 8
 class Prediction:
     """The class with the best prediction, and its gain [nat]."""
 
-    way: str = ""
+    influence: str = ""
     gain: float = 0.0
 
 
@@ -93,10 +93,10 @@ class LoopSignals:
 
 def on_above(x: Floats, at: float, band: float) -> Floats:
     """1 where x, shape (n,), was last above `at` + half a band, 0 where it was last below `at` - half a band."""
-    told = np.where(x > at + band / 2.0, 1.0, np.where(x < at - band / 2.0, 0.0, np.nan))
-    told[0] = float(x[0] > at)
-    last = np.maximum.accumulate(np.where(np.isnan(told), 0, np.arange(x.size)))
-    return told[last]  # type: ignore[no-any-return]
+    states = np.where(x > at + band / 2.0, 1.0, np.where(x < at - band / 2.0, 0.0, np.nan))
+    states[0] = float(x[0] > at)
+    last = np.maximum.accumulate(np.where(np.isnan(states), 0, np.arange(x.size)))
+    return states[last]  # type: ignore[no-any-return]
 
 
 def by_level(o: LoopSignals) -> list[Floats]:
@@ -132,8 +132,8 @@ def by_history(o: LoopSignals) -> list[Floats]:
 def by_direction(o: LoopSignals) -> list[Floats]:
     """Gain, load and reading that depend on the direction and the speed of flow and of PV."""
     flow, pv = o.ahead(o.flow), o.ahead(o.pv)
-    way, rise = (np.tanh(3.0 * x / (float(np.std(x)) + 1e-9)) for x in (flow, pv))
-    loads = [o.response(x) for x in (way, way * o.flow, rise, rise * o.flow)]
+    direction, rise = (np.tanh(3.0 * x / (float(np.std(x)) + 1e-9)) for x in (flow, pv))
+    loads = [o.response(x) for x in (direction, direction * o.flow, rise, rise * o.flow)]
     return [*loads, np.abs(flow), np.abs(pv), pv * o.pv, rise, np.abs(pv) * o.pv]
 
 
@@ -141,8 +141,8 @@ def by_sensor(p: Problem, fit: Fitted) -> list[Floats]:
     """For the innovations directly: whether PV is constant, and its predicted move by size and direction."""
     one, two = (np.concatenate((np.full(k, p.y[0]), p.y[:-k])) for k in (1, 2))
     move = _bounded(p.y - fit.e - one)
-    stands = (one == two).astype(float)
-    return [stands, move * stands, move * np.abs(move), np.maximum(move, 0.0), np.abs(move)]
+    is_constant = (one == two).astype(float)
+    return [is_constant, move * is_constant, move * np.abs(move), np.maximum(move, 0.0), np.abs(move)]
 
 
 def past_moves(o: LoopSignals) -> list[Floats]:
@@ -164,7 +164,7 @@ def bent_moves(o: LoopSignals) -> list[Floats]:
     return [response(x, o.c, o.dt_s) for x in (*moves, o.flow**2, o.flow**3)]
 
 
-WAYS: Mapping[str, Callable[[LoopSignals], list[Floats]]] = {
+INFLUENCES: Mapping[str, Callable[[LoopSignals], list[Floats]]] = {
     "past": past_moves,
     "size": bent_moves,
     "level": by_level,
@@ -175,11 +175,11 @@ WAYS: Mapping[str, Callable[[LoopSignals], list[Floats]]] = {
 """The classes of influences on PV, each with its signals, shape (n,) each."""
 
 
-def ways(p: Problem, fit: Fitted) -> Iterator[tuple[str, list[Floats]]]:
+def influence_signals(p: Problem, fit: Fitted) -> Iterator[tuple[str, list[Floats]]]:
     """All classes with their whitened signals, shape (n,) each."""
     o = LoopSignals(p, fit.model.c)
-    for name, way in WAYS.items():
-        yield name, [whitened(x, fit.ar, p.edges) for x in way(o)]
+    for name, signals_of in INFLUENCES.items():
+        yield name, [whitened(x, fit.ar, p.edges) for x in signals_of(o)]
     if not p.by_simulation:
         yield "sensor", by_sensor(p, fit)
 
@@ -193,7 +193,7 @@ def unfollowed(p: Problem, fit: Fitted) -> Callable[[Floats], Floats]:
     return lambda x: x - span @ (span.T @ x)
 
 
-def left_freely(p: Problem, fit: Fitted) -> Floats:
+def flexible_residual(p: Problem, fit: Fitted) -> Floats:
     """Residual of a fit's weighted innovations under the flexible model, shape (n,)."""
     root, rest, o = np.sqrt(p.weight), unfollowed(p, fit), LoopSignals(p, fit.model.c)
     free = past_moves(o) + bent_moves(o)
@@ -210,12 +210,12 @@ def best_prediction(p: Problem, fit: Fitted, clock: bool = True) -> Prediction:
     root, rest = np.sqrt(p.weight), unfollowed(p, fit)
     e = rest(fit.e * root)
     best = Prediction("clock", _gained(fit, e, _by_clock(e, root))) if clock else Prediction()
-    for way, signals in ways(p, fit):
+    for influence, signals in influence_signals(p, fit):
         x = rest(np.nan_to_num(np.stack(signals) * root).T)
         size = x.std(axis=0)
         kept = size > 1e-9 * size.max(initial=1e-30)
         won = max(_gained(fit, e, _by_ridge(e, x[:, kept] / size[kept], prior)) for prior in PRIORS)
-        best = Prediction(way, won) if won > best.gain else best
+        best = Prediction(influence, won) if won > best.gain else best
     return best
 
 
@@ -256,14 +256,14 @@ def _by_clock(e: Floats, root: Floats) -> Floats:
         highest = lines[np.argmax(power[np.outer(each, lines)].sum(axis=0))]
         angle = 2.0 * np.pi * highest / (FINER * n)
         turn = np.outer(np.arange(n) * angle, each)
-        wave = np.concatenate((np.cos(turn), np.sin(turn)), axis=1) * root[:, None]
-        gram, slope = wave[known].T @ wave[known], wave[known].T @ e[known]
+        harmonics = np.concatenate((np.cos(turn), np.sin(turn)), axis=1) * root[:, None]
+        gram, slope = harmonics[known].T @ harmonics[known], harmonics[known].T @ e[known]
         ridge = CALM * n * np.eye(2 * each.size)
-        out[part] = e[part] - wave[part] @ np.linalg.solve(gram + ridge, slope)
+        out[part] = e[part] - harmonics[part] @ np.linalg.solve(gram + ridge, slope)
     return out
 
 
-def _gained(fit: Fitted, e: Floats, left: Floats) -> float:
+def _gained(fit: Fitted, e: Floats, residual: Floats) -> float:
     """Gain in log likelihood [nat] from e to `left`, shape (n,) each."""
-    won = 0.5 * fit.count * np.log(float(e @ e) / max(float(left @ left), 1e-30))
+    won = 0.5 * fit.count * np.log(float(e @ e) / max(float(residual @ residual), 1e-30))
     return float(won) if np.isfinite(won) else 0.0

@@ -78,18 +78,18 @@ def silent(_: str) -> None:
     """Progress without output."""
 
 
-def compete(
-    x: Round, rows: tuple[Variant, ...] = CANDIDATES, tell: Progress = silent, least: float = 0.0
+def ranked_candidates(
+    x: Round, rows: tuple[Variant, ...] = CANDIDATES, progress: Progress = silent, least: float = 0.0
 ) -> list[Candidate]:
     """All rows as candidates, each added to the fit, best first; the better half is followed to the end.
 
-    tell : called with each row's name before it is tried; least : smallest useful penalised gain [nat].
+    progress : called with each row's name before it is tried; least : smallest useful penalised gain [nat].
     """
-    begun = [first_try(x, row, least, tell) for row in rows if applies(x, row)]
+    begun = [first_try(x, row, least, progress) for row in rows if applies(x, row)]
     firsts = counted_alike(x, [first for first, _ in begun])
     tried = sorted(zip(firsts, (models for _, models in begun), strict=True), key=lambda t: -t[0].penalised)
     ended = [gain_over_opponent(x, followed(x, first, models, least)) for first, models in tried[:FOLLOWED]]
-    sticking = sticking_candidates(x, [first for first, _ in tried], rows, tell)
+    sticking = sticking_candidates(x, [first for first, _ in tried], rows, progress)
     found = [*ended, *sticking, *(gain_over_opponent(x, first) for first, _ in tried[FOLLOWED:])]
     return sorted(counted_alike(x, found), key=lambda c: -c.penalised)
 
@@ -107,8 +107,8 @@ def applies(x: Round, row: Variant) -> bool:
     if x.p.by_simulation and effect.timed and row.opponent is None:
         return False  # an added load is judged by innovations
     # behind one friction, a second of the same stem is not identifiable without the stem's position
-    told = x.s.free_valve or any(about(name).friction is not None for name in near.names)
-    return effect.friction is None or not told
+    has_friction = x.s.free_valve or any(about(name).friction is not None for name in near.names)
+    return effect.friction is None or not has_friction
 
 
 def penalty(p: Problem, row: Variant) -> float:
@@ -135,10 +135,10 @@ def worth_following(p: Problem, least: float) -> float:
     return min(MAY_COME_TO * least, least + WORTH_FOLLOWING)
 
 
-def first_try(x: Round, row: Variant, least: float, tell: Progress) -> tuple[Candidate, list[Model]]:
+def first_try(x: Round, row: Variant, least: float, progress: Progress) -> tuple[Candidate, list[Model]]:
     """The candidate after a few steps from a row's best start, and all its starts, the best first; a hopeless start
     is stopped."""
-    tell(row.name)
+    progress(row.name)
     p, near = x.p, x.near
     first = models = start_models(x, row)
     if row.needs != "line":
@@ -186,18 +186,18 @@ def gain_over_opponent(x: Round, first: Candidate) -> Candidate:
 
 
 def sticking_candidates(
-    x: Round, tried: list[Candidate], rows: tuple[Variant, ...], tell: Progress
+    x: Round, tried: list[Candidate], rows: tuple[Variant, ...], progress: Progress
 ) -> list[Candidate]:
     """Sticking valves scanned near the best backlash, if backlash or a similar effect gains anything."""
-    plays = [c for c in tried if about(c.name).friction is Friction.PLAY]
+    backlashes = [c for c in tried if about(c.name).friction is Friction.BACKLASH]
     hints = [c.gain for c in tried if about(c.name).friction is not None]
-    if not plays or max(hints) < STICKING_HINT:
+    if not backlashes or max(hints) < STICKING_HINT:
         return []
     out = []
     for row in rows:
         if about(row.name).friction is Friction.STICKS:
-            tell(row.name)
-            fit = fit_sticking(x.p, plays[0].fit, row, x.near.model.added)
+            progress(row.name)
+            fit = fit_sticking(x.p, backlashes[0].fit, row, x.near.model.added)
             out.append(penalised(x, fit))
     return out
 

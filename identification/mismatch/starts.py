@@ -81,12 +81,12 @@ class Round:
         e = whitened(x, self.near.ar, self.p.edges) * np.sqrt(self.p.weight)
         return e - self.directions @ (self.directions.T @ e)  # type: ignore[no-any-return]
 
-    def left(self, model: Model) -> float:
+    def residual_squares(self, model: Model) -> float:
         """Sum of squares of this part under a model."""
         e = self.free(self.p.y - simulate(self.p.inputs, model.c))
         return float(e @ e)
 
-    def on_line(self, model: Model) -> Model:
+    def linearly_adjusted(self, model: Model) -> Model:
         """A start with its linear parameter at the least residual."""
         slot = model.added[-1].linear
         if slot is None:
@@ -198,19 +198,19 @@ def start_models(x: Round, row: Variant) -> list[Model]:
         for param in row.params:
             offset, factor = scales(x.p.inputs, begun.c, param)
             c[param.slot] = offset + factor * start.get(int(param.slot), 0.0)
-        stood = sum(c[slot] for slot in row.delays) + max(-c[Slot.SHARE] * c[Slot.T], 0.0)
+        delay = sum(c[slot] for slot in row.delays) + max(-c[Slot.SHARE] * c[Slot.T], 0.0)
         if row.enter is not None:
             row.enter(c)
-        for part in (0.4, 1.0) if stood > 0 else (0.0,):
+        for part in (0.4, 1.0) if delay > 0 else (0.0,):
             shorter = c.copy()
-            shorter[Slot.L] = max(c[Slot.L] - part * stood, 0.2 * c[Slot.L])
+            shorter[Slot.L] = max(c[Slot.L] - part * delay, 0.2 * c[Slot.L])
             out.append(Model((*begun.added, row), shorter))
     return out
 
 
 def screened(x: Round, models: list[Model]) -> list[Model]:
     """Starts ordered by their residual innovations after a linear adjustment of the fit's own constants."""
-    return models if len(models) == 1 else sorted(map(x.on_line, models), key=x.left)
+    return models if len(models) == 1 else sorted(map(x.linearly_adjusted, models), key=x.residual_squares)
 
 
 def mode_starts(p: Problem, near: Fitted, row: Variant) -> list[Model]:
@@ -238,11 +238,11 @@ def grid_of_modes(p: Problem, near: Fitted, row: Variant, ar: Floats) -> Iterato
             rows = np.stack([late[first], late[other], level])
             weighted = rows * p.weight
             beta = np.linalg.lstsq(weighted @ rows.T, weighted @ y, rcond=1e-12)[0]
-            (one, two), left = beta[:2], float((p.weight * y) @ y - beta @ (weighted @ y))
+            (one, two), squares = beta[:2], float((p.weight * y) @ y - beta @ (weighted @ y))
             c = near.model.c.copy()
             c[Slot.T], c[Slot.L], c[Slot.MODE_T] = first, samples * dt_s, max(other, 0.1 * dt_s)
             c[Slot.K], c[Slot.SHARE] = one + two, two / (one + two) if one + two != 0 else np.inf
-            yield left, Model((*near.model.added, row), c)
+            yield squares, Model((*near.model.added, row), c)
 
 
 def responses(p: Problem, near: Fitted, times: set[float], ar: Floats) -> dict[float, Floats]:

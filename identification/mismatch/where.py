@@ -26,7 +26,7 @@ ONE_WAY = 3.0
 """Ratio of the residual in one direction of OP to that in the other, from which that direction is
 reported."""
 
-TOLD = ("name", "p", "carries", "share", "by", "range")
+REPORTED = ("name", "p", "carries", "share", "by", "range")
 """Reported fields of a feature."""
 
 
@@ -53,8 +53,8 @@ def ranges(x: Floats, weight: Floats) -> list[float]:
 
 def direction(op: Floats, won: Floats) -> str:
     """Whether the gain comes from OP moves up, down, or both."""
-    way = np.sign(np.diff(op, prepend=op[0]))
-    up, down = float(won[way > 0].sum()), float(won[way < 0].sum())
+    sign = np.sign(np.diff(op, prepend=op[0]))
+    up, down = float(won[sign > 0].sum()), float(won[sign < 0].sum())
     if up > ONE_WAY * max(down, 0.0):
         return "up"
     return "down" if down > ONE_WAY * max(up, 0.0) else "both"
@@ -94,21 +94,21 @@ def where_of(found: Explanation, s: Recording, block: str, at: Located) -> dict[
 
     block : of the verdict; at : of the baseline model's innovations, of the last model's if a residual remains.
     """
-    p, marked, signals = found.p, found.finding, words.TOLD["signals"][block]
-    features = [{key: getattr(f, key) for key in TOLD} for f in at.features]
+    p, marked, signals = found.p, found.finding, words.TEXTS["signals"][block]
+    features = [{key: getattr(f, key) for key in REPORTED} for f in at.features]
     after = any(f.name == "after_reversals" for f in at.carrying)
-    told: dict[str, Any] = {"features": features, "after_reversals": after}
+    reported: dict[str, Any] = {"features": features, "after_reversals": after}
     if marked is not None:
         here = marked.where[: s.pv.size]
         spans = [[0.0, here.size * s.dt_s]] if here.all() else carrying(here.astype(float), s.dt_s)
-        return {"signals": signals, "spans": spans} | told
+        return {"signals": signals, "spans": spans} | reported
     if found.accepted:
         won, difference = won_over(p, found.plain, found.best)
-    elif found.left > 0:
+    elif found.residual_nat > 0:
         won = at.local if at.carrying else p.weight * found.best.e**2
         difference = np.where(p.weight > 0, found.best.e, 0.0)
     else:
-        return {"signals": [], "spans": []} | told
+        return {"signals": [], "spans": []} | reported
     return {
         "signals": signals,
         "spans": carrying(won, s.dt_s),
@@ -116,4 +116,4 @@ def where_of(found: Explanation, s: Recording, block: str, at: Located) -> dict[
         "op_range": ranges(s.op, won),
         "direction": direction(s.op, won),
         "band_s": half_power_periods(difference, s.dt_s),
-    } | told
+    } | reported

@@ -19,7 +19,7 @@ from identification.mismatch.outside import OUTSIDE, about
 if TYPE_CHECKING:
     from identification.mismatch.answer import Answer, EffectFound
 
-TOLD: Mapping[str, Any] = tomllib.loads((files(__package__) / "words.toml").read_text("utf-8"))
+TEXTS: Mapping[str, Any] = tomllib.loads((files(__package__) / "words.toml").read_text("utf-8"))
 MINUTES_S, MINUTES_OF_RECORD_S, HOURS_S = 600.0, 120.0, 7200.0
 """Times above which minutes are used, for a parameter and for a record, and hours [s]; ours."""
 
@@ -32,67 +32,67 @@ def check(data: Mapping[str, Any]) -> str:
         return ""
     if "outside" in data:
         return OUTSIDE[data["outside"]["name"]].check
-    said = TOLD["checks"]
-    return EFFECTS[verdict].check if verdict in EFFECTS else said.get(verdict, said["unexplained"])
+    checks = TEXTS["checks"]
+    return EFFECTS[verdict].check if verdict in EFFECTS else checks.get(verdict, checks["unexplained"])
 
 
 def discriminating_test(one: str, other: str) -> str:
     """The experiment or signal that distinguishes two names of the catalogue."""
     tests = [EFFECTS[a].tests.get(b) for a, b in ((one, other), (other, one)) if a in EFFECTS]
-    return next(filter(None, tests), TOLD["longer"])
+    return next(filter(None, tests), TEXTS["longer"])
 
 
 def remarks(fit: Mapping[str, Any]) -> list[str]:
     """Remarks on a fit: that the finding appears in one-step-ahead prediction but in no simulation, and that the
     baseline models with the best simulation and the best prediction differ."""
-    ahead = [] if fit.get("ahead_nat") is None else [TOLD["seen_ahead"]]
+    ahead = [] if fit.get("ahead_nat") is None else [TEXTS["seen_ahead"]]
     loops = {
         name: f"gain {x['gain']:.3g}, time constant {_number(x['time_constant_s'], 's')}"
         for name, x in fit.get("plain_loops", {}).items()
     }
-    return [*ahead, TOLD["two_plain_loops"].format(**loops)] if loops else ahead
+    return [*ahead, TEXTS["two_plain_loops"].format(**loops)] if loops else ahead
 
 
 def note(found: Explanation) -> str:
     """Why there is no name, or no single name; empty if there is nothing to add."""
     if found.refuted and not found.accepted:
-        over = TOLD["over_others" if found.others else "over_rest"]
-        return TOLD["refuted"].format(names=" and ".join(found.refuted), **over)
-    if found.left <= 0:
+        over = TEXTS["over_others" if found.others else "over_rest"]
+        return TEXTS["refuted"].format(names=" and ".join(found.refuted), **over)
+    if found.residual_nat <= 0:
         stacked = " and ".join(c.name for c in found.accepted)
-        return TOLD["stacked"].format(names=stacked) if is_stack(found) else ""
+        return TEXTS["stacked"].format(names=stacked) if is_stack(found) else ""
     if found.outside is not None:
         return ""
-    if not found.left_by:
-        return TOLD["no_name"]
-    return TOLD["left_over"].format(nats=found.left, by=TOLD["left_by"][found.left_by])
+    if not found.residual_by:
+        return TEXTS["no_name"]
+    return TEXTS["left_over"].format(nats=found.residual_nat, by=TEXTS["left_by"][found.residual_by])
 
 
-def cycles_told(found: Explanation) -> str:
+def cycles_text(found: Explanation) -> str:
     """A sentence on the faulty valve that the cycles show."""
     seen = found.cycles
     assert seen is not None
     between = "OP reversals" if seen.cycling else "moves of the stem"
-    text = TOLD["cycles"].format(share=100 * seen.agreeing, stretches=seen.stretches, between=between)
-    return text if found.proven.carries else f"{text} {TOLD['strays']}"
+    text = TEXTS["cycles"].format(share=100 * seen.agreeing, stretches=seen.stretches, between=between)
+    return text if found.proven.carries else f"{text} {TEXTS['strays']}"
 
 
-def too_short_told(enough: float, length_s: float, lag_s: float) -> str:
+def too_short_text(enough: float, length_s: float, lag_s: float) -> str:
     """Requirement where the record is short compared with the time constant."""
     length, lag = (_time(x, MINUTES_OF_RECORD_S) for x in (length_s, lag_s))
-    return TOLD["too_short"].format(enough=enough, held=length_s / lag_s, length=length, lag=lag)
+    return TEXTS["too_short"].format(enough=enough, held=length_s / lag_s, length=length, lag=lag)
 
 
-def reason(said: Answer) -> str:
+def reason(answer: Answer) -> str:
     """The verdict in words: with its numbers and what the recording does not determine; for an unnamed residual its
     size, its location, and why it has no name."""
-    if said.verdict == "unexplained":
-        outside = "" if said.outside is None else f"{TOLD['better']}: {_filled(said.outside)}."
-        return f"{said.note or outside or TOLD['no_name']} {located_sentence(said.where)}".strip()
-    first = _filled(said.effects[0]) if said.effects else TOLD["nothing_left"]
-    others = f"Then also: {', '.join(e.name for e in said.effects[1:])}." if len(said.effects) > 1 else ""
-    caution = f"The figures are rough: the recording {said.caution}." if said.caution else ""
-    return " ".join(filter(None, (first, others, caution, said.shown)))
+    if answer.verdict == "unexplained":
+        outside = "" if answer.outside is None else f"{TEXTS['better']}: {_filled(answer.outside)}."
+        return f"{answer.note or outside or TEXTS['no_name']} {located_sentence(answer.where)}".strip()
+    first = _filled(answer.effects[0]) if answer.effects else TEXTS["nothing_left"]
+    others = f"Then also: {', '.join(e.name for e in answer.effects[1:])}." if len(answer.effects) > 1 else ""
+    caution = f"The figures are rough: the recording {answer.caution}." if answer.caution else ""
+    return " ".join(filter(None, (first, others, caution, answer.shown)))
 
 
 def _filled(found: EffectFound) -> str:
@@ -106,16 +106,16 @@ def _filled(found: EffectFound) -> str:
 
 def is_along(feature: Mapping[str, Any]) -> bool:
     """Whether errors keep one sign along a feature, so that they have no single place."""
-    return feature["by"] == "sign" and "along" in TOLD["features"][feature["name"]]
+    return feature["by"] == "sign" and "along" in TEXTS["features"][feature["name"]]
 
 
 def place(feature: Mapping[str, Any]) -> str:
     """Location of the misfit along one feature of the answer's `where`."""
-    told, ends = TOLD["features"][feature["name"]], feature["range"]
+    texts, ends = TEXTS["features"][feature["name"]], feature["range"]
     if is_along(feature):
-        return told["along"]
-    text = f"{ends[0]:.3g} to {ends[1]:.3g} {told.get('unit', '')}" if ends else "part of the range"
-    return told["place"].format(range=text)
+        return texts["along"]
+    text = f"{ends[0]:.3g} to {ends[1]:.3g} {texts.get('unit', '')}" if ends else "part of the range"
+    return texts["place"].format(range=text)
 
 
 def located_sentence(where: Mapping[str, Any]) -> str:
@@ -124,7 +124,7 @@ def located_sentence(where: Mapping[str, Any]) -> str:
     carrying = [place(f) if is_along(f) else f"is located at {place(f)}" for f in features if f["carries"]]
     if carrying:
         return f"The residual {'; '.join(carrying[:3])}."
-    return TOLD["tied_to_nothing"] if features else ""
+    return TEXTS["tied_to_nothing"] if features else ""
 
 
 def _number(value: float, unit: str) -> str:

@@ -183,5 +183,5 @@ def harris_index(error: Floats, usable: Mask, dt_s: float, dead_time_s: float) -
     x = rows[:, whole]
     gram = x @ x.T
     beta = np.linalg.solve(gram + 1e-9 * np.trace(gram) * np.eye(HARRIS_LAGS), x @ y)
-    left = y - beta @ x
-    return float(np.clip(left @ left / power, 0.0, 1.0))
+    residual = y - beta @ x
+    return float(np.clip(residual @ residual / power, 0.0, 1.0))

@@ -174,13 +174,13 @@ RIDGE = 1e-9
 """Share of a column's power that is added to it, because pasts of rounded trends are collinear."""
 
 
-def granger_f(signals: Floats, lags: int, asked: int | None = None) -> Floats:
+def granger_f(signals: Floats, lags: int, first_count: int | None = None) -> Floats:
     """F statistics for predicting every signal from the past of every other in addition to its own past.
 
-    signals : shape (k, n), samples of one clock; lags : number of past samples used; asked : number of first signals
-    whose pairs with the later ones are computed, None for all pairs. Returns shape (k, k), F[i, j]: signal i predicts
-    signal j; 0 on the diagonal, for pairs that are not computed, and everywhere if n is less than four times the
-    constants of a model.
+    signals : shape (k, n), samples of one clock; lags : number of past samples used; first_count : number of first
+    signals whose pairs with the later ones are computed, None for all pairs. Returns shape (k, k), F[i, j]: signal i
+    predicts signal j; 0 on the diagonal, for pairs that are not computed, and everywhere if n is less than four times
+    the constants of a model.
     """
     k, n = signals.shape
     rows = n - lags
@@ -192,22 +192,22 @@ def granger_f(signals: Floats, lags: int, asked: int | None = None) -> Floats:
     ridge = range(1, lags + 1)
     own[:, ridge, ridge] *= 1.0 + RIDGE
     own[:, ridge, ridge] += 1e-300
-    first, later = (level, level) if asked is None else (level[:asked], level[asked:])
+    first, later = (level, level) if first_count is None else (level[:first_count], level[first_count:])
     between = _lagged(first[None], later[None], lags)[0]
-    one, other = np.indices(between.shape[:2]).reshape(2, -1) + np.array([[0], [asked or 0]])
+    one, other = np.indices(between.shape[:2]).reshape(2, -1) + np.array([[0], [first_count or 0]])
     once = one < other
     one, other, pairs = one[once], other[once], between.reshape(-1, lags + 1, lags + 1)[once]
-    beside, alone = pairs[:, 1:, 1:], own[:, 0, 0] - _explained(own[:, 1:, 1:], own[:, 1:, 0])
+    shared_gram, alone = pairs[:, 1:, 1:], own[:, 0, 0] - _explained(own[:, 1:, 1:], own[:, 1:, 0])
     for of, by, shared, cross in (
-        (other, one, beside.transpose(0, 2, 1), pairs[:, 1:, 0]),
-        (one, other, beside, pairs[:, 0, 1:]),
+        (other, one, shared_gram.transpose(0, 2, 1), pairs[:, 1:, 0]),
+        (one, other, shared_gram, pairs[:, 0, 1:]),
     ):
         gram = np.block([[own[of, 1:, 1:], shared], [shared.transpose(0, 2, 1), own[by, 1:, 1:]]])
         power = own[of, 0, 0]
         both = power - _explained(gram, np.concatenate((own[of, 1:, 0], cross), axis=1))
-        left = both > 1e-12 * power
-        gained = np.maximum(alone[of[left]] - both[left], 0.0) / lags
-        out[by[left], of[left]] = gained / (both[left] / (rows - 2 * lags - 1))
+        varies = both > 1e-12 * power
+        gained = np.maximum(alone[of[varies]] - both[varies], 0.0) / lags
+        out[by[varies], of[varies]] = gained / (both[varies] / (rows - 2 * lags - 1))
     return out
 
 

@@ -121,8 +121,8 @@ def _half_misfits(y: Floats, t: Floats, length: float) -> tuple[float, float]:
     peak = 0.5 * (t[1:] + t[:-1])
     fitted = (rising[0] / peak + falling[0] / (length - peak)) ** 2
     triangle = float((fitted / (rising[1] / peak**2 + falling[1] / (length - peak) ** 2)).max())
-    left = power - float(sine @ y) ** 2 / float(sine @ sine), power - triangle
-    return max(left[0], 0.0) / y.size, max(left[1], 0.0) / y.size
+    residual_power = power - float(sine @ y) ** 2 / float(sine @ sine), power - triangle
+    return max(residual_power[0], 0.0) / y.size, max(residual_power[1], 0.0) / y.size
 
 
 def curve_fit(x: Floats, period: float) -> Values | None:
@@ -148,7 +148,7 @@ def curve_fit(x: Floats, period: float) -> Values | None:
     return (sine / (sine + triangle),) if sine + triangle > 0.0 else None
 
 
-def _ways(x: Floats) -> np.ndarray | None:
+def _step_signs(x: Floats) -> np.ndarray | None:
     """Each step of a trend as -1, 0 or 1; None for a constant."""
     step = np.diff(x)
     spread = float(step.std())
@@ -165,7 +165,7 @@ def qualitative_shape(op: Floats, pv: Floats, period: float) -> Values | None:
     PV is a flow that rises with OP, sampled some ten times a cycle (Yamashita 2006, Control Engineering Practice 14:
     rho 1 and rho 3).
     """
-    u, y = _ways(op), _ways(pv)
+    u, y = _step_signs(op), _step_signs(pv)
     if u is None or y is None or op.size < CYCLES * period:
         return None
     moving = (u != 0) | (y != 0)
@@ -275,12 +275,12 @@ def load_disturbances(error: Floats, dt_s: float, ti_s: float) -> Values | None:
     return (most,)
 
 
-def idle_index(op: Floats, pv: Floats, sp: Floats, way: float) -> Values | None:
+def idle_index(op: Floats, pv: Floats, sp: Floats, gain_sign: float) -> Values | None:
     """Time in which OP and PV move in the same direction less that of opposite directions, over both, while a load
     has moved PV: near 1 for sluggish control, about 0 or less otherwise.
 
-    Sampled a few times in the loop's own time; steps soon after a set point move are left out; way, the sign of the
-    process gain (Hägglund 1999, Control Engineering Practice 7).
+    Sampled a few times in the loop's own time; steps soon after a set point move are left out; gain_sign, the sign
+    of the process gain (Hägglund 1999, Control Engineering Practice 7).
     """
     u, y, off = np.diff(op), np.diff(pv), 0.5 * np.abs(sp[1:] - pv[1:] + sp[:-1] - pv[:-1])
     moved = np.convolve(np.abs(np.diff(sp)) > 1e-9, np.ones(2 * AFTER_MOVE + 1))[
@@ -290,4 +290,4 @@ def idle_index(op: Floats, pv: Floats, sp: Floats, way: float) -> Values | None:
     both &= (off > float((sp - pv).std())) & (moved < 0.5)
     if both.sum() < IDLE_STEPS:
         return None
-    return (float(np.sign(u[both] * y[both] * way).mean()),)
+    return (float(np.sign(u[both] * y[both] * gain_sign).mean()),)

@@ -18,9 +18,9 @@ def isolated_values(x: Floats, usable: Mask, factor: float, least: float) -> Mas
     low, high = np.quantile(x[usable] if usable.any() else x, [0.005, 0.995])
     there, back = rise[:-1], -rise[1:]
     away = np.minimum(np.abs(there), np.abs(back))
-    apart = np.abs(x[2:] - x[:-2])
+    across = np.abs(x[2:] - x[:-2])
     far = away > max(factor * usual, least * float(high - low))
-    out[1:-1] = far & (there * back > 0.0) & (apart < 0.1 * away) & usable[1:-1]
+    out[1:-1] = far & (there * back > 0.0) & (across < 0.1 * away) & usable[1:-1]
     return out
 
 

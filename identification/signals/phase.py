@@ -42,9 +42,9 @@ def kept_phase(x: Floats, usable: Mask, period: float) -> KeptPhase:
     if count < 2:
         return KeptPhase(0.0, PERIODS * count)
     at = np.arange(count * size)
-    wave = np.exp(-2j * np.pi * at / period)
+    phasor = np.exp(-2j * np.pi * at / period)
     good = usable[at].reshape(count, size)
-    turned = (np.where(usable[at], x[at], 0.0) * wave).reshape(count, size)
+    turned = (np.where(usable[at], x[at], 0.0) * phasor).reshape(count, size)
     kept = good.mean(axis=1) >= 0.5
     blocks = np.where(kept, turned.sum(axis=1) / np.maximum(good.sum(axis=1), 1), 0.0)
     height, periods = np.abs(blocks), PERIODS * int(kept.sum())

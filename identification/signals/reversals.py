@@ -23,18 +23,18 @@ LONGEST = 2.0
 def turning_points(x: Floats, size: float) -> np.ndarray:
     """Samples at which a signal, shape (n,), reverses by more than a size, shape (t,)."""
     out = np.empty(x.size, dtype=np.int64)
-    count, high, low, way = 0, 0, 0, 0
+    count, high, low, direction = 0, 0, 0, 0
     for k in range(x.size):
-        if way >= 0 and x[k] > x[high]:
+        if direction >= 0 and x[k] > x[high]:
             high = k
-        if way <= 0 and x[k] < x[low]:
+        if direction <= 0 and x[k] < x[low]:
             low = k
-        if way >= 0 and x[high] - x[k] >= size:
+        if direction >= 0 and x[high] - x[k] >= size:
             out[count] = high
-            count, way, low = count + 1, -1, k
-        elif way <= 0 and x[k] - x[low] >= size:
+            count, direction, low = count + 1, -1, k
+        elif direction <= 0 and x[k] - x[low] >= size:
             out[count] = low
-            count, way, high = count + 1, 1, k
+            count, direction, high = count + 1, 1, k
     return out[:count]
 
 

@@ -117,11 +117,11 @@ def held(lag_s: float, h: float) -> tuple[float, float]:
 
 
 @njit(cache=True)
-def _followed(x: Floats, left: float, mean: float) -> Floats:
+def _followed(x: Floats, remaining: float, mean: float) -> Floats:
     out, at = np.empty_like(x), x[0]
     for k in range(x.size):
         out[k] = x[k] + (at - x[k]) * mean
-        at = x[k] + (at - x[k]) * left
+        at = x[k] + (at - x[k]) * remaining
     return out
 
 
@@ -133,5 +133,5 @@ def lagged(x: Floats, lag_s: float, dt_s: float) -> Floats:
 
 def first_order(x: Floats, samples: float) -> Floats:
     """A signal, shape (n,), behind a first-order filter, time constant in samples (0: none), initially at rest."""
-    left = math.exp(-1.0 / samples) if samples > 0 else 0.0
-    return x if samples <= 0 else _followed(x, left, left)  # type: ignore[no-any-return]
+    remaining = math.exp(-1.0 / samples) if samples > 0 else 0.0
+    return x if samples <= 0 else _followed(x, remaining, remaining)  # type: ignore[no-any-return]

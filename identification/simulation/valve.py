@@ -119,25 +119,25 @@ def heavy_step(stem: Stem, op: float, law: StemLaw, time_s: float, dt_s: float) 
 
     stem : position [% OP], speed [%/s], and an unused value; time_s : natural time of mass and spring [s].
     """
-    at, speed, left, total = stem[0], stem[1], dt_s, 0.0
+    at, speed, remaining_s, total = stem[0], stem[1], dt_s, 0.0
     for _ in range(MOST_PIECES):
         gap = op - at
         if speed == 0.0 and abs(gap) <= law.breakaway:
             break
-        way = math.copysign(1.0, speed if speed != 0.0 else gap)
-        rest = op - way * law.sliding  # where spring and friction balance
+        direction = math.copysign(1.0, speed if speed != 0.0 else gap)
+        rest = op - direction * law.sliding  # where spring and friction balance
         x, a = at - rest, speed + (at - rest) / time_s
-        stops = speed * time_s / a if a * way > 0.0 else math.inf
-        t = min(stops, left)
+        stops = speed * time_s / a if a * direction > 0.0 else math.inf
+        t = min(stops, remaining_s)
         fade = math.exp(-t / time_s)
         moved = time_s * (x + a * time_s) - fade * time_s * (x + a * time_s + a * t)
         total += rest * t + moved
-        at, speed, left = rest + (x + a * t) * fade, (speed - a * t / time_s) * fade, left - t
+        at, speed, remaining_s = rest + (x + a * t) * fade, (speed - a * t / time_s) * fade, remaining_s - t
         if stops <= t or abs(speed) * time_s < STILL * law.breakaway:
             speed = 0.0
-        if left <= 0.0:
+        if remaining_s <= 0.0:
             break
-    return (total + at * left) / dt_s, (at, speed, op)
+    return (total + at * remaining_s) / dt_s, (at, speed, op)
 
 
 @njit(cache=True)
@@ -192,6 +192,6 @@ def stem_position(op: Floats, valve: Valve, start: float | None = None) -> Float
     return walk(np.ascontiguousarray(op, dtype=np.float64), law, first)  # type: ignore[no-any-return]
 
 
-def play(op: Floats, width: float, start: float | None = None) -> Floats:
+def backlash_stem(op: Floats, width: float, start: float | None = None) -> Floats:
     """Stem position [% OP], shape (n,), behind backlash of full width `width` [% OP]."""
     return stem_position(op, Backlash(width), start)

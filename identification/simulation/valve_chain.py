@@ -49,8 +49,8 @@ def slew_step(at: float, op: float, most: float) -> tuple[float, float]:
     gap = op - at
     if abs(gap) <= most:
         return op - 0.5 * gap * abs(gap) / most, op
-    way = math.copysign(most, gap)
-    return at + 0.5 * way, at + way
+    move = math.copysign(most, gap)
+    return at + 0.5 * move, at + move
 
 
 @njit(cache=True)
@@ -99,8 +99,8 @@ def flow_step(op: float, m: Floats, c: Floats, friction: StemLaw, dt_s: float, m
         extra = second_valve(x, c)
         if c[SPLIT_LAG] > 0.0:
             at = extra if math.isnan(m[SECOND]) else m[SECOND]
-            left, mean = held(c[SPLIT_LAG], dt_s)
-            extra, m[SECOND] = extra + (at - extra) * mean, extra + (at - extra) * left
+            remaining, mean = held(c[SPLIT_LAG], dt_s)
+            extra, m[SECOND] = extra + (at - extra) * mean, extra + (at - extra) * remaining
         x += extra
     return x if abs(c[BEND]) < STRAIGHT else curved(x, c[BEND], middle)
 

@@ -148,23 +148,23 @@ def risen(x: float, feed: float, o: Outflow, rises: Floats, half: int) -> float:
 @njit(cache=True, error_model="numpy")
 def kept(c: Floats, parts: tuple[float, float]) -> tuple[Floats, Floats]:
     """held() of second and third lag and second mode, by part of a sample, shape (2, 3) each."""
-    left, mean = np.empty((2, 3)), np.empty((2, 3))
+    remaining, mean = np.empty((2, 3)), np.empty((2, 3))
     for half in range(2):
         for i, lag_s in enumerate((c[T2], c[T3], c[MODE_T])):
-            left[half, i], mean[half, i] = held(lag_s, parts[half])
-    return left, mean
+            remaining[half, i], mean[half, i] = held(lag_s, parts[half])
+    return remaining, mean
 
 
 @njit(cache=True, error_model="numpy")
 def poured(
-    level: float, feed: float, left: float, mean: float, cap: tuple[float, float], held_over: float
+    level: float, feed: float, remaining: float, mean: float, cap: tuple[float, float], held_over: float
 ) -> tuple[float, float]:
     """Level of the vessel before the last one after a time of constant feed, and its mean outflow meanwhile.
 
-    All in % PV of feed at rest. left, mean : of `held`; cap : level above which it overflows, and the share [-] of
-    the overflow that enters the next vessel; held_over : its time constant divided by that time [-].
+    All in % PV of feed at rest. remaining, mean : of `held`; cap : level above which it overflows, and the share [-]
+    of the overflow that enters the next vessel; held_over : its time constant divided by that time [-].
     """
-    after = feed + (level - feed) * left
+    after = feed + (level - feed) * remaining
     out = feed + (level - feed) * mean
     if after > cap[0]:
         return cap[0], min(out, cap[0]) + cap[1] * (after - cap[0]) * held_over
@@ -200,7 +200,7 @@ def vessel_span(
     linear = c[SLOPE] == 0.0 and c[ROOT] == 0.0 and c[GAIN_SLOPE] == 0.0
     times, o = (parts[0] / c[T], parts[1] / c[T]), outflow_of(c, head)
     rises = shares_filled(o, times)
-    left, mean = kept(c, parts)
+    remaining, mean = kept(c, parts)
     k_gain, bias, share, second, third = c[K], c[BIAS], c[SHARE], c[T2] > 0.0, c[T3] > 0.0
     upper = (c[UPPER_CAP], c[PASSED])
     pours = math.isfinite(upper[0])
@@ -215,14 +215,14 @@ def vessel_span(
                 feed *= scheduled(x, o.gain_slope)
             feed += added
             if second and pours:
-                z2, feed = poured(z2, feed, left[half, 0], mean[half, 0], upper, c[T2] / parts[half])
+                z2, feed = poured(z2, feed, remaining[half, 0], mean[half, 0], upper, c[T2] / parts[half])
             elif second:
-                z2, feed = feed + (z2 - feed) * left[half, 0], feed + (z2 - feed) * mean[half, 0]
+                z2, feed = feed + (z2 - feed) * remaining[half, 0], feed + (z2 - feed) * mean[half, 0]
             if third:
-                z3, feed = feed + (z3 - feed) * left[half, 1], feed + (z3 - feed) * mean[half, 1]
+                z3, feed = feed + (z3 - feed) * remaining[half, 1], feed + (z3 - feed) * mean[half, 1]
             x = risen(x, feed, o, rises, half) if linear else filled(x, feed, times[half], o)
             if share != 0.0:
-                mode += (feed - mode) * (1.0 - left[half, 2])
+                mode += (feed - mode) * (1.0 - remaining[half, 2])
     return x, mode, z2, z3
 
 

@@ -30,7 +30,7 @@ from identification.controller.pi_regression import Trends, recovered_law
 from identification.mismatch.baseline import inputs_of, prepared, without_spikes
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.model_file import carried, to_data
-from identification.mismatch.selection import Candidate, compete, integrating_or_first_order
+from identification.mismatch.selection import Candidate, integrating_or_first_order, ranked_candidates
 from identification.mismatch.starts import round_of
 from proofs.concealed.proof import interval, place_section, table
 from proofs.concealed.score import INDISTINGUISHABLE, indistinguishable
@@ -79,7 +79,7 @@ def compared(cases: pathlib.Path, truths: dict, tag: str) -> dict:
     p, plain = integrating_or_first_order(
         *prepared(inputs, s.pv - inputs.level, without_spikes(s.pv, s.usable)), s
     )
-    candidates = compete(round_of(p, plain, s))
+    candidates = ranked_candidates(round_of(p, plain, s))
     mine = [r for r in candidates if indistinguishable(r.name, truth["effect"], INDISTINGUISHABLE)]
     wrong = [
         r

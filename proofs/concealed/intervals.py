@@ -26,7 +26,7 @@ from identification.estimation.prediction_error import FULL_STEPS, descended
 from identification.mismatch.answer import parameters_of
 from identification.mismatch.baseline import inputs_of, prepared, without_spikes
 from identification.mismatch.catalogue import CANDIDATES
-from identification.mismatch.selection import compete, integrating_or_first_order
+from identification.mismatch.selection import integrating_or_first_order, ranked_candidates
 from identification.mismatch.starts import round_of
 from proofs.concealed.effects import NAMES
 from proofs.concealed.make import read_residuals, seal
@@ -56,7 +56,7 @@ def fitted(cases: pathlib.Path, tag: str, effect: str):
     p, plain = integrating_or_first_order(*begun, s)
     x = round_of(p, plain, s)
     rows = tuple(v for v in CANDIDATES if indistinguishable(v.name, effect, INDISTINGUISHABLE))
-    best = compete(x, rows)[0]
+    best = ranked_candidates(x, rows)[0]
     return x.p, descended(x.p, best.fit.model, FULL_STEPS)
 
 

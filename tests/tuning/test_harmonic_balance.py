@@ -89,15 +89,15 @@ def test_map_of_the_level_loop_agrees_with_the_study():
     (Figure 5)."""
     m = travel_map(LEVEL, np.array([0.5, 1.0]), np.array([5.0, 10.0, 50.0, 100.0, 190.0]))
     assert np.all(np.diff(m.travel, axis=0) <= 0)
-    assert m.rests[-1].all()
-    assert not m.rests[:4].any()
+    assert m.at_rest[-1].all()
+    assert not m.at_rest[:4].any()
 
 
 def test_map_of_the_flow_loop_with_stick_slip_agrees_with_the_study():
     """A smaller gain and a longer Ti reduce the travel, and no cell is at rest (Figure 7)."""
     loop = Loop(Fopdt(1, 2, 1), Pid(0.8, 2, scan_s=0), Stiction(1, 1))
     m = travel_map(loop, np.array([0.2, 0.4, 0.8]), np.array([0.8, 1.2, 2.0]))
-    assert not travel_map(loop, np.array([0.2, 0.8]), np.array([2.0, 8.0])).rests.any()
+    assert not travel_map(loop, np.array([0.2, 0.8]), np.array([2.0, 8.0])).at_rest.any()
     assert np.all(np.diff(m.travel, axis=1) > 0)
     assert np.all(np.diff(m.travel, axis=0) < 0)
 

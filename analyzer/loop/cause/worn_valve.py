@@ -16,7 +16,11 @@ from analyzer.loop.decisions import Fault
 from analyzer.loop.identification.candidates import SEARCHED, judged_count
 from analyzer.loop.identification.fit_data import scans_of, whole_problem
 from analyzer.loop.identification.measure import Measured
-from identification.estimation.backlash_under_line import BacklashUnderLine, beside_line, in_window
+from identification.estimation.backlash_under_line import (
+    BacklashUnderLine,
+    fit_backlash_under_line,
+    in_window,
+)
 from identification.estimation.between_samples import with_scans
 from identification.estimation.model import Fitted
 from identification.estimation.problem import Problem
@@ -49,7 +53,7 @@ class WornValve:
         """The joint model of process, backlash, load and line."""
         m = self.measured
         valves = [fit.valve for fit in (m.play, m.stick_slip) if fit is not None]
-        return beside_line(self._problem, self._starts(), valves, self.period_s)
+        return fit_backlash_under_line(self._problem, self._starts(), valves, self.period_s)
 
     @property
     def is_seen(self) -> bool:
@@ -87,8 +91,8 @@ class WornValve:
         """Process alone and behind the faulty valve. If the cycle of OP crosses the backlash it is fitted in the
         stretch of the measures, whose blocks are shorter: longer ones give a width that is too small."""
         m, found = self.measured, self.found
-        if found.play.valve.stickband > self.limits.widest * m.problem.reach:
-            return as_fit(found.ideal, found.play.p), found.play
+        if found.backlash.valve.stickband > self.limits.widest * m.problem.reach:
+            return as_fit(found.ideal, found.backlash.p), found.backlash
         return m.linear, as_fit(in_window(found, m.problem, self.period_s), m.problem)
 
     @property
@@ -117,7 +121,7 @@ class WornValve:
     def _is_crossed(self) -> bool:
         """Whether OP crosses the backlash at least once in the record, the backlash is no small share of its range in
         a cycle, and the process gain has the controller's sign."""
-        m, backlash = self.measured, self.found.play
+        m, backlash = self.measured, self.found.backlash
         right_way = m.controller is None or m.controller.sign * backlash.gain > 0.0
         width = backlash.valve.stickband
         crossed = width <= self.limits.widest * backlash.p.op_range

@@ -18,7 +18,7 @@ from analyzer.loop.record.sample_clock import constant_stretches, snapped
 from analyzer.loops.spec import LoopSpec
 from identification.controller.pi_regression import ControlLaw, Trends, unstated_law
 from identification.errors import NotAssessedError, TriageError
-from identification.experiments.find import Experiment, by_hand, in_automatic
+from identification.experiments.find import Experiment, in_automatic, in_manual
 from identification.experiments.model import Modelled, Pooled, modelled, pooled
 from identification.limits import LIMITS
 from identification.models import Pid
@@ -99,7 +99,7 @@ def found_in(
     if not prepared.op_known or not prepared.op_scaled or prepared.shared is not None:
         return ()
     manual = manual_of(spec, prepared, series, config)
-    return (*by_hand(prepared.record, manual), *(() if manual.all() else in_automatic(prepared.record)))
+    return (*in_manual(prepared.record, manual), *(() if manual.all() else in_automatic(prepared.record)))
 
 
 def experiment_results(

@@ -150,7 +150,7 @@ def _size_lines(plan: Plan, known: Known) -> Iterator[str]:
 def _precision_lines(plan: Plan, known: Known) -> Iterator[str]:
     if plan.gain_within is not None:
         yield TEXTS["gain_within"].format(number(100.0 * plan.gain_within))
-    if plan.play_within is not None:
-        yield TEXTS["play_within"].format(number(known.width_pct), number(100.0 * plan.play_within))
+    if plan.backlash_within is not None:
+        yield TEXTS["play_within"].format(number(known.width_pct), number(100.0 * plan.backlash_within))
     yield TEXTS["why"]
     yield TEXTS["conditions"]

@@ -20,7 +20,7 @@ from identification.estimation.problem import Stems, stem_of
 from identification.models import Loop, Pid
 from identification.record import Floats
 from identification.simulation.closed_loop import scan_step
-from identification.simulation.valve import play
+from identification.simulation.valve import backlash_stem
 from tuning.forecast import in_digits, loop_in_digits, run, settled
 
 LEAST = 0.5
@@ -82,9 +82,9 @@ def agreement(loop: Loop, fit: Fitted, load: Floats) -> Agreement:
     stem = modelled if problem.blocks.position is None else problem.blocks.position
     every = max(round(dt_s / scan_s), 1)
     digit = op_step(problem.blocks.op)
-    recorded = [_travel(x[-last:], dt_s) for x in (play(problem.blocks.op, digit), stem)]
+    recorded = [_travel(x[-last:], dt_s) for x in (backlash_stem(problem.blocks.op, digit), stem)]
     rounded = digit * np.round(sim.op[::every] / digit) if digit > 0.0 else sim.op[::every]
-    simulated = [_travel(x, every * scan_s) for x in (play(rounded, digit), sim.stem[::every])]
+    simulated = [_travel(x, every * scan_s) for x in (backlash_stem(rounded, digit), sim.stem[::every])]
     op, moved = (s / max(r, 1e-9) for s, r in zip(simulated, recorded, strict=True))
     error = recorded_error(fit, loop.controller, math.ceil(len(sim) * scan_s / problem.dt_s))
     moved_on = (

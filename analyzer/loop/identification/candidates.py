@@ -21,7 +21,7 @@ from identification.estimation.gauss_newton import descend
 from identification.estimation.model import Fitted
 from identification.estimation.noise import AR_ORDER, judged
 from identification.estimation.problem import Problem
-from identification.estimation.stem_position import Seen, seen
+from identification.estimation.stem_position import ValveFromPosition, valve_from_position
 from identification.record import Mask
 
 Candidates = tuple[Fitted, Fitted, Fitted | None]
@@ -49,7 +49,11 @@ class FitInputs(NamedTuple):
 def fits_of(problem: Problem, q: FitInputs) -> Fits:
     """The candidates' fits, by a recorded stem if it shows a fault; with OP at the controller's scan if its scans
     within a row are known."""
-    shown = None if problem.blocks.position is None else seen(problem.blocks.op, problem.blocks.position)
+    shown = (
+        None
+        if problem.blocks.position is None
+        else valve_from_position(problem.blocks.op, problem.blocks.position)
+    )
     if shown is not None:
         return _stem_shown(problem, shown, q)
     problem = problem.with_blocks(position=None)
@@ -143,12 +147,12 @@ def _compared(found: Candidates, q: FitInputs) -> tuple[Fitted, float, float]:
     return best, gained - (q.limits.evidence_jump if best is stick else 0.0), jump
 
 
-def _stem_shown(problem: Problem, shown: Seen, q: FitInputs) -> Fits:
+def _stem_shown(problem: Problem, shown: ValveFromPosition, q: FitInputs) -> Fits:
     """The same with a recorded stem: its fault is visible, and PV responds to the stem itself."""
     linear = fit_linear(problem, q.scale_s)
     behind = problem if problem.blocks.position is None else problem.with_blocks(op=problem.blocks.position)
-    backlash = descend(replace(fit_linear(behind, q.scale_s), p=problem).moved(valve=shown.play))
-    stick = None if shown.jumping is None else backlash.moved(valve=shown.jumping)
+    backlash = descend(replace(fit_linear(behind, q.scale_s), p=problem).moved(valve=shown.backlash))
+    stick = None if shown.stick_slip is None else backlash.moved(valve=shown.stick_slip)
     best = backlash if stick is None else stick
     gained = evidence(best, with_load_step(linear, q.due, best.ar))
     return linear, backlash, stick, best, gained, 0.0 if stick is None else math.inf

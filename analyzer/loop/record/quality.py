@@ -30,7 +30,7 @@ from analyzer.loops.gain_schedule import in_force
 from analyzer.loops.spec import STATED, LoopSpec
 from identification.controller.check import runs
 from identification.controller.pi_regression import feedback_share
-from identification.experiments.find import by_hand
+from identification.experiments.find import in_manual
 from identification.limits import LIMITS
 from identification.record import Floats, LoopRecord, Mask
 
@@ -277,7 +277,7 @@ def moved_by_script(record: LoopRecord) -> bool:
     does not respond to PV."""
     op = record.op
     constant = record.sp_estimated and float(np.mean(np.diff(op) != 0.0)) < MOVING
-    if not constant or not by_hand(record, np.ones(op.size, dtype=bool)):
+    if not constant or not in_manual(record, np.ones(op.size, dtype=bool)):
         return False
     return feedback_share(op, record.pv) < LIMITS.controller.feedback
 

@@ -3,7 +3,7 @@
 from identification.mismatch.effect import Block, Effect, Friction, Param, Slot, Variant, each
 from identification.mismatch.pictures import stem_over_op
 
-PLAY = Param(Slot.STICKBAND, "backlash_pct", "% OP", 1e-4, 2.0, "op", True, title="Backlash, full width")
+WIDTH = Param(Slot.STICKBAND, "backlash_pct", "% OP", 1e-4, 2.0, "op", True, title="Backlash, full width")
 
 EFFECT = Effect(
     name="backlash",
@@ -26,7 +26,7 @@ EFFECT = Effect(
         "direction-asymmetry": "Two more moves in one direction: the first takes up the backlash.",
         "controller-gap": "Check whether OP itself is constant: then the controller is the cause.",
     },
-    friction=Friction.PLAY,
+    friction=Friction.BACKLASH,
     curve=stem_over_op,
-    variants=(Variant((PLAY,), each(Slot.STICKBAND, 0.01, 0.03, 0.08, 0.2, 0.5), {Slot.JUMP: 0.0}),),
+    variants=(Variant((WIDTH,), each(Slot.STICKBAND, 0.01, 0.03, 0.08, 0.2, 0.5), {Slot.JUMP: 0.0}),),
 )

@@ -3,7 +3,7 @@
 import numpy as np
 
 from identification.mismatch.effect import Block, Ends, Fault, Finding, Floats, Recording, exact
-from identification.mismatch.pictures import PV, TIME, WINDOW, Drawn, Picture, busiest
+from identification.mismatch.pictures import PV, TIME, WINDOW, Drawn, Picture, most_active
 from identification.mismatch.recording import straight, straightened
 
 
@@ -17,8 +17,8 @@ def straight_segments(s: Recording) -> Finding | None:
 
 
 def straight_lines(found: Finding, s: Recording, _: Floats) -> Picture:
-    """The busiest stretch of a compressed trend, with the samples on straight lines."""
-    part = busiest(s.pv, WINDOW)
+    """The most active stretch of a compressed trend, with the samples on straight lines."""
+    part = most_active(s.pv, WINDOW)
     time, x, marked = np.arange(part.start, part.stop) * s.dt_s, s.pv[part], found.where[part]
     curves = (Drawn("points", time[marked], x[marked]), Drawn("recorded", time, x))
     return Picture("course", TIME, PV, curves)

@@ -18,10 +18,10 @@ def gap_profile(found: Finding, s: Recording, _: Floats) -> Picture | None:
     edges = np.linspace(0.0, GAPS_SHOWN * width, GAP_CLASSES + 1)
     at = np.digitize(np.abs(s.sp - s.pv)[s.usable], edges) - 1
     count = np.bincount(at, minlength=GAP_CLASSES + 1)[:GAP_CLASSES]
-    stood = np.bincount(at, still[s.usable], minlength=GAP_CLASSES + 1)[:GAP_CLASSES]
+    constant = np.bincount(at, still[s.usable], minlength=GAP_CLASSES + 1)[:GAP_CLASSES]
     held = count >= FEWEST_IN_CLASS
     middle = 0.5 * (edges[1:] + edges[:-1])
-    curve = Drawn("recorded", middle[held], 100.0 * stood[held] / count[held])
+    curve = Drawn("recorded", middle[held], 100.0 * constant[held] / count[held])
     x, y = Axis("size of SP − PV", "%"), Axis("OP constant", "% of samples")
     return Picture("curve", x, y, (curve,), (width,))
 

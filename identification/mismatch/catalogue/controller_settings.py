@@ -2,14 +2,14 @@
 
 from identification.controller.check import StatedSettings
 from identification.mismatch.effect import Block, Fault, Finding, Floats, Recording, within
-from identification.mismatch.pictures import Picture, busiest, law_window, rebuilt_course
+from identification.mismatch.pictures import Picture, law_window, most_active, rebuilt_course
 
 
 def other_settings(found: Finding, s: Recording, _: Floats) -> Picture | None:
-    """OP over its busiest stretch, recomputed by identified and stated settings; None without SP or settings."""
+    """OP over its most active stretch, recomputed by identified and stated settings; None without SP or settings."""
     if s.sp is None or s.stated is None:
         return None
-    part, e = busiest(s.op, law_window(s, s.stated.ti), s.usable), s.sp - s.pv
+    part, e = most_active(s.op, law_window(s, s.stated.ti), s.usable), s.sp - s.pv
     own = StatedSettings(found.values["kp"], found.values["ti_samples"])
     return rebuilt_course(s, part, {"found": (e, own), "stated": (e, s.stated)})
 

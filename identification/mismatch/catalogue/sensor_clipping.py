@@ -3,7 +3,7 @@
 import numpy as np
 
 from identification.mismatch.effect import Block, Estimate, Fault, Finding, Floats, Recording, exact
-from identification.mismatch.pictures import PV, TIME, WINDOW, Drawn, Picture, around
+from identification.mismatch.pictures import PV, TIME, WINDOW, Drawn, Picture, around_run
 
 
 def clipped(s: Recording) -> Finding | None:
@@ -28,7 +28,7 @@ def end_of_range(found: Finding, s: Recording) -> dict[str, Estimate]:
 
 def range_end(found: Finding, s: Recording, free: Floats) -> Picture:
     """The longest stretch of PV at its range end, with the unclipped model."""
-    part = around(found.where, WINDOW)
+    part = around_run(found.where, WINDOW)
     time = np.arange(part.start, part.stop) * s.dt_s
     end = np.full(time.size, found.values["clip_pct"])
     curves = (

@@ -13,18 +13,18 @@ BANDS = (0.01, 0.03, 0.08, 0.2, 0.5)
 """Stickbands at which the search begins, relative to OP's range."""
 
 
-def as_friction_leaves_it(own: Parameters) -> dict[str, Estimate]:
+def widened_by_scatter(own: Parameters) -> dict[str, Estimate]:
     """Widen all intervals by the scatter of real friction. It differs from slip to slip, and one slip more or less
     changes all later ones, so the likelihood's optimum is much narrower than the true uncertainty."""
     band, jump, time = own[BAND.name], own[JUMP.name], own.get(TIME.name)
     most = band.value * LEAST_BAND
-    told = {
+    widened = {
         BAND.name: reaching(band, band.value / LEAST_BAND, most),
         JUMP.name: reaching(jump, jump.value / LEAST_JUMP, most),
     }
     if time is not None:
-        told[TIME.name] = reaching(time, time.value / LEAST_JUMP, time.value * LEAST_JUMP)
-    return told
+        widened[TIME.name] = reaching(time, time.value / LEAST_JUMP, time.value * LEAST_JUMP)
+    return widened
 
 
 EFFECT = Effect(
@@ -34,7 +34,7 @@ EFFECT = Effect(
     check="Look at packing and actuator; stroke the valve in steps under the stickband and watch the stem.",
     tests={"positioner": "A recorded stem position, or a stem watched by eye while OP ramps slowly."},
     indistinguishable=("positioner",),
-    derived=as_friction_leaves_it,
+    derived=widened_by_scatter,
     friction=Friction.STICKS,
     curve=stem_over_op,
     variants=(

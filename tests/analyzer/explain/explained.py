@@ -91,7 +91,7 @@ def explanation(kind: str) -> Explained:
     if kind == "backlash":
         found = with_backlash(found, 1.5)
     if kind == "unexplained":
-        found = Explanation(p, plain, plain, left=99.0)
+        found = Explanation(p, plain, plain, residual_nat=99.0)
     found = replace(found, proof=held_out(found.p, found.plain, found.best))
     answered = answer(found, s)
     model = {

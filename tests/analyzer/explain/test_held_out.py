@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identification.mismatch.explanation import together
+from identification.mismatch.explanation import pooled_misfit
 from identification.mismatch.proof import Misfit
 from tests.analyzer.explain.test_explain import export, run_command
 
@@ -87,7 +87,7 @@ def test_misfits_add_up_by_their_squares() -> None:
     parts = [
         Misfit(float(e.std()), 100 * (1 - float(e.std() / m.std()))) for e, m in zip(left, moves, strict=True)
     ]
-    all_of = together(parts, [500, 1500])
+    all_of = pooled_misfit(parts, [500, 1500])
     assert all_of.rmse == pytest.approx(float(np.concatenate(left).std()))
     assert all_of.fit_pct == pytest.approx(
         100 * (1 - np.concatenate(left).std() / np.concatenate(moves).std())

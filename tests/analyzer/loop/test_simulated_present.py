@@ -11,7 +11,7 @@ import pytest
 
 from analyzer.config import Config
 from analyzer.loop.identification.agreement import Agreement, reversals
-from identification.simulation.valve import play
+from identification.simulation.valve import backlash_stem
 
 SAME = Agreement(1.0, 1.0, 1.0, 1.0, (60, 60))
 
@@ -22,13 +22,13 @@ def test_a_stem_behind_backlash_reverses_twice_a_cycle_that_crosses_it(width, ex
     one.
     """
     op = np.sin(2 * np.pi * np.arange(20 * 200) / 200)
-    assert reversals(play(op, width)) == pytest.approx(expected, abs=1)
+    assert reversals(backlash_stem(op, width)) == pytest.approx(expected, abs=1)
 
 
 def test_noise_within_the_backlash_causes_no_reversal():
     """Noise of OP that stays within the backlash does not move the stem."""
     op = np.sin(2 * np.pi * np.arange(4000) / 200) + 0.05 * np.random.default_rng(1).standard_normal(4000)
-    assert reversals(play(op, 1.0)) == pytest.approx(39, abs=1)
+    assert reversals(backlash_stem(op, 1.0)) == pytest.approx(39, abs=1)
     assert reversals(op) > 400
 
 

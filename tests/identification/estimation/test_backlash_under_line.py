@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 from benchmarks.world.draw import wander
 from benchmarks.world.simulate import BACKLASH, Controller, Process, Valve, simulate
-from identification.estimation.backlash_under_line import BacklashUnderLine, beside_line
+from identification.estimation.backlash_under_line import BacklashUnderLine, fit_backlash_under_line
 from identification.estimation.problem import block_means, in_blocks
 from identification.estimation.smooth_load import _line, _whitened
 from identification.record import Floats
@@ -39,15 +39,15 @@ def _found(trends: tuple[Floats, Floats]) -> BacklashUnderLine:
     pv, op = trends
     y = block_means(pv, BLOCK)
     problem = in_blocks(y, np.ascontiguousarray(op), np.ones(y.size, dtype=bool), 1.0 * BLOCK, BLOCK)
-    return beside_line(problem, STARTS, (), PERIOD_S)
+    return fit_backlash_under_line(problem, STARTS, (), PERIOD_S)
 
 
 def test_backlash_under_a_sine_is_found_with_its_width():
     """Backlash under a sine is recovered by the joint model with width and process gain within 10 %."""
     found = _found(_trends(Valve(BACKLASH, WIDTH), 3))
     assert found.evidence > 75.0
-    assert found.play.valve.stickband == pytest.approx(WIDTH, rel=0.1)
-    assert found.play.gain / found.play.time_constant_s == pytest.approx(0.01, rel=0.1)
+    assert found.backlash.valve.stickband == pytest.approx(WIDTH, rel=0.1)
+    assert found.backlash.gain / found.backlash.time_constant_s == pytest.approx(0.01, rel=0.1)
 
 
 @pytest.mark.parametrize("seed", [3, 4])
@@ -60,8 +60,8 @@ def test_backlash_that_the_cycle_does_not_cross_is_found_by_slower_moves(seed):
     assert np.median(swings) < 1.1 * WIDTH
     found = _found((pv, op))
     assert found.evidence > 75.0
-    assert found.play.valve.stickband == pytest.approx(2 * WIDTH, rel=0.1)
-    assert found.play.gain / found.play.time_constant_s == pytest.approx(0.01, rel=0.25)
+    assert found.backlash.valve.stickband == pytest.approx(2 * WIDTH, rel=0.1)
+    assert found.backlash.gain / found.backlash.time_constant_s == pytest.approx(0.01, rel=0.25)
 
 
 @pytest.mark.parametrize("top", [1.0, 0.5])

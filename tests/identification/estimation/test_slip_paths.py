@@ -159,7 +159,7 @@ def test_friction_that_scatters_is_recovered(seed):
     """Slips that scatter by 5 % give the stickband within 10 % and the jump within 35 %, and also the process."""
     backlash, path = fitted(0.05, seed)
     assert path is not None
-    assert path.worth > backlash.log_likelihood + 20.0
+    assert path.log_likelihood > backlash.log_likelihood + 20.0
     assert path.fit.valve.stickband == pytest.approx(2.2, rel=0.1)
     assert path.fit.valve.slip_jump == pytest.approx(0.8, rel=0.35)
     assert path.fit.dead_time_s == pytest.approx(3.0, abs=1.0)
@@ -198,7 +198,7 @@ def test_a_square_pv_of_a_fast_flow_is_not_backlash(seed):
     assert backlash.gain > 3.0 * 1.1
     path = fit_irregular(backlash, generic_noise(), 300.0)
     assert path is not None
-    assert path.worth > backlash.log_likelihood + 1000.0
+    assert path.log_likelihood > backlash.log_likelihood + 1000.0
     assert path.fit.gain == pytest.approx(1.1, rel=0.25)
     assert path.fit.valve.stickband == pytest.approx(6.0, rel=0.15)
 

@@ -7,7 +7,7 @@ import pytest
 
 from analyzer.loop.assess import assess
 from analyzer.loop.record.quality import prepare
-from identification.estimation.stem_position import seen
+from identification.estimation.stem_position import valve_from_position
 from proofs.plant import CONFIG, START_S, Sketch, Trends, series, simulate, spec
 
 BACKLASH = Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5)
@@ -23,26 +23,26 @@ def recorded(t: Trends, seed: int = 0) -> np.ndarray:
 def test_backlash_is_found_with_its_width() -> None:
     """From OP and a noisy stem, the backlash is recovered within 2 %, and no jump is reported."""
     t = simulate(BACKLASH)
-    found = seen(t.op, recorded(t))
+    found = valve_from_position(t.op, recorded(t))
     assert found is not None
-    assert found.play.stickband == pytest.approx(2.5, rel=0.02)
-    assert found.jumping is None
+    assert found.backlash.stickband == pytest.approx(2.5, rel=0.02)
+    assert found.stick_slip is None
 
 
 def test_stickband_and_jump_are_found() -> None:
     """Stickband and slip jump of dry friction are recovered within 5 %."""
     t = simulate(STICKING)
-    found = seen(t.op, recorded(t))
+    found = valve_from_position(t.op, recorded(t))
     assert found is not None
-    assert found.jumping is not None
-    assert found.jumping.stickband == pytest.approx(3.0, rel=0.05)
-    assert found.jumping.slip_jump == pytest.approx(1.5, rel=0.05)
+    assert found.stick_slip is not None
+    assert found.stick_slip.stickband == pytest.approx(3.0, rel=0.05)
+    assert found.stick_slip.slip_jump == pytest.approx(1.5, rel=0.05)
 
 
 def test_a_stem_that_follows_is_no_fault() -> None:
     """A stem that follows OP with the transmitter's noise has no fault."""
     t = simulate(FAULT_FREE)
-    assert seen(t.op, recorded(t)) is None
+    assert valve_from_position(t.op, recorded(t)) is None
 
 
 def test_a_stem_that_lags_has_no_backlash() -> None:
@@ -53,7 +53,7 @@ def test_a_stem_that_lags_has_no_backlash() -> None:
     for k, u in enumerate(op):
         at += (u - at) / 20.0
         stem[k] = at
-    assert seen(op, stem) is None
+    assert valve_from_position(op, stem) is None
 
 
 @pytest.mark.parametrize(("sketch", "fault"), [(BACKLASH, "backlash"), (STICKING, "stiction")])

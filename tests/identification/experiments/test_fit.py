@@ -7,9 +7,9 @@ import pytest
 
 from identification.errors import NotAssessedError
 from identification.experiments.columns import Kind
-from identification.experiments.find import Course, Experiment, by_hand, in_automatic
+from identification.experiments.find import Course, Experiment, in_automatic, in_manual
 from identification.experiments.intervals import ninety
-from identification.experiments.model import modelled, pooled, together
+from identification.experiments.model import modelled, pooled, weighted_mean
 from identification.record import LoopRecord
 from proofs.step_test_plant import behind_backlash
 
@@ -91,7 +91,7 @@ def test_an_on_off_controller_makes_no_experiment():
         pv.append(y + 0.01 * NOISE[k])
         op.append(100 * on)
     r = record(np.array(pv), np.array(op))
-    assert by_hand(r, np.ones(len(r), bool)) == ()
+    assert in_manual(r, np.ones(len(r), bool)) == ()
 
 
 def test_a_set_point_that_always_moves_is_no_experiment():
@@ -207,11 +207,11 @@ def test_a_heater_that_warms_up_under_control_has_a_positive_gain():
 def test_experiments_are_weighted_by_their_deviations():
     """Two numbers with deviations 1 and 3 are pooled with weights 9 to 1 if they agree. If they differ by more
     than that, the weights are nearly equal (DerSimonian, Laird 1986)."""
-    mean, deviation, weights = together([(10.0, 1.0), (10.5, 3.0)])
+    mean, deviation, weights = weighted_mean([(10.0, 1.0), (10.5, 3.0)])
     assert weights == pytest.approx([0.9, 0.1])
     assert mean == pytest.approx(10.05)
     assert deviation == pytest.approx(np.sqrt(0.9))
-    assert together([(10.0, 1.0), (30.0, 1.2)])[2] == pytest.approx([0.5, 0.5], abs=0.01)
+    assert weighted_mean([(10.0, 1.0), (30.0, 1.2)])[2] == pytest.approx([0.5, 0.5], abs=0.01)
 
 
 def test_several_experiments_make_one_model():

@@ -12,7 +12,7 @@ from identification.mismatch.answer import answer, open_gain_note
 from identification.mismatch.catalogue.supply_variation import AT_REST
 from identification.mismatch.diagnosis import explain
 from identification.mismatch.recording import Recording, coarser_by, is_experiment
-from identification.mismatch.words import TOLD
+from identification.mismatch.words import TEXTS
 from identification.models import Estimate
 from proofs.experiments import Plant, answered, carried_misfit, drawn, slow_mode
 
@@ -92,7 +92,7 @@ def test_a_supply_with_an_uncertain_flow_at_rest_is_reported_with_a_caution() ->
     any_sign = replace(
         found_answer.effects[0], parameters={AT_REST.name: Estimate(10.0, -35.0, 55.0, "% OP")}
     )
-    assert open_gain_note(found, (any_sign,)) == TOLD["wanders"]
+    assert open_gain_note(found, (any_sign,)) == TEXTS["wanders"]
 
 
 @pytest.mark.parametrize("seed", [1, 3, 16])

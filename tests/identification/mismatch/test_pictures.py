@@ -11,12 +11,20 @@ from identification.controller.check import Finding
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.catalogue.controller_gap import gap_profile
 from identification.mismatch.catalogue.quantization import grid
-from identification.mismatch.pictures import Drawing, Picture, around, banded, biggest_move, busiest, rebuilt
+from identification.mismatch.pictures import (
+    Drawing,
+    Picture,
+    around_run,
+    banded,
+    biggest_move,
+    most_active,
+    rebuilt,
+)
 from identification.mismatch.recording import Recording
 from identification.models import Estimate
 from identification.simulation.open_loop import ModelInputs
 from identification.simulation.parameters import Param, Slot, Variant, neutral
-from identification.simulation.valve import play
+from identification.simulation.valve import backlash_stem
 
 N = 2000
 
@@ -54,7 +62,7 @@ def test_backlash_is_drawn_as_a_loop_of_its_width() -> None:
     found = shape("backlash", STICKBAND=4.0)
     loop = found.curves[0]
     assert np.abs(loop.y - loop.x).max() == pytest.approx(2.0, abs=1e-9)
-    twice = play(np.concatenate((loop.x, loop.x)), 4.0)[loop.x.size :]
+    twice = backlash_stem(np.concatenate((loop.x, loop.x)), 4.0)[loop.x.size :]
     np.testing.assert_allclose(loop.y, twice, atol=1e-9)
 
 
@@ -158,12 +166,12 @@ def test_stretches_contain_their_events() -> None:
     inside the record."""
     x = np.zeros(1000)
     x[700:740] = np.random.default_rng(0).normal(0, 1, 40)
-    part = busiest(x, 100)
+    part = most_active(x, 100)
     assert part.start <= 700
     assert part.stop >= 740
     where = np.zeros(1000, dtype=bool)
     where[10:30] = True
-    part = around(where, 100)
+    part = around_run(where, 100)
     assert part.start == 0
     assert part.stop >= 30
     step = np.where(np.arange(1000) >= 990, 5.0, 0.0)

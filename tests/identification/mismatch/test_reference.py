@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.mismatch.baseline import inputs_of, prepared
-from identification.mismatch.diagnosis import LEFT_OVER
+from identification.mismatch.diagnosis import LEAST_RESIDUAL
 from identification.mismatch.reference import Prediction, best_prediction, on_above
 from proofs.concealed.plant import Plant
 from proofs.experiments import drawn
@@ -25,7 +25,7 @@ def residual_prediction(plant: Plant, seed: int, **acting: np.ndarray) -> Predic
 def test_load_and_noise_are_not_predicted() -> None:
     """For twelve loops under load and noise without an effect, the prediction gain is below half of the
     reporting limit."""
-    assert max(residual_prediction(PLANT, seed).gain for seed in range(12)) < 0.5 * LEFT_OVER
+    assert max(residual_prediction(PLANT, seed).gain for seed in range(12)) < 0.5 * LEAST_RESIDUAL
 
 
 @pytest.mark.parametrize(
@@ -39,7 +39,7 @@ def test_load_and_noise_are_not_predicted() -> None:
 )
 def test_physics_without_a_name_is_predicted(changes: dict[str, float]) -> None:
     """Four kinds of physics outside the catalogue have a prediction gain above the reporting limit."""
-    assert residual_prediction(PLANT._replace(**changes), 21).gain > LEFT_OVER
+    assert residual_prediction(PLANT._replace(**changes), 21).gain > LEAST_RESIDUAL
 
 
 @pytest.mark.parametrize(
@@ -52,7 +52,7 @@ def test_physics_without_a_name_is_predicted(changes: dict[str, float]) -> None:
 )
 def test_each_kind_of_physics_is_predicted_best_by_its_cause(changes: dict[str, float], way: str) -> None:
     """A gain with history, a recycle and a gain with rate are each predicted best by their own cause."""
-    assert residual_prediction(PLANT._replace(**changes), 21).way == way
+    assert residual_prediction(PLANT._replace(**changes), 21).influence == way
 
 
 @pytest.mark.parametrize("seed", [22, 23, 24])
@@ -61,9 +61,9 @@ def test_a_periodic_pump_is_predicted_by_the_clock(seed: int) -> None:
     smaller one, which noise hides, is below the limit."""
     for size in (0.7, 1.5):
         prediction = residual_prediction(PLANT, seed, act=size * (CLOCK % 600 < 200))
-        assert prediction.way == "clock"
-        assert prediction.gain > LEFT_OVER
-    assert residual_prediction(PLANT, seed, act=0.4 * (CLOCK % 600 < 200)).gain < LEFT_OVER
+        assert prediction.influence == "clock"
+        assert prediction.gain > LEAST_RESIDUAL
+    assert residual_prediction(PLANT, seed, act=0.4 * (CLOCK % 600 < 200)).gain < LEAST_RESIDUAL
 
 
 def test_the_errors_of_an_experiments_simulation_are_not_predicted() -> None:
@@ -72,7 +72,7 @@ def test_the_errors_of_an_experiments_simulation_are_not_predicted() -> None:
     for seed in range(6):
         s, _ = drawn("plain", seed)
         p, fit = prepared(inputs_of(s), s.pv - s.pv.mean(), s.usable, experiment=True)
-        assert best_prediction(p, fit).gain < LEFT_OVER
+        assert best_prediction(p, fit).gain < LEAST_RESIDUAL
 
 
 def test_a_switch_keeps_its_last_state() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.location import groups
-from identification.mismatch.words import TOLD, check, discriminating_test, located_sentence
+from identification.mismatch.words import TEXTS, check, discriminating_test, located_sentence
 
 NAMED_ONLY = {"sensor-lag"}
 """Names that are reported only as alternatives: SP, PV and OP cannot show them."""
@@ -14,7 +14,7 @@ def test_indistinguishable_effects_have_a_test_of_their_own() -> None:
     """Effects that the catalogue lists as indistinguishable have their own discriminating test, in both orders."""
     for effect in EFFECTS.values():
         for other in effect.indistinguishable:
-            assert discriminating_test(effect.name, other) != TOLD["longer"]
+            assert discriminating_test(effect.name, other) != TEXTS["longer"]
             assert discriminating_test(other, effect.name) == discriminating_test(effect.name, other)
 
 
@@ -36,7 +36,7 @@ def test_every_feature_has_a_text() -> None:
 
     op = 50 + 60 * np.sin(np.arange(500) / 9.0)
     names = {g.name for g in groups(op, np.clip(op, 0, 100), 1.0, 0, 10)}
-    assert names == set(TOLD["features"])
+    assert names == set(TEXTS["features"])
 
 
 def test_location_is_reported_with_its_range() -> None:

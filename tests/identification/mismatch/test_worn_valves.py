@@ -17,7 +17,7 @@ from identification.mismatch.candidate_proof import runs_out
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.diagnosis import explain, without_redundant
 from identification.mismatch.explanation import Explanation
-from identification.mismatch.friction import simulated_anew
+from identification.mismatch.friction import simulated_reestimated
 from identification.mismatch.proof import HeldOut, Misfit
 from identification.mismatch.recording import Recording, SeenInCycles
 from identification.mismatch.selection import Candidate, applies
@@ -138,7 +138,7 @@ def test_stem_with_known_positions_follows_a_sticking_valve(seed: int) -> None:
     lose the oscillation over hours."""
     p, c = as_problem(seed, 0.3), as_parameters(Fopdt(GAIN, LAG, DEAD), Stiction(STICKBAND, JUMP))
     window = 80
-    open_run, placed = simulate(p.inputs, c), simulated_anew(p, c, window)
+    open_run, placed = simulate(p.inputs, c), simulated_reestimated(p, c, window)
     free = simulate(p.inputs, as_parameters(Fopdt(GAIN, LAG, DEAD)))
     assert residual_in_windows(p, placed, window) < 0.8 * residual_in_windows(p, open_run, window)
     assert residual_in_windows(p, placed, window) < 0.8 * residual_in_windows(p, free, window)
@@ -147,7 +147,7 @@ def test_stem_with_known_positions_follows_a_sticking_valve(seed: int) -> None:
 def test_simulation_without_friction_is_unchanged() -> None:
     """Without friction there is no stem position to set, and the simulation is identical to the usual one."""
     p, c = as_problem(7, 0.0), as_parameters(Fopdt(GAIN, LAG, DEAD))
-    np.testing.assert_array_equal(simulated_anew(p, c, 80), simulate(p.inputs, c))
+    np.testing.assert_array_equal(simulated_reestimated(p, c, 80), simulate(p.inputs, c))
 
 
 @pytest.mark.parametrize(

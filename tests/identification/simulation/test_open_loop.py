@@ -10,7 +10,7 @@ import pytest
 from identification.models import Backlash, Fopdt, Integrator, Motion, Process, Stiction, Valve
 from identification.simulation.open_loop import ModelInputs, as_parameters, begun_at_rest, simulate
 from identification.simulation.parameters import Slot, neutral
-from identification.simulation.valve import play
+from identification.simulation.valve import backlash_stem
 from tests.identification.slow_responses import pv_of
 
 
@@ -55,7 +55,7 @@ def test_backlash_equals_backlash_before_lag() -> None:
     got = simulate(s, constants(STICKBAND=3.0))
     expected = pv_of(Fopdt(1.5, 40.0, 7.0), Backlash(3.0), s.op, s.dt_s)
     assert np.allclose(got - got[0], expected, atol=1e-9)
-    assert not np.allclose(play(s.op, 3.0), s.op)
+    assert not np.allclose(backlash_stem(s.op, 3.0), s.op)
 
 
 @pytest.mark.parametrize(

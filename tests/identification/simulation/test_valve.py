@@ -10,8 +10,8 @@ from identification.simulation.valve import (
     HALTS,
     SLIDES,
     StemLaw,
+    backlash_stem,
     first_slip,
-    play,
     stem_position,
     thresholds,
     walk,
@@ -34,7 +34,7 @@ def slow_backlash(op: list[float], width: float, stem: float) -> list[float]:
 @given(st.lists(st.floats(-50, 50), min_size=1, max_size=60), st.floats(0.01, 20))
 def test_backlash_agrees_with_a_slow_implementation(op, width):
     """The kernel and a pushed slot give the same stem within rounding."""
-    assert play(np.array(op), width, 0.0) == pytest.approx(slow_backlash(op, width, 0.0), abs=1e-9)
+    assert backlash_stem(np.array(op), width, 0.0) == pytest.approx(slow_backlash(op, width, 0.0), abs=1e-9)
 
 
 @given(st.lists(st.floats(-50, 50), min_size=1, max_size=60), st.floats(0.01, 20), st.floats(0, 1))
@@ -68,8 +68,8 @@ def test_backlash_has_one_path_after_op_has_covered_it(op, width, where):
     width."""
     x = np.array(op)
     covered = np.flatnonzero(np.maximum.accumulate(x) - np.minimum.accumulate(x) > width)
-    known = play(x, width, first_slip(x, StemLaw(width / 2, width / 2)))
-    free = play(x, width, x[0] + where * width / 2)
+    known = backlash_stem(x, width, first_slip(x, StemLaw(width / 2, width / 2)))
+    free = backlash_stem(x, width, x[0] + where * width / 2)
     after = covered[0] if covered.size else x.size
     assert known[after:] == pytest.approx(free[after:], abs=1e-9)
 
