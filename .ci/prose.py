@@ -1,11 +1,14 @@
-"""Plain English in the project's pages and in the texts that the program prints: python .ci/prose.py [FOLDER]
+"""Plain English in the project's pages, in its printed texts, and in docstrings and comments: python .ci/prose.py [FOLDER]
 
 Prints one line for each banned phrase, each long sentence of a page and a README that is too long, and exits with 1
 if there is one. Code blocks, inline code, links' addresses and figures are not read; of TOML files the values are.
 """
 
+import ast
+import io
 import re
 import sys
+import tokenize
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -30,6 +33,18 @@ TEXTS = (
     "tuning/reasons.toml",
     "*/limits.toml",
 )
+CODE = (
+    "analyzer",
+    "identification",
+    "tuning",
+    "reports",
+    "tests",
+    "proofs",
+    "benchmarks",
+    "sample_data",
+    "docs",
+)
+"""Folders whose docstrings and comments are read."""
 IDENTIFIER = "key"
 """The key of a TOML table whose value is not printed."""
 
@@ -61,7 +76,7 @@ BANNED = {
     r"bears?|borne": "have, allow, support",
     r"of another hand|by another hand|a hand that": "independent generator",
     r"plays?": "backlash",
-    r"waves?": "oscillation, waveform",
+    r"(?<!square )waves?": "oscillation, waveform",
     r"cured|healthy|sound": "repaired, no fault found",
     r"chance of so much": "p-value",
     r"kin|look-alikes?|twins?|likeness": "indistinguishable effects, slow reference implementation",
@@ -72,6 +87,7 @@ BANNED = {
     r"anew": "again",
     r"goes? on|going on|gone on": "continue",
     r"whole of": "all of",
+    r"(?:rows?|samples?|moves?|files?|ms|words|sentences?) an? (?:cycle|loop|night|hour|day|sentence|file|effect)": "per",
     r"beside": "next to, compared with, in addition to",
     r"whatever": "independently of",
     r"amid": "among",
@@ -155,6 +171,30 @@ def printed(root: Path) -> Iterator[str]:
                 yield from (f"{file.relative_to(root)}: {name}: {what}" for _, what in banned(text))
 
 
+def documented(file: Path) -> Iterator[tuple[int, str]]:
+    """First line and text of each docstring and comment of a Python file; a string below a constant is one too."""
+    text = file.read_text(encoding="utf-8")
+    for node in ast.walk(ast.parse(text)):
+        if (
+            isinstance(node, ast.Expr)
+            and isinstance(node.value, ast.Constant)
+            and isinstance(node.value.value, str)
+        ):
+            yield node.lineno, node.value.value
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        if token.type == tokenize.COMMENT:
+            yield token.start[0], token.string
+
+
+def explained(root: Path) -> Iterator[str]:
+    """A line for each banned phrase in docstrings and comments."""
+    for file in sorted(file for folder in CODE for file in (root / folder).rglob("*.py")):
+        for start, text in documented(file):
+            plain = without_code(text)
+            for position, what in banned(plain.replace("\n", " ")):
+                yield f"{file.relative_to(root)}:{start + plain.count(chr(10), 0, position)}: {what}"
+
+
 def main(root: Path) -> int:
     """Print the findings of all pages and texts; 1 if there are any."""
     lines = [
@@ -166,6 +206,7 @@ def main(root: Path) -> int:
     if words > README_WORDS:
         lines.append(f"README.md:1: {words} words; at most {README_WORDS}")
     lines.extend(printed(root))
+    lines.extend(explained(root))
     print("".join(f"{line}\n" for line in lines), end="")
     return int(bool(lines))
 

@@ -125,11 +125,11 @@ def simulate(
     >>> from identification.models import Backlash, Fopdt, Pid
     >>> still = np.zeros(7200)
     >>> load = np.where(np.arange(7200) < 10, 0.0, 5.0)
-    >>> worn, sound = (
+    >>> worn, ideal = (
     ...     triage.simulate(Fopdt(1.5, 20.0, 3.0), Pid(3.0, 8.0), still, load, valve)
     ...     for valve in (Backlash(2.0), None)
     ... )
-    >>> [bool(np.ptp(r.pv[-3600:]) > 0.5) for r in (worn, sound)]
+    >>> [bool(np.ptp(r.pv[-3600:]) > 0.5) for r in (worn, ideal)]
     [True, False]
 
     Parameters

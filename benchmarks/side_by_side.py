@@ -85,7 +85,7 @@ def ours(made: Case) -> Model:
     prior information."""
     limits = Config().cause
     m = measure(made.record, None, made.controller, limits)
-    fit = m.play if m.evidence >= limits.evidence_unexcited else m.linear
+    fit = m.backlash if m.evidence >= limits.evidence_unexcited else m.linear
     p = fit.process
     return p.gain, p.time_constant_s, p.dead_time_s
 

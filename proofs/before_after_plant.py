@@ -19,7 +19,7 @@ NOTHING = "nothing"
 
 @dataclass(frozen=True)
 class World:
-    """Inputs of the loop in one week: size [% OP] and corner [s] of its load, noise [% PV], set point moves a day,
+    """Inputs of the loop in one week: size [% OP] and corner [s] of its load, noise [% PV], set point moves per day,
     size [% OP] and period [s] of an external sine."""
 
     size: float

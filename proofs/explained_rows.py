@@ -4,7 +4,7 @@ The folders hold plants as ../shared/plants does (export.parquet, loops.csv, tru
 benchmarks/world adds loops without a fault and worn valves. Of the rows every tenth is kept, or every --every-th. By
 the truth, the table counts loops for which `run` and `explain` name a valve fault, and loops with an effect that does
 not exist. It also counts loops whose improved model is worse on held-out data in the loop's frequency band. Worn
-valves count from fifteen rows a cycle on. A load is never an invented effect, because each of these loops has one.
+valves count from fifteen rows per cycle on. A load is never an invented effect, because each of these loops has one.
 Writes proofs/explained_rows.md.
 """
 
@@ -64,7 +64,7 @@ def judged(case: Case) -> tuple[str, Counter[str]]:
     group = case.cause
     if group in WORN:
         few = cycle is None or cycle.period_s < ROWS * case.every
-        group = "worn, few rows a cycle" if few else "worn"
+        group = "worn, few rows per cycle" if few else "worn"
     there = LOADS | VALVE if case.cause in WORN else LOADS
     worse = bool(names) and held_out(data)[1] > WORSE * held_out(data)[0]
     flags = (True, night.verdict.cause is Cause.VALVE, bool(VALVE & names), bool(names - there), worse)

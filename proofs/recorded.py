@@ -2,7 +2,7 @@
 8]
 
 Four loops with known causes are simulated at 1 s by the sample mill's physics and then recorded. They are thinned to
-fewer samples a cycle, rounded to a grid, or archived by a swinging door and read by linear interpolation. Grid and
+fewer samples per cycle, rounded to a grid, or archived by a swinging door and read by linear interpolation. Grid and
 deviation are relative to the amplitude of the cycle. Writes recorded.md here and docs/figures/recorded.png.
 """
 
@@ -34,7 +34,7 @@ SKETCHES = {
     "load": Sketch("load", (1.4, 90.0, 10.0), 0.8, 120.0, load_std=0.3, sine=3.0, sine_s=300.0),
 }
 SAMPLES = (60.0, 30.0, 20.0, 15.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0)
-"""Samples a cycle."""
+"""Samples per cycle."""
 GRIDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
 """Step of the grid of PV and OP, relative to their amplitudes."""
 DOORS = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4)
@@ -43,7 +43,7 @@ LONGEST_S = 600
 """Longest straight line that the historian draws [s]."""
 NAMES = ("valve", "tuning", "load")
 COLOURS = dict(zip(SKETCHES, ("#b3342d", "#d98a2b", "#6a9a3b", "#1f6f9f"), strict=True))
-WAYS = {"samples a cycle": SAMPLES, "grid over amplitude": GRIDS, "deviation over amplitude": DOORS}
+WAYS = {"samples per cycle": SAMPLES, "grid over amplitude": GRIDS, "deviation over amplitude": DOORS}
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def drawn(name: str, seed: int) -> tuple[Trends, float]:
 def recorded(cell: Cell, seed: int) -> tuple[np.ndarray, list[np.ndarray]]:
     """Stamps [s] and SP, PV, OP as a historian keeps them."""
     trends, period = drawn(cell.name, seed)
-    step = max(round(period / cell.much), 1) if cell.way == "samples a cycle" else 1
+    step = max(round(period / cell.much), 1) if cell.way == "samples per cycle" else 1
     samples = [x[::step] for x in (trends.sp, trends.pv, trends.op)]
     sizes = [0.0, *(float(np.std(x)) * np.sqrt(2) for x in samples[1:])]
     if cell.way == "grid over amplitude":
@@ -108,7 +108,7 @@ def answered(job: tuple[Cell, int]) -> Answer:
     width = None
     if a.verdict.cause is Cause.VALVE and a.verdict.measured is not None:
         m = a.verdict.measured
-        best = m.stick_slip if m.stick_slip is not None and a.verdict.fault == "stiction" else m.play
+        best = m.stick_slip if m.stick_slip is not None and a.verdict.fault == "stiction" else m.backlash
         width = float(best.valve.stickband) / (sketch.backlash or sketch.stickband)
     return Answer(True, oscillates, str(a.verdict.cause), width)
 

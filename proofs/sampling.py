@@ -30,7 +30,7 @@ from identification.errors import NotAssessedError
 from proofs.common import command, command_line, publish
 
 ROWS = 15
-"""Least number of rows a cycle with which a loop counts."""
+"""Least number of rows per cycle with which a loop counts."""
 WORN = 8
 """Number of valves with backlash, and of valves with stick-slip, in one draw of the world."""
 KINDS = ("named", "width", "slope", "dead time", "interval")
@@ -45,7 +45,7 @@ def judged(name: str, export: Path, loops: Path, truth: dict[str, float], every:
     cycle, m = found.oscillations.first, found.verdict.measured
     if cycle is None or m is None or cycle.period_s < ROWS * every:
         return Counter()
-    fit = found.verdict.fit if found.verdict.cause is Cause.VALVE else m.play
+    fit = found.verdict.fit if found.verdict.cause is Cause.VALVE else m.backlash
     width, slope = truth.get("backlash") or truth["stick_S"], truth["K"] / truth["T"]
     said = intervals(fit, True, api.Config().advice, m.controller)
     held = said.get("stickband_pct") or said.get("backlash_pct")

@@ -2,7 +2,7 @@
 
 The loops are those of proofs/untidy, of seeds that set no threshold (1 to 3 did). A loop shows its cause where the
 error is 1.5 times as large as without it, in three quarters of the record, over five cycles of four samples, with a
-rhythm of at least .15. The cause is clear where the error is twice as large, with eight samples a cycle and without
+rhythm of at least .15. The cause is clear where the error is twice as large, with eight samples per cycle and without
 compression. Writes proofs/untidy_loops.md.
 """
 

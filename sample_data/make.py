@@ -80,7 +80,7 @@ def stated(loop: Loop, tuning: tuple[float, float]) -> tuple[float, float]:
 
 
 def loops_table() -> pd.DataFrame:
-    """loops.csv: one row a loop, with the settings in force at the start."""
+    """loops.csv: one row per loop, with the settings in force at the start."""
     rows = []
     for loop in MILL:
         unit, (kp, ti) = loop.unit, stated(loop, loop.tuning)

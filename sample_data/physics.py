@@ -24,7 +24,7 @@ SLIP_S = 0.3  # how fast a stem that slips reaches its new place
 
 @njit(cache=True)
 def drag(stem: float, actuator: float, width: float) -> float:
-    """Stem behind a play of full width `width`: it rests until a flank of the play takes it along [% OP]."""
+    """Stem with a backlash of full width `width`: it is constant until OP has taken up the backlash [% OP]."""
     return min(max(stem, actuator - 0.5 * width), actuator + 0.5 * width)
 
 
@@ -79,7 +79,7 @@ def shares(lag: float, delay: float, dt: float) -> tuple[int, float, float]:
 
 @njit(cache=True)
 def moved(rest: float, way: float, force: float, valve: Three, share: float) -> tuple[float, float]:
-    """One step of a stem that sticks, or of one behind play: its position and direction."""
+    """One step of a stem that sticks, or of one with backlash: its position and direction."""
     if valve[1] > 0.0:
         return slip(rest, way, force, valve[1], valve[2], share)
     return drag(rest, force, valve[0]), way

@@ -13,7 +13,7 @@ from tuning.search import rounded
 
 SHARES_KEPT, CALM_MS = (0.5, 0.6, 0.67, 0.75, 0.8), 7.0
 """Shares of the response at the ringing period that a first step keeps; the most robust with an error within the
-price is chosen. Maximum sensitivity of the fitted process up to which it is robust: with four fifths of the response
+limit is chosen. Maximum sensitivity of the fitted process up to which it is robust: with four fifths of the response
 the integrator with dead time has 5 to 7, true plants about 3.5 (benchmarks.world, seeds 1, 2, 3, 16, 61)."""
 
 

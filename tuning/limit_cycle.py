@@ -30,7 +30,7 @@ STEADY = 0.02
 KICK = 1.0 + math.sqrt(5.0)
 """Kick in backlash widths at OP; irrational, so that the stem's travel never matches it exactly."""
 KICKS = (1.0, 1.37, 1.83)
-"""Further kicks relative to the first, for a stem that moves by jumps and happens to rest on the set point."""
+"""Further kicks relative to the first, for a stem that moves by jumps and happens to stop at the set point."""
 NO_LIMIT = 1e9
 """Output limits [% OP] without effect: a cycle scales with the backlash and must not reach a limit."""
 

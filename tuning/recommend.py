@@ -172,7 +172,7 @@ def _least_of_both(
 def _first_step(
     old: Pid, now: float, seen: ObservedRinging, limits: TuningLimits, process: Process | None = None
 ) -> Proposal:
-    """The most robust step from the observed ringing alone with an error within the price; among equals the one of
+    """The most robust step from the observed ringing alone with an error within the limit; among equals the one of
     least error; with a higher gain only if there is no other; none if there is none. An integral alone rings before
     any long lag, so its steps are tested on the identified process."""
     tried = steps(old, seen, process)

@@ -130,7 +130,7 @@ def seen_in_cycles(verdict: Verdict, limits: AdviceLimits) -> SeenInCycles | Non
     m = verdict.measured
     if verdict.cause is not Cause.VALVE or m is None:
         return None
-    fit = m.stick_slip if verdict.fault is Fault.STICTION and m.stick_slip is not None else m.play
+    fit = m.stick_slip if verdict.fault is Fault.STICTION and m.stick_slip is not None else m.backlash
     valve = fit.valve.valve
     shown = m.trials or trials_between_moves(fit, m.linear)
     if valve is None or shown is None:

@@ -40,7 +40,7 @@ LEAST_STEP_S = 1e-5
 """Interval of samples below which a unit in the name of a time column is not used [s]: drives are sampled at
 100 kHz at most."""
 MOST_STEP_S = 1e5
-"""Interval of samples above which it is not used [s]: more than a sample a day is no trend of a loop."""
+"""Interval of samples above which it is not used [s]: more than one day between samples is no trend of a loop."""
 
 TICKS_PER_S = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 

@@ -320,7 +320,7 @@ def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: C
     night = _known_without_op(assess_span(record, config.figures), in_percent)
     hours = hourly(record, judged.of_all, config.figures, night.noise_band_pct)
     m, at_fault = judged.verdict.measured, judged.verdict.cause is Cause.VALVE
-    dead_time = None if m is None else (m.play if at_fault else m.linear).dead_time_s
+    dead_time = None if m is None else (m.backlash if at_fault else m.linear).dead_time_s
     close = close_view(judged.part.record, found, stretch.first)
     end_s = record.start_s + record.duration_s
     return Assessment(

@@ -171,7 +171,7 @@ def _valve_width(fault: Fault, m: Measured) -> dict[str, float | None]:
     if fault is Fault.STICTION and m.stick_slip is not None:
         valve = m.stick_slip.valve
         return {"stickband_pct": valve.stickband, "slip_jump_pct": valve.slip_jump}
-    return {"backlash_pct": m.play.valve.stickband}
+    return {"backlash_pct": m.backlash.valve.stickband}
 
 
 def _process_known(verdict: Verdict, limits: AdviceLimits) -> dict[str, float | None]:

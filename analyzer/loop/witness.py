@@ -46,7 +46,7 @@ def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, config: Conf
             round(float(x), 1) for x in _profile(m, 0.0 if with_valve_oscillation else limits.noise_widths)
         ],
         "needed": round(needed(m, limits, oscillates), 1),
-        "op_range": float(f"{m.play.valve.stickband / m.size:.4g}") if m.size > 0 else 0.0,
+        "op_range": float(f"{m.backlash.valve.stickband / m.size:.4g}") if m.size > 0 else 0.0,
         "jump": [round(x, 1) for x in jump],
         **{
             k: [float(f"{x:.4g}") for x in known]
@@ -59,7 +59,7 @@ def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, config: Conf
 def _profile(m: Measured, noise_widths: float) -> Floats:
     """The profile of widths [nat], its positive part scaled to the evidence that remains after outliers; zero for
     widths under `noise_widths` deviations of OP's noise, which sometimes crosses such a backlash."""
-    found = width_profile(m.linear, m.play)
+    found = width_profile(m.linear, m.backlash)
     crossed = (
         noise_widths * robust_deviation(np.abs(np.diff(m.problem.blocks.op, 2))) / math.sqrt(6.0) > WIDTHS
     )
@@ -77,7 +77,7 @@ def _constants_of_fit(
     constants are those identified slip by slip, if there are any."""
     worn = m.evidence >= needed(m, limits, oscillates)
     sticks = worn and fault_of(m, limits) is Fault.STICTION and m.stick_slip is not None
-    fit = (m.stick_slip if sticks else m.play) if worn else m.linear
+    fit = (m.stick_slip if sticks else m.backlash) if worn else m.linear
     assert fit is not None
     spread, found = covariance(fit, free_width=worn), {}
     if np.isfinite(spread).all() and fit.gain != 0.0:

@@ -183,7 +183,7 @@ def _half_cycle(kept: Row, scale: PvScale, step_s: float) -> tuple[Course, Cours
 
 
 def _laid_over(paths: Sequence[Course]) -> tuple[Line, ...]:
-    """Superimposed paths, with the part of the stem at rest on top."""
+    """Superimposed paths, with the part in which the stem is at rest drawn last."""
     stuck = [Line(STEM_AT_REST, x[part], y[part], kind="stuck") for x, y, part in paths if x[part].size > 1]
     return (*(Line("since the reversal", x, y) for x, y, _ in paths), *stuck)
 

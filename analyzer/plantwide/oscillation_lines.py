@@ -249,7 +249,7 @@ def _on_span(oscillation: OscillationLines, span: tuple[float, float]) -> Oscill
     size = next_fast_len(FINE * count)
     padded = np.zeros(size, dtype=np.complex128)
     padded[:count] = oscillation.lines
-    envelope = ifft(padded) * size  # of the lines from wave.first on
+    envelope = ifft(padded) * size  # from the first line of the band on
     fresh = next_fast_len(max(math.ceil(FINE * count * length / oscillation.duration_s), 16))
     t = start + np.arange(fresh) * (length / fresh)
     at = (t - oscillation.start_s) / oscillation.duration_s * size

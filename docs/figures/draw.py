@@ -2,7 +2,7 @@
 
     python docs/figures/draw.py [FOLDER]
 
-writes figure-1.png and so on beside this file, or into FOLDER.
+writes figure-1.png and so on next to this file, or into FOLDER.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def continuous(loop: Loop) -> Loop:
 
 
 def figure_1() -> Figure:
-    """The level loop with play at Kp 1 and at half of it, from rest through a load step."""
+    """The level loop with backlash at Kp 1 and at half of it, from rest through a load step."""
     fig, axes = plt.subplots(2, 1, figsize=(7.5, 4.6), sharex=True, layout="constrained")
     steps = 400
     load = np.where(np.arange(steps) < 20, 0.0, 0.5)
@@ -64,7 +64,7 @@ def figure_1() -> Figure:
 
 
 def figure_3() -> Figure:
-    """N(A) of play against -1/(G C) of the level loop, with the intersection."""
+    """N(A) of backlash against -1/(G C) of the level loop, with the intersection."""
     c = curves(continuous(LEVEL))
     crossing = next(b for b in c.crossings if b.stable)
     fig, ax = plt.subplots(figsize=(6.2, 4.6), layout="constrained")
@@ -123,17 +123,17 @@ def map_figure(
 
 
 def figure_4() -> Figure:
-    """Travel of the flow loop with play."""
+    """Travel of the flow loop with backlash."""
     return map_figure(FLOW, (0.2, 1.6), (0.3, 4.0), "Flow loop (T/L 2) with 1 % play", 0.85)
 
 
 def figure_5() -> Figure:
-    """Travel of the level loop with play."""
+    """Travel of the level loop with backlash."""
     return map_figure(LEVEL, (0.3, 1.8), (5.0, 220.0), "Level loop (T/L 200) with 1 % play")
 
 
 def figure_6() -> Figure:
-    """Largest Ti/T at which play still cycles, over T/L, for three gains."""
+    """Largest Ti/T at which a loop with backlash still cycles, over T/L, for three gains."""
     ratios = np.geomspace(2, 500, 25)
     fig, ax = plt.subplots(figsize=(6.4, 4.4), layout="constrained")
     for share, color in ((0.5, GREEN), (1.0, BLUE), (1.5, RED)):
@@ -146,7 +146,7 @@ def figure_6() -> Figure:
     ax.annotate("Ti = T: no cycle above", (60, 1.02), fontsize=8)
     ax.set(xscale="log", xlabel="T/L [-]", ylabel="Ti/T [-]", ylim=(0, 1.1), xlim=(2, 500))
     ax.set_xticks([2, 5, 10, 20, 50, 100, 200, 500], [2, 5, 10, 20, 50, 100, 200, 500])
-    ax.set_title("Longest integral time at which play still cycles")
+    ax.set_title("Longest integral time at which a loop with backlash still cycles")
     ax.legend(fontsize=8, loc="lower center")
     return fig
 

@@ -148,7 +148,7 @@ def test_backlash_is_reported_in_addition_to_a_load_that_causes_the_oscillation(
     verdict, other = (assessed(d)[0].verdict for d in (with_backlash, SINE))
     assert (verdict.fault, other.fault) == ("backlash", "none")
     assert verdict.measured is not None
-    assert verdict.measured.play.valve.stickband == pytest.approx(2.0, rel=0.15)
+    assert verdict.measured.backlash.valve.stickband == pytest.approx(2.0, rel=0.15)
 
 
 def test_models_that_do_not_ring_as_recorded_choose_no_settings() -> None:

@@ -37,9 +37,11 @@ def refine_stick_slip(verdict: Verdict, period_s: float, config: Config) -> Verd
         or m.problem.y.size < SHORT
     ):
         return verdict
-    problem = m.play.p
-    blocks = replace(m.play, p=problem.of_rows.with_blocks(fine=False))
-    backlash = descend(blocks, free_width=True) if problem.blocks.fine or problem.blocks.steps > 1 else m.play
+    problem = m.backlash.p
+    blocks = replace(m.backlash, p=problem.of_rows.with_blocks(fine=False))
+    backlash = (
+        descend(blocks, free_width=True) if problem.blocks.fine or problem.blocks.steps > 1 else m.backlash
+    )
     path = fit_irregular(backlash, generic_noise(), period_s, verdict.fault is not Fault.STICTION)
     if path is None:
         return verdict
@@ -70,5 +72,5 @@ def _finely(fit: Fitted, m: Measured) -> Fitted:
 def _with_path(m: Measured, path: SlipPath, jump: float, more: float) -> Measured:
     """The measures, with the path's stem and the friction and process of its fit."""
     fit = _finely(path.fit, m)
-    linear, backlash = (replace(x, p=fit.p) for x in (m.linear, m.play))
-    return replace(m, linear=linear, play=backlash, stick_slip=fit, jump=jump, evidence=m.evidence + more)
+    linear, backlash = (replace(x, p=fit.p) for x in (m.linear, m.backlash))
+    return replace(m, linear=linear, backlash=backlash, stick_slip=fit, jump=jump, evidence=m.evidence + more)

@@ -85,7 +85,7 @@ class Verdict:
         m = self.require_measured
         if self.cause is not Cause.VALVE:
             return m.linear
-        return m.stick_slip if self.fault is Fault.STICTION and m.stick_slip is not None else m.play
+        return m.stick_slip if self.fault is Fault.STICTION and m.stick_slip is not None else m.backlash
 
     @property
     def identified_between_rows(self) -> bool:
@@ -116,7 +116,7 @@ def _ramp(x: float, low: float, high: float) -> float:
 
 def needed(m: Measured, limits: CauseLimits, oscillating: bool) -> float:
     """Evidence required of these measures [nat]."""
-    return limits.needed(m.play.count, m.excited, oscillating)
+    return limits.needed(m.backlash.count, m.excited, oscillating)
 
 
 def _crossed(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
@@ -124,7 +124,7 @@ def _crossed(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
     a cycle; over its usual range in a calm loop, whose tails are kicks of its set point. OP of a valve that rarely
     slips stays within its stickband, so the whole range counts there too."""
     whole = oscillating or fault_of(m, limits) is Fault.STICTION
-    return m.play.valve.stickband <= limits.widest * float(np.ptp(m.problem.blocks.op)) and (
+    return m.backlash.valve.stickband <= limits.widest * float(np.ptp(m.problem.blocks.op)) and (
         whole or m.size <= 1.0
     )
 
@@ -132,7 +132,7 @@ def _crossed(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
 def shows_fault(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
     """Whether PV shows a valve fault: enough evidence, a process gain of the controller's sign, and a width that OP
     has crossed."""
-    wrong_way = m.controller is not None and m.controller.sign * m.play.gain < 0
+    wrong_way = m.controller is not None and m.controller.sign * m.backlash.gain < 0
     return m.evidence >= needed(m, limits, oscillating) and not wrong_way and _crossed(m, limits, oscillating)
 
 
@@ -157,7 +157,7 @@ def quiet_signs(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
         return ()
     sure = 0.5 + 0.5 * _ramp(m.evidence, least, 4 * least)
     signs = [Sign(Cause.VALVE, sure, SignKind.CALM_EVIDENCE, (m.evidence,))]
-    width = m.play.valve.stickband
+    width = m.backlash.valve.stickband
     if m.size < limits.size and m.steady >= limits.steady_alone and width >= limits.plain_width:
         signs.append(
             Sign(Cause.VALVE, 0.6 + 0.4 * _ramp(m.steady, limits.steady_alone, 10.0), SignKind.AGAIN)
@@ -276,9 +276,9 @@ def imbalance(m: Measured) -> float:
     where the loop attenuates a load at the period, the factor by which it does; 0 without settings."""
     if m.controller is None:
         return 0.0
-    loop = Loop(between_samples(m.play.process, m.problem, m.controller), m.controller)
+    loop = Loop(between_samples(m.backlash.process, m.problem, m.controller), m.controller)
     response = complex(loop_response(loop, np.array([2.0 * math.pi / m.scale_s]))[0])
-    return abs(1.0 + response * describe(Backlash(m.play.valve.stickband), 0.5 * m.problem.cycle_range))
+    return abs(1.0 + response * describe(Backlash(m.backlash.valve.stickband), 0.5 * m.problem.cycle_range))
 
 
 def _quiet(m: Measured, limits: CauseLimits, worn_valve: WornValve | None) -> Verdict:
@@ -301,7 +301,7 @@ def hidden_by_grid(m: Measured, pv_step: float, oscillates: bool, limits: CauseL
     covers so few, that the grid itself keeps PV constant as the valve would."""
     if m.problem.blocks.position is not None and not m.problem.blocks.decoded:
         return False
-    best = m.stick_slip if m.stick_slip is not None and m.jump > limits.evidence_jump else m.play
+    best = m.stick_slip if m.stick_slip is not None and m.jump > limits.evidence_jump else m.backlash
     covered = float(np.ptp(m.problem.y[m.problem.usable]))
     rough = not oscillates and covered < limits.grid_covered * pv_step
     return rough or abs(best.gain) * best.valve.stickband < limits.grid_steps * pv_step

@@ -52,7 +52,7 @@ class WornValve:
     def found(self) -> BacklashUnderLine:
         """The joint model of process, backlash, load and line."""
         m = self.measured
-        valves = [fit.valve for fit in (m.play, m.stick_slip) if fit is not None]
+        valves = [fit.valve for fit in (m.backlash, m.stick_slip) if fit is not None]
         return fit_backlash_under_line(self._problem, self._starts(), valves, self.period_s)
 
     @property
@@ -82,7 +82,7 @@ class WornValve:
     def shown(self) -> tuple[Fault, Measured]:
         """The fault of the likeliest valve, and the measures with its fit."""
         linear, valve = self._fits()
-        measured = replace(self.measured, linear=linear, play=valve)
+        measured = replace(self.measured, linear=linear, backlash=valve)
         if valve.valve.slip_jump < self.limits.least_jump * valve.valve.stickband:
             return Fault.BACKLASH, measured
         return Fault.STICTION, replace(measured, stick_slip=valve)
@@ -98,7 +98,7 @@ class WornValve:
     @property
     def _is_hidden(self) -> bool:
         """Whether the record cannot answer: its stem is recorded, the load was not compared, OP swings from limit to
-        limit, few blocks are good, or the loop rings with few samples a cycle."""
+        limit, few blocks are good, or the loop rings with few samples per cycle."""
         m, limits = self.measured, self.limits
         if m.ringing is None or m.problem.blocks.position is not None or m.problem.cycle_range >= WHOLE_PCT:
             return True
@@ -135,10 +135,10 @@ class WornValve:
         scans = None if m.problem.blocks.steps == 1 else scans_of(self.record, problem, m.controller)
         if scans is None:
             return problem
-        return with_scans(replace(m.play, p=problem), scans, SEARCHED).p
+        return with_scans(replace(m.backlash, p=problem), scans, SEARCHED).p
 
     def _starts(self) -> list[Dynamics]:
         """Time constants and dead times [s] at which the search begins."""
         m = self.measured
-        starts = [(x.time_constant_s, max(x.dead_time_s, 0.0)) for x in (m.linear, m.play)]
+        starts = [(x.time_constant_s, max(x.dead_time_s, 0.0)) for x in (m.linear, m.backlash)]
         return starts + [(share * self.period_s, 0.05 * self.period_s) for share in LAGS]

@@ -36,20 +36,20 @@ from tuning.ringing import ObservedRinging, observed_ringing
 class Measured:
     """The measures for the signs.
 
-    linear, play, stick_slip : the fits; evidence [nat] of the better valve over none; size, its stickband over OP's
-    range [-]; jump [nat], stick-slip over backlash; amplification |S| at the period [-], None without settings;
-    stable, the identified loop; saturated, share of time at limits [-]; controller, stated or recovered; moves,
-    number of moves of the better valve's stem; excited, whether set point moves drove the loop; trials, agreement of
-    the stretches between OP reversals on the better valve, None with too few; kurtosis [-] of the band at the period,
-    3 for noise, 1.5 for a constant size; steady [-], of a calm loop, agreement of the stretches between moves of the
-    stem on the better valve: their mean gain over its standard error, and response_nat, its gain while a response of
-    PV to set point moves is expected [nat]; ringing, the models of a cycle under a smooth load, None without a cycle;
-    observed, the ringing seen in the error, None without a cycle; kept, how well the cycle keeps its phase; scale_s,
-    the period or another time scale of the loop [s].
+    linear, backlash, stick_slip : the fits; evidence [nat] of the better valve over none; size, its stickband over
+    OP's range [-]; jump [nat], stick-slip over backlash; amplification |S| at the period [-], None without
+    settings; stable, the identified loop; saturated, share of time at limits [-]; controller, stated or recovered;
+    moves, number of moves of the better valve's stem; excited, whether set point moves drove the loop; trials,
+    agreement of the stretches between OP reversals on the better valve, None with too few; kurtosis [-] of the
+    band at the period, 3 for noise, 1.5 for a constant size; steady [-], of a calm loop, agreement of the
+    stretches between moves of the stem on the better valve: their mean gain over its standard error, and
+    response_nat, its gain while a response of PV to set point moves is expected [nat]; ringing, the models of a
+    cycle under a smooth load, None without a cycle; observed, the ringing seen in the error, None without a cycle;
+    kept, how well the cycle keeps its phase; scale_s, the period or another time scale of the loop [s].
     """
 
     linear: Fitted
-    play: Fitted
+    backlash: Fitted
     stick_slip: Fitted | None
     evidence: float
     size: float
@@ -104,7 +104,7 @@ def measure(
     fine_linear, fine_backlash, fine_stick = refined((linear, backlash, stick), best, hopeless)
     seen_alone = Measured(
         linear=fine_linear,
-        play=fine_backlash,
+        backlash=fine_backlash,
         stick_slip=fine_stick,
         evidence=gained,
         size=best.valve.stickband / max(problem.cycle_range, 1e-9),

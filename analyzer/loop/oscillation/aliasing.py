@@ -65,6 +65,6 @@ def _ratio(record: LoopRecord, period_s: float) -> complex | None:
 
 
 def _line(x: Floats, window: Complexes) -> complex:
-    """The line of a block at a wave's frequency, without its mean and drift."""
+    """The line of a block at a given frequency, without its mean and drift."""
     k = np.linspace(-1.0, 1.0, x.size)
     return complex((x - x.mean() - k * (k @ x) / (k @ k)) @ window)

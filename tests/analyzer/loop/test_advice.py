@@ -243,7 +243,7 @@ def test_a_sample_for_each_half_of_ti_gives_no_settings(every, action):
 
 
 def test_cycles_too_fast_for_the_sampling_are_not_excluded():
-    """With fewer than three samples a cycle, an oscillating loop is not reported as steady; the required sampling is
+    """With fewer than three samples per cycle, an oscillating loop is not reported as steady; the required sampling is
     reported.
     """
     t = simulate(TANK, 24.0)
@@ -279,8 +279,8 @@ def test_outdated_settings_are_reported_without_advice():
 def test_a_model_beyond_its_record_gets_no_advice(pipe):
     """A fit whose dead time is a third of the record gets no settings, and the reason says why."""
     m = pipe.verdict.measured
-    late = m.play.moved(dead_time_s=m.problem.duration_s / 3)
-    verdict = replace(pipe.verdict, measured=replace(m, play=late), fault="backlash")
+    late = m.backlash.moved(dead_time_s=m.problem.duration_s / 3)
+    verdict = replace(pipe.verdict, measured=replace(m, backlash=late), fault="backlash")
     p = propose(verdict, PIPE.controller, 100.0, CONFIG).proposal
     assert p.controller is None
     assert "dead time" in p.reason
@@ -331,7 +331,7 @@ def test_a_loop_without_a_cycle_stores_no_width_from_single_stretches(pipe):
     stretches support it.
     """
     m = pipe.verdict.require_measured
-    tried = m.play.moved(valve=m.play.valve._replace(sliding=0.25 * m.play.valve.stickband))
+    tried = m.backlash.moved(valve=m.backlash.valve._replace(sliding=0.25 * m.backlash.valve.stickband))
     single = replace(m, stick_slip=tried, steady=0.0, response_nat=0.0)
     calm = replace(pipe.verdict, measured=single, steady=None)
     evidence = json.loads(witness(calm, False, prepared(simulate(PIPE, 6.0)), CONFIG) or "")

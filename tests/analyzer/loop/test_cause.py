@@ -103,7 +103,7 @@ def test_width_of_backlash_is_recovered(name):
     verdict = assessed(name).verdict
     assert verdict.fault == "backlash"
     assert verdict.measured is not None
-    assert verdict.measured.play.valve.stickband == pytest.approx(SKETCHES[name].backlash, rel=0.10)
+    assert verdict.measured.backlash.valve.stickband == pytest.approx(SKETCHES[name].backlash, rel=0.10)
 
 
 @pytest.mark.parametrize("name", [n for n in named("valve") if SKETCHES[n].stickband])
@@ -155,7 +155,7 @@ def test_direct_acting_loops_get_the_same_verdict():
     verdict = assess(prepared(turned), settings, CONFIG).verdict
     assert (verdict.cause, verdict.fault) == ("valve", "backlash")
     assert verdict.measured is not None
-    assert verdict.measured.play.valve.stickband == pytest.approx(sketch.backlash, rel=0.10)
+    assert verdict.measured.backlash.valve.stickband == pytest.approx(sketch.backlash, rel=0.10)
 
 
 def test_trends_that_do_not_identify_a_cause_state_what_they_need():
@@ -171,7 +171,7 @@ def test_trends_that_do_not_identify_a_cause_state_what_they_need():
     assert str(blind.needs) == "needs OP, which is not recorded"
     straight = assess(replace(made, compressed_share=0.9, archived_share=0.02), None, CONFIG).verdict
     assert straight.cause == "undecided"
-    wanted = "needs trends without compression, or 7 archived samples a cycle"
+    wanted = "needs trends without compression, or 7 archived samples per cycle"
     assert str(straight.needs) == f"{wanted}, has 2.6 a cycle and 90 % of the samples on straight segments"
 
 
@@ -188,7 +188,7 @@ def test_a_large_backlash_is_found_for_any_noise_and_load(seed, grid):
     found = assess(prepared(replace(made, pv=pv, op=op)), sketch.controller, CONFIG).verdict
     assert found.cause == "valve"
     assert found.measured is not None
-    assert found.measured.play.valve.stickband == pytest.approx(sketch.backlash, rel=0.1)
+    assert found.measured.backlash.valve.stickband == pytest.approx(sketch.backlash, rel=0.1)
 
 
 def compressed(name: str, share: float) -> Trends:
@@ -353,7 +353,7 @@ def test_a_sign_that_is_not_known_names_no_cause(name):
 
 
 def test_a_load_of_few_samples_a_cycle_is_named_by_its_phase_alone():
-    """With rows every 10 s and fewer than 8 samples a cycle, only the phase identifies the load.
+    """With rows every 10 s and fewer than 8 samples per cycle, only the phase identifies the load.
 
     There is no third harmonic, so the waveform does not separate backlash from a load. A sine keeps its phase over
     500 periods.

@@ -47,7 +47,7 @@ def test_a_half_in_manual_does_not_change_the_verdict(backlash, cause):
     assert found.verdict.cause == cause
     assert found.judged_h == pytest.approx(3.0, abs=0.01)
     if backlash:
-        assert found.verdict.measured.play.valve.stickband == pytest.approx(backlash, rel=0.15)
+        assert found.verdict.measured.backlash.valve.stickband == pytest.approx(backlash, rel=0.15)
 
 
 def still(hours: float, manual: slice = slice(0)) -> LoopRecord:

@@ -267,7 +267,7 @@ def test_a_cycle_whose_halves_last_from_half_to_twice_is_found(seed):
 
 
 def test_three_samples_a_cycle_are_enough_for_a_clear_cycle():
-    """A sine with 3.6 samples a cycle and 1.4 times the noise deviation is found, and white noise is not."""
+    """A sine with 3.6 samples per cycle and 1.4 times the noise deviation is found, and white noise is not."""
     t = np.arange(600)
     assert first_of(record(50 + 2 * np.sin(2 * np.pi * t / 3.6) + noise(21, 600))).period_s == pytest.approx(
         3.6, rel=0.03
@@ -299,7 +299,7 @@ def cycling_after_a_start(dt_s: float, n: int, seed: int = 7) -> LoopRecord:
 
 @pytest.mark.parametrize("dt_s", [2.0, 2.7, 7.0, 13.0, 23.0, 61.0, 73.0])
 def test_sampling_changes_no_answer(dt_s):
-    """From 8 to 300 samples a cycle, period, share of time and significance agree with those at 5 s."""
+    """From 8 to 300 samples per cycle, period, share of time and significance agree with those at 5 s."""
     usual = first_of(cycling_after_a_start(5.0, 7200))
     found = first_of(cycling_after_a_start(dt_s, int(36_000 / dt_s)))
     assert found.period_s == pytest.approx(usual.period_s, rel=0.01)

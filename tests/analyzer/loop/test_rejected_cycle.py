@@ -112,7 +112,7 @@ def test_an_undecided_cycle_that_the_loop_amplifies_is_reduced(
 
 @pytest.mark.parametrize(("kind", "at"), [("stiction", 3), ("backlash", 3)])
 def test_a_cycle_whose_waveform_is_not_recorded_is_left_alone(kind: str, at: int, tmp_path: Path) -> None:
-    """With three to seven rows a cycle, a sticking valve looks like ringing, and the loop gets no settings.
+    """With three to seven rows per cycle, a sticking valve looks like ringing, and the loop gets no settings.
 
     Slower settings would give 60 % more error.
     """

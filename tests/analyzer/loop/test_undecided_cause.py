@@ -102,7 +102,7 @@ def test_no_valve_fault_is_reported_without_its_own_evidence(loaded):
 def test_a_model_rings_at_the_period_of_a_cycle_within_the_row_interval(loaded):
     """In rows of a second, a model that rings 20 % slower has another period.
 
-    With ten rows a cycle it has the same period, because its dead time is known only to a row.
+    With ten rows per cycle it has the same period, because its dead time is known only to a row.
     """
     ringing, limits = loaded[1].verdict.measured.ringing, CONFIG.cause
     slower = replace(ringing, ms=5.0, period_s=1.2 * ringing.cycle_s)

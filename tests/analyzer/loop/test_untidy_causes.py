@@ -96,7 +96,7 @@ def test_a_backlash_of_many_steps_of_the_grid_is_still_found():
 def test_a_tuning_is_found_on_a_grid_of_two_steps_an_amplitude(seed, expected):
     """A tuning is found at an amplitude of at least 1.5 steps of PV's grid if settings are known.
 
-    Eight rows a cycle must show the ringing. Otherwise the cause is undecided.
+    Eight rows per cycle must show the ringing. Otherwise the cause is undecided.
     """
     drawn = draw(seed)
     ready, stated = recorded(drawn, CONFIG)

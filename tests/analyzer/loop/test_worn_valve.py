@@ -49,7 +49,7 @@ def test_a_worn_valve_under_a_sine_is_found_with_its_width() -> None:
     for d, verdict in worn:
         m = verdict.measured
         assert m is not None
-        assert m.play.valve.stickband == pytest.approx(d.valve.band, rel=0.2)
+        assert m.backlash.valve.stickband == pytest.approx(d.valve.band, rel=0.2)
 
 
 @pytest.mark.parametrize("kind", ["tight", pytest.param("load", marks=pytest.mark.slow)])
@@ -71,7 +71,7 @@ def test_a_night_with_half_of_it_lost_is_assessed_by_the_rest(lost: str) -> None
     record = LoopRecord(d.name, 0.0, 1.0, t.sp, t.pv, t.op, away & (lost == "bad"), masks=masks)
     found = assessed(d, record).verdict
     assert found.fault == "backlash"
-    assert found.require_measured.play.valve.stickband == pytest.approx(d.valve.band, rel=0.1)
+    assert found.require_measured.backlash.valve.stickband == pytest.approx(d.valve.band, rel=0.1)
 
 
 def loop(seed: int, kind: str, number: int) -> Drawn:
@@ -89,7 +89,7 @@ def test_backlash_wider_than_the_cycle_of_op_is_reported_with_the_load(seed, num
     verdict = judged(d).verdict
     assert verdict.cause is Cause.LOAD
     assert verdict.fault is Fault.BACKLASH
-    assert verdict.require_measured.play.valve.stickband == pytest.approx(d.valve.band, rel=0.05)
+    assert verdict.require_measured.backlash.valve.stickband == pytest.approx(d.valve.band, rel=0.05)
 
 
 def test_a_neighbours_cycle_through_a_valve_without_a_fault_is_no_valve_fault():
@@ -115,7 +115,7 @@ def test_a_steady_loop_with_set_point_moves_has_no_fault():
 
 @pytest.mark.parametrize("number", [0, 3])
 def test_slow_rows_of_a_loop_tuned_too_tight_show_no_backlash(number):
-    """Recorded every 10 s, a loop tuned too tight with seven rows a cycle, or with OP between its limits, has no
+    """Recorded every 10 s, a loop tuned too tight with seven rows per cycle, or with OP between its limits, has no
     backlash.
     """
     verdict = judged(loop(574, "tight", number), "every 10 s").verdict
@@ -131,7 +131,7 @@ def test_a_limit_cycle_with_a_load_of_another_period_is_the_valves():
     verdict = judged(d).verdict
     assert verdict.cause is Cause.VALVE
     assert verdict.fault is Fault.BACKLASH
-    assert verdict.require_measured.play.valve.stickband == pytest.approx(d.valve.band, rel=0.05)
+    assert verdict.require_measured.backlash.valve.stickband == pytest.approx(d.valve.band, rel=0.05)
 
 
 def test_a_limit_cycle_far_wider_than_its_backlash_is_the_valves():
@@ -143,7 +143,7 @@ def test_a_limit_cycle_far_wider_than_its_backlash_is_the_valves():
     verdict = judged(d).verdict
     assert verdict.cause is Cause.VALVE
     assert verdict.fault is Fault.BACKLASH
-    assert verdict.require_measured.play.valve.stickband == pytest.approx(d.valve.band, rel=0.05)
+    assert verdict.require_measured.backlash.valve.stickband == pytest.approx(d.valve.band, rel=0.05)
 
 
 def test_short_holes_all_day_hide_no_worn_valve():
@@ -154,7 +154,7 @@ def test_short_holes_all_day_hide_no_worn_valve():
     d = loop(574, "worn-sine", 6)
     found = assessed(d, holed(d, 4, 30)).verdict
     assert found.fault is Fault.BACKLASH
-    assert found.require_measured.play.valve.stickband == pytest.approx(d.valve.band, rel=0.05)
+    assert found.require_measured.backlash.valve.stickband == pytest.approx(d.valve.band, rel=0.05)
 
 
 def test_a_day_without_complete_blocks_neither_shows_nor_excludes_a_fault():

@@ -60,7 +60,7 @@ def test_a_width_recorded_every_ten_seconds_is_that_of_the_valve(drawn: Drawn) -
     """With one row in ten of a controller that scans every second, the backlash is recovered within 15 %."""
     m = measured(drawn, 10, 1.0)
     assert m.problem.blocks.steps == 10
-    assert m.play.valve.stickband == pytest.approx(drawn.valve.band, rel=0.15)
+    assert m.backlash.valve.stickband == pytest.approx(drawn.valve.band, rel=0.15)
 
 
 def test_a_controller_no_faster_than_its_record_holds_op_between_rows() -> None:
@@ -69,7 +69,7 @@ def test_a_controller_no_faster_than_its_record_holds_op_between_rows() -> None:
     d = replace(BACKLASH_LOOPS[0], controller=replace(BACKLASH_LOOPS[0].controller, scan_s=10.0))
     m = measured(d, 1, 1.0)
     assert m.problem.blocks.steps == 1
-    assert m.play.valve.stickband == pytest.approx(d.valve.band, rel=0.15)
+    assert m.backlash.valve.stickband == pytest.approx(d.valve.band, rel=0.15)
 
 
 def rows_of(n: int = 400) -> Rows:

@@ -67,4 +67,4 @@ def test_the_night_uses_the_stem(sketch: Sketch, fault: str) -> None:
     assert (verdict.cause, verdict.fault) == ("valve", fault)
     assert verdict.measured is not None
     gain, lag, _ = sketch.process
-    assert verdict.measured.play.slope == pytest.approx(gain / lag, rel=0.05)
+    assert verdict.measured.backlash.slope == pytest.approx(gain / lag, rel=0.05)

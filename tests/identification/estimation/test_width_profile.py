@@ -30,9 +30,9 @@ def test_it_peaks_at_the_true_backlash(seed: int) -> None:
     """A level with a backlash of 0.62 % has its peak there, as high as the evidence of the search within 25 %.
     The profile falls above."""
     m = measured(LEVEL, seed)
-    found = width_profile(m.linear, m.play)
+    found = width_profile(m.linear, m.backlash)
     assert WIDTHS[int(found.argmax())] == pytest.approx(0.62, rel=0.05)
-    assert found.max() == pytest.approx(m.play.log_likelihood - m.linear.log_likelihood, rel=0.25)
+    assert found.max() == pytest.approx(m.backlash.log_likelihood - m.linear.log_likelihood, rel=0.25)
     assert found[WIDTHS > 1.1].max() < 0.0
 
 
@@ -41,8 +41,8 @@ def test_backlash_between_two_widths_counts_for_both(width: float) -> None:
     """Backlash between two widths has its full evidence at both, so that two nights of one valve agree on one
     width."""
     m = measured(replace(LEVEL, backlash=width), 3)
-    found = width_profile(m.linear, m.play)
-    assert m.play.valve.stickband == pytest.approx(width, rel=0.05)
+    found = width_profile(m.linear, m.backlash)
+    assert m.backlash.valve.stickband == pytest.approx(width, rel=0.05)
     assert found[(width / 1.26 < WIDTHS) & (width * 1.26 > WIDTHS)].min() >= found.max() - 1.0
 
 
@@ -51,7 +51,7 @@ def test_it_has_no_evidence_of_backlash_for_an_ideal_valve() -> None:
     constant. The limit is the likelihood ratio at 5 %, corrected for all widths and records (Wilks 1938,
     Bonferroni 1936)."""
     found = [measured(sketch, seed) for sketch in (QUIET, MOVED) for seed in range(1, 9)]
-    most = [width_profile(m.linear, m.play).max() for m in found]
+    most = [width_profile(m.linear, m.backlash).max() for m in found]
     assert max(most) < 0.5 * chi2.isf(0.05 / (len(found) * WIDTHS.size), 1)
 
 
@@ -59,7 +59,7 @@ def test_widths_that_are_too_small_are_not_distinguished_from_none() -> None:
     """Backlash far narrower than OP's moves has no evidence for or against it. Widths of more than half of OP's
     range are excluded, and widths above this range do not differ."""
     m = measured(MOVED, 1)
-    found = width_profile(m.linear, m.play)
+    found = width_profile(m.linear, m.backlash)
     assert found[0] == 0.0
     assert found[0.5 * np.ptp(m.problem.blocks.op) < WIDTHS].max() < -100.0
     beyond = found[np.ptp(m.problem.blocks.op) * 1.25 < WIDTHS]
