@@ -1,4 +1,4 @@
-"""Plain English in the project's pages, in its printed texts, and in docstrings and comments: python .ci/prose.py [FOLDER]
+"""Plain English in pages, printed texts, docstrings and comments: python .ci/prose.py [FOLDER]
 
 Prints one line for each banned phrase, each long sentence of a page and a README that is too long, and exits with 1
 if there is one. Code blocks, inline code, links' addresses and figures are not read; of TOML files the values are.
@@ -87,7 +87,7 @@ BANNED = {
     r"anew": "again",
     r"goes? on|going on|gone on": "continue",
     r"whole of": "all of",
-    r"(?:rows?|samples?|moves?|files?|ms|words|sentences?) an? (?:cycle|loop|night|hour|day|sentence|file|effect)": "per",
+    r"(?:rows?|samples?|moves?|files?|ms|words|sentences?) an? (?:cycle|loop|night|hour|day|sentence)": "per",
     r"beside": "next to, compared with, in addition to",
     r"whatever": "independently of",
     r"amid": "among",

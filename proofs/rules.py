@@ -55,7 +55,6 @@ RULES: Mapping[str, Rule] = {
     "no swing between limits": _limits("oscillation", swing_least=1e9),
     "no cycle for its valve's sake": _limits("cause", near_evidence=1e9),
     "stickbands of any size": _limits("cause", least_size=0.0),
-    "likely valves of compressed trends": ({(cause, "compressed"): _never}, WHOLE),
     "causes of compressed trends": ({(fitness, "compressed"): _never}, WHOLE),
     "PV that sticks and jumps": ({(fitness, "pv_that_jumps"): _never}, WHOLE),
     "backlash within PV's grid": ({(assess, "hidden_by_grid"): lambda *_: False}, WHOLE),
@@ -136,14 +135,14 @@ def counts(name: str, loops: list[Judged]) -> list[int]:
 HELD = """\
 Some rules do not improve the counts of these draws. Other data need them:
 
+- *no set point's response*: without it the corners of a batch programme are oscillations
+  (tests/analyzer/loop/test_loop_of_batches.py); the draws have no such programme.
 - *stickbands of any size*: without it a slow loop's valve without a fault is blamed in a record of a day
   (tests/analyzer/loop/test_cause.py). The draws include no record of this length.
 - *PV that sticks and jumps*: without it a valve is blamed behind a sensor that sticks
   (tests/analyzer/loop/test_sticking_sensor.py); the draws have no such sensor.
 - *backlash within PV's grid*: seven valves without a fault were blamed in loops that do not oscillate. Four of these
   trends covered few steps of a grid (cause.grid_covered in analyzer/limits.toml).
-- *likely valves of compressed trends*: two of 30 such cycles of another cause resembled valve faults
-  (cause.compressed_pct).
 - *loads on a coarse grid*: of 24 valves on a grid of 0.4 and 0.8 of PV's amplitude (proofs/recorded.py, seeds 0 to
   5) 7 are reported as loads without it. 12 of 12 loads are reported as loads without it, and undecided with it.
 - *tight loops that are robust*: it applies to 2 of 240 loops (../shared/recordings: isdb, refinery, field;

@@ -165,7 +165,8 @@ MILL: tuple[Loop, ...] = (
          unit=_degrees(200.0), sp=40.0, op=30.0, sp_move=0.0, batch=30.0),
 )  # fmt: skip
 BATCH_S, RAMP_S, HELD_S = 5 * 3600, 3000, 7000
-"""A batch, its ramp and how long it is held; in the remaining time it has the value of the start, up to a third of an hour longer."""
+"""A batch, its ramp and how long it is held; in the remaining time it has the value of the start, up to a third of
+an hour longer."""
 
 
 def _rng(tag: str, what: int) -> np.random.Generator:

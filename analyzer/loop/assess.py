@@ -195,7 +195,8 @@ def verdict_by_measures(
     whole record."""
     if hidden_by_grid(measured, prepared.pv_step, oscillation is not None, config.cause):
         measured = replace(measured, evidence=0.0)
-    return resolve_ambiguity(judge(measured, oscillation, config.cause, worn), prepared, oscillation, config)
+    verdict = judge(measured, oscillation, config.cause, worn)
+    return resolve_ambiguity(verdict, prepared, oscillation, config.cause)
 
 
 def _known_without_op(figures: Assessments, op: bool) -> Assessments:

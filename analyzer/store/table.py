@@ -27,8 +27,8 @@ class StoredTable:
     """A table of a night, stored in STORE/name/NIGHT.parquet.
 
     columns, those declared for its rows, none if they are declared here (trends) or in the module that reads them
-    (`waves`, `moves`); in_pieces, whether chunks write it during a night; kept, whether a finished night has it; bulky,
-    whether it may be deleted before its night.
+    (`waves`, `moves`); in_pieces, whether chunks write it during a night; kept, whether a finished night has it;
+    bulky, whether it may be deleted before its night.
     """
 
     name: str

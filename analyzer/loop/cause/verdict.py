@@ -20,8 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analyzer.config import CauseLimits, Config
-from analyzer.loop.cause.fitness import compressed
+from analyzer.config import CauseLimits
 from analyzer.loop.cause.signs import WEAK, signs_of
 from analyzer.loop.cause.worn_valve import WornValve
 from analyzer.loop.decisions import (
@@ -313,33 +312,19 @@ def cap_confidence(verdict: Verdict, most_pct: float) -> Verdict:
 
 
 def resolve_ambiguity(
-    verdict: Verdict, prepared: Prepared, oscillation: Oscillation | None, config: Config
+    verdict: Verdict, prepared: Prepared, oscillation: Oscillation | None, limits: CauseLimits
 ) -> Verdict:
-    """The verdict on an oscillation, with the missing data if it is undecided: no valve if compressed trends make it
-    uncertain, and no load if the recording does not show the waveform of a valve's cycle."""
+    """The verdict on an oscillation, with the missing data if it is undecided: no load if the recording does not show
+    the waveform of a valve's cycle, except one that keeps its phase."""
     if oscillation is None or verdict.measured is None:
         return verdict
+    coarse = _too_coarse(prepared, oscillation, limits)
     if verdict.cause is Cause.UNDECIDED:
-        lacking = _too_coarse(prepared, oscillation, config.cause) or CAUSE_IN_MANUAL
-        return replace(verdict, needs=lacking)
-    hides = _hides(verdict, prepared, oscillation, config)
-    if hides is None:
+        return replace(verdict, needs=coarse or CAUSE_IN_MANUAL)
+    keeps_phase = any(sign.kind is SignKind.KEPT_PHASE for sign in verdict.signs)
+    if coarse is None or verdict.cause is not Cause.LOAD or keeps_phase:
         return verdict
-    fault = Fault.UNDECIDED if verdict.cause is Cause.VALVE else verdict.fault
-    hint = cap_confidence(verdict, 0.9 * config.cause.named_pct)
-    return replace(hint, cause=Cause.UNDECIDED, fault=fault, needs=hides)
-
-
-def _hides(
-    verdict: Verdict, prepared: Prepared, oscillation: Oscillation, config: Config
-) -> Requirement | None:
-    """Missing data to distinguish the named cause from others; None if there are none."""
-    limits = config.cause
-    if verdict.cause is Cause.LOAD:
-        clocked = any(sign.kind is SignKind.KEPT_PHASE for sign in verdict.signs)
-        return None if clocked else _too_coarse(prepared, oscillation, limits)
-    unsure = verdict.cause is Cause.VALVE and verdict.confidence[Cause.VALVE] < limits.compressed_pct
-    return compressed(prepared, None, config.quality) if unsure else None
+    return replace(cap_confidence(verdict, 0.9 * limits.named_pct), cause=Cause.UNDECIDED, needs=coarse)
 
 
 def _too_coarse(prepared: Prepared, oscillation: Oscillation, limits: CauseLimits) -> Requirement | None:

@@ -243,8 +243,8 @@ def test_a_sample_for_each_half_of_ti_gives_no_settings(every, action):
 
 
 def test_cycles_too_fast_for_the_sampling_are_not_excluded():
-    """With fewer than three samples per cycle, an oscillating loop is not reported as steady; the required sampling is
-    reported.
+    """With fewer than three samples per cycle, an oscillating loop is not reported as steady; the required
+    sampling is reported.
     """
     t = simulate(TANK, 24.0)
     every = 90

@@ -31,7 +31,7 @@ def verdict_with(loaded, kurtosis=1.5, ms=1.3, **changed):
     made, found = loaded
     m, cycle = replace(found.verdict.measured, kurtosis=kurtosis), counting(found.oscillations)
     verdict = judge(replace(m, ringing=replace(m.ringing, ms=ms, **changed)), cycle, CONFIG.cause)
-    return resolve_ambiguity(verdict, made, cycle, CONFIG)
+    return resolve_ambiguity(verdict, made, cycle, CONFIG.cause)
 
 
 @pytest.mark.parametrize(("share", "cause"), [(0.5, "undecided"), (0.9, "undecided"), (1.1, "load")])
