@@ -34,7 +34,7 @@ CYCLES = 20
 class Rig:
     """One loop: seconds, percent of spans.
 
-    kind: backlash, stiction, healthy, load or tight; lag 0: integrator of slope `gain`; second: second lag; gap:
+    kind: backlash, stiction, `healthy`, load or tight; lag 0: integrator of slope `gain`; second: second lag; gap:
     backlash.
     static, sliding: friction; load, corner: standard deviation [% OP] and correlation time of the load at the
     valve; noise [% PV].

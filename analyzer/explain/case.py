@@ -11,13 +11,12 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from analyzer.config import AdviceLimits, Config
-from analyzer.history.plant_clock import stamp
+from analyzer.explain.parts import Part, parts, parts_note
 from analyzer.history.series import Series
 from analyzer.loop.advice.tune import NEIGHBOURS
 from analyzer.loop.assess import judged_where
@@ -32,7 +31,7 @@ from analyzer.loop.oscillation.detection import counting
 from analyzer.loop.record.judged_stretch import differing
 from analyzer.loop.record.quality import Prepared, prepare
 from analyzer.loop.record.sample_clock import onto_clock, snapped
-from analyzer.loops.changes import TuningChange, in_force
+from analyzer.loops.changes import in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import controller
 from analyzer.night.nights import Night, Plant, cut
@@ -58,9 +57,6 @@ more that requires an effect."""
 NIGHT_S, LONGER = 86400.0, 1.5
 """Length of a night [s], and of a recording [nights] from which its last night alone is judged: ours: a
 day with some hours of the next day is still one recording."""
-PART_SAMPLES = 300
-"""Samples of PV from which a part under other settings is judged: a noise model that reaches 25 samples
-back needs twelve times as many."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -310,48 +306,6 @@ def recording_of(
         period_s,
         config.explain,
     )
-
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """One part: the loop with its settings then, its trends, and its time."""
-
-    spec: LoopSpec
-    series: dict[str, Series]
-    name: str
-    samples: int
-
-
-def parts(
-    spec: LoopSpec, series: Mapping[str, Series], changes: Sequence[TuningChange], zone: str
-) -> list[Part]:
-    """The parts of a recording, the one with most samples first; a single one without a change.
-
-    series : trends by tag, including PV's; changes : of any loops; zone : the plant's, for the names of parts.
-    """
-    stamps = series[spec.pv or ""].stamp_s
-    first, last = float(stamps[0]), float(stamps[-1])
-    stated = [c.time_s for c in changes if c.loop == spec.loop]
-    dated = [s.valid_from_s for s in (*spec.earlier, spec) if s.valid_from_s is not None]
-    changed = sorted({t for t in (*stated, *dated) if first < t < last})
-    ends = [first, *changed, last + 1.0]
-    out = []
-    for a, b in pairwise(ends):
-        held = {tag: cut(x, Night("", a, b)) for tag, x in series.items()}
-        pv = held[spec.pv or ""].stamp_s
-        if pv.size:
-            name = f"{stamp(float(pv[0]), zone)} to {stamp(float(pv[-1]), zone)}"
-            out.append(Part(in_force(spec, changes, float(pv[-1])), held, name, pv.size))
-    out.sort(key=lambda p: -p.samples)
-    return [out[0], *(p for p in out[1:] if p.samples >= PART_SAMPLES)]
-
-
-def parts_note(judged: Sequence[Part]) -> str:
-    """A sentence on the part that is explained and those held out; empty for a single part."""
-    if len(judged) < 2:
-        return ""
-    rest = " and ".join(p.name for p in judged[1:])
-    return f"Settings changed within the recording: explained on {judged[0].name}, held out on {rest}."
 
 
 def loop_trends(plant: Plant, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...], dict[str, Series]]:

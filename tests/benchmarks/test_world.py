@@ -10,7 +10,8 @@ import pytest
 
 from analyzer.config import Config
 from analyzer.history.series import Series
-from analyzer.loop.advice.advise import advise, tuning_model, withheld
+from analyzer.loop.advice.advise import advise, withheld
+from analyzer.loop.advice.propose import tuning_model
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.decisions import SignKind
 from analyzer.loop.identification.agreement import agreement

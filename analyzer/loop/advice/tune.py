@@ -11,7 +11,8 @@ import numpy as np
 from analyzer.columns import Row
 from analyzer.config import AdviceLimits, Config
 from analyzer.loop.action import AGAINST
-from analyzer.loop.advice.advise import Advice, propose, tuning_model, withheld
+from analyzer.loop.advice.advise import Advice, withheld
+from analyzer.loop.advice.propose import propose, tuning_model
 from analyzer.loop.advice.settings_side_by_side import compared
 from analyzer.loop.advice.sluggish import faster_settings, rejecting_settings
 from analyzer.loop.advice.tune_pictures import pictures

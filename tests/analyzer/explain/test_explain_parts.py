@@ -12,14 +12,8 @@ import pandas as pd
 import pytest
 
 from analyzer.config import Config
-from analyzer.explain.case import (
-    PART_SAMPLES,
-    latest_night,
-    parts,
-    parts_note,
-    requested_cases,
-    stretch_of_night,
-)
+from analyzer.explain.case import latest_night, requested_cases, stretch_of_night
+from analyzer.explain.parts import PART_SAMPLES, parts, parts_note
 from analyzer.history.series import Series
 from analyzer.loop.record.quality import prepare
 from analyzer.loops.changes import TuningChange

@@ -10,7 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analyzer.loop.advice.advise import advise, propose, tuning_model
+from analyzer.loop.advice.advise import advise
+from analyzer.loop.advice.propose import propose, tuning_model
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.cause.verdict import NO_CAUSE, not_assessed
 from analyzer.loop.conclusion import concluded

@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from analyzer.config import Config
-from analyzer.loop.advice.advise import tuning_model
+from analyzer.loop.advice.propose import tuning_model
 from analyzer.loop.advice.sluggish import faster_settings
 from analyzer.loop.assess import assess
 from analyzer.loop.identification.identified import joined, load_of_night, scan_noise

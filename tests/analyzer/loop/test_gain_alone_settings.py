@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from analyzer.config import Config
-from analyzer.loop.advice.advise import Advice, advise, tuning_model
+from analyzer.loop.advice.advise import Advice, advise
+from analyzer.loop.advice.propose import tuning_model
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.identification.agreement import agreement
 from analyzer.loop.identification.identified import load_of

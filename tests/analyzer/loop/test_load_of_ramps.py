@@ -9,7 +9,7 @@ import pytest
 
 from analyzer.config import Config
 from analyzer.history.export import open_export
-from analyzer.loop.advice.advise import tuning_model
+from analyzer.loop.advice.propose import tuning_model
 from analyzer.loop.assess import assess
 from analyzer.loop.identification.agreement import agreement
 from analyzer.loop.identification.identified import load_of

@@ -7,7 +7,7 @@ from functools import cache
 
 import pytest
 
-from analyzer.loop.advice.advise import propose
+from analyzer.loop.advice.propose import propose
 from analyzer.loop.cause.verdict import Verdict
 from analyzer.words import sentences
 from identification.models import Pid
