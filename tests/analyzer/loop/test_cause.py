@@ -172,7 +172,7 @@ def test_trends_that_do_not_identify_a_cause_state_what_they_need():
     straight = assess(replace(made, compressed_share=0.9, archived_share=0.02), None, CONFIG).verdict
     assert straight.cause == "undecided"
     wanted = "needs trends without compression, or 7 archived samples per cycle"
-    assert str(straight.needs) == f"{wanted}, has 2.6 a cycle and 90 % of the samples on straight segments"
+    assert str(straight.needs) == f"{wanted}, has 2.6 per cycle and 90 % of the samples on straight segments"
 
 
 @pytest.mark.parametrize("seed", [0, 1, 4, 5])
