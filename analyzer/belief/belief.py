@@ -186,7 +186,7 @@ def _with_constants(now: Belief, row: Row, limits: BeliefLimits) -> Belief:
     share = valve.faded_over(now.night, row["night"], limits) if now.night else 1.0
     constants = {k: pool.faded(share) for k, pool in now.constants.items()}
     evidence = evidence_of(row) or {}
-    for name in set(CONSTANTS) & evidence.keys():
+    for name in (name for name in CONSTANTS if name in evidence):
         value, deviation = evidence[name]
         pool = constants.get(name, Pool())
         constants[name] = pool.plus(value, deviation, LEAST_DEVIATION, MOST_DEVIATION)

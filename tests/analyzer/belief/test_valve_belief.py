@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
+from analyzer.belief.belief import CONSTANTS
 from analyzer.words.belief import news
 from identification.estimation.backlash_stiction import WIDTHS
 from tests.analyzer.belief.nights_of_a_loop import (
@@ -136,3 +139,10 @@ def test_another_recorder_does_not_change_the_belief_in_the_valve() -> None:
     assert [w for _, w, _ in beliefs[-1].widths] == [2.4] * 4
     changes = [news(a, b, r) for a, b, r in zip(beliefs[5:], beliefs[6:], cut, strict=False)]
     assert changes == [("", "")] * 4
+
+
+def test_constants_of_experiments_are_stored_in_one_order() -> None:
+    """The constants of a night with an experiment alone have the order of CONSTANTS, in every process."""
+    given = {name: [2.0, 0.1] for name in reversed(CONSTANTS)}
+    experiment = {"oscillating_pct": None, "experiment": "[]", "witness": json.dumps(given)}
+    assert tuple(followed([row(0, experiment)])[-1].constants) == CONSTANTS
