@@ -13,7 +13,7 @@ from typing import Any
 
 from analyzer.columns import BELIEVED, BY_NAME, LISTED, NOTED, RANKING, names
 from analyzer.lanes.lanes import FIGURE, lanes_in
-from analyzer.loop.cost import LOSS, MARK, OF_RECORDED, SIGNIFICANCE, compares, cost_column, mark
+from analyzer.loop.cost import LOSS, MARK, OF_RECORDED, RECORDED, SIGNIFICANCE, compares, cost_column, mark
 from analyzer.loop.decisions import Cause, Due, Lane
 from analyzer.pages.words import SHARES, Row, cell, keys, marked_cell, number
 from analyzer.store import notes
@@ -214,6 +214,8 @@ def _shown_of(rows: Sequence[Row], figure: str | None) -> tuple[str, ...]:
 def brief(row: Row, columns: Sequence[str]) -> dict[str, str]:
     """A row for people, by column: short figures, old and new settings in one cell."""
     gain = gain_unit(row.get("gain_unit"), row.get("pv_unit"), row.get("op_unit"))
+    in_percent = row.get("gain_unit") in (None, "percent") and row.get("percent_of") == RECORDED
+    gain += MARK if in_percent else ""
     noted = f" [note: {row['note']}]" if row.get("note") else ""
     special = {
         "kp": _setting_text(row["kp"], row["kp_new"], gain),
@@ -236,9 +238,9 @@ def _fitting(shown: Sequence[Mapping[str, str]], width: int) -> tuple[str, ...]:
 
 
 def _setting_text(now: float | None, new: float | None, unit: str, off: str = "0") -> str:
-    """A setting and its new value, with its unit; empty if unknown, `off` if it is 0."""
+    """A setting and its new value, with its unit; empty if neither is known, `off` if it is 0."""
     if now is None:
-        return ""
+        return f"-> {number(new)} {unit}" if new else ""
     present = number(now) if now else off
     if new:
         return f"{present} -> {number(new)} {unit}"

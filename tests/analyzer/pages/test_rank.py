@@ -355,3 +355,20 @@ def test_settings_are_shown_with_their_units(tmp_path):
         shown = run_rank(tmp_path, "--format", form).stdout
         assert "% band" in shown
         assert "7.67 min" in shown
+
+
+def test_new_settings_are_shown_without_present_ones(tmp_path):
+    """If loops.csv states no Kp and Ti, the list shows the new ones, with the mark of a recorded range."""
+    unstated = {
+        "kp": None,
+        "ti": None,
+        "kp_new": 0.17,
+        "ti_new": 24.7,
+        "gain_unit": "percent",
+        "ti_unit": "s",
+    }
+    row = {**rows(1)[0], **unstated, "percent_of": "recorded"}
+    write_table(rows_table([row], NIGHTS), tmp_path / "nights" / f"{NIGHT}.parquet")
+    shown = run_rank(tmp_path, "--wide").stdout
+    assert "-> 0.17 %/%*" in shown
+    assert "-> 24.7 s" in shown
