@@ -301,9 +301,8 @@ def model(c: Comparison, spec: LoopSpec, unit: str) -> str:
 
 
 def settings_page(loop: str, night: str, c: Comparison, spec: LoopSpec) -> parts.Page:
-    """The settings page of a loop."""
-    known = spec.pv_lo is not None and spec.pv_hi is not None
-    unit, labels = (spec.pv_unit or "own unit") if known else "%", texts("settings_tried")
+    """The settings page of a loop. Its errors are in the unit of PV, also if percent is of the recorded range."""
+    unit, labels = spec.pv_unit or "own unit", texts("settings_tried")
     meant = texts("settings") | (
         texts("settings_of_integrators") if isinstance(c.loop.process, Integrator) else {}
     )

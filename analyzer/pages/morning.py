@@ -71,12 +71,14 @@ def worst_table(night: ShownNight) -> Table:
         name, trend = night.link(row["loop"]), night.trends.get(row["loop"])
         drawn = None if trend is None else sparkline(trend, close_span(row, trend))
         changed = row["kp_new"] is not None or row["ti_new"] is not None
+        known = row["kp"] is not None or row["ti"] is not None
+        settings = changed_settings(row) if changed else row_settings(row)
         return {
             "loop": replace(name, text=FOLLOWER + name.text) if row["source_loop"] in here else name,
             "trend": Cell("", figure=drawn),
             by: words.marked_cell(row, by),
             "cause": words.cause_cell(row["cause"]),
-            "settings": changed_settings(row) if changed else row_settings(row),
+            "settings": settings if known or not changed else f"new: {settings}",
             "note": night.note(row["loop"]),
         }
 

@@ -66,7 +66,10 @@ def seconds_of(ti: float, unit: str) -> float | None:
 
 
 def changed_settings(row: Row) -> str:
-    """Old and new settings of a row with their units; a band also as gain and other times also in seconds."""
+    """Old and new settings of a row with their units; a band also as gain and other times also in seconds. If the old
+    ones are not stated, the new ones alone."""
+    if row["kp"] is None and row["ti"] is None:
+        return row_settings(row, "kp_new", "ti_new")
     gain, time = gain_unit(row["gain_unit"], row["pv_unit"], row.get("op_unit")), row["ti_unit"] or "s"
     old, new = (row["kp"], row["ti"]), (row["kp_new"], row["ti_new"])
     kp = "integral action only" if new[0] == 0 else f"Kp {arrow(old[0], new[0])} {gain}"

@@ -5,15 +5,20 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 
 from analyzer.columns import row_of
+from analyzer.config import Config
+from analyzer.loop.advice.settings_side_by_side import compared
 from analyzer.loop.conclusion import stated
 from analyzer.loops.spec import LoopSpec
+from analyzer.pages.compared import settings_page
 from analyzer.pages.rank import brief
-from analyzer.words.units import arrow, gain_unit, number, settings
+from analyzer.words.units import arrow, changed_settings, gain_unit, number, settings
 from identification.controller.pid_regression import fit_pi
-from identification.models import Fopdt, Loop, Pid
+from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
+from reports.pages import Panels
 
 
 def test_a_gain_is_in_percent_of_op_only_if_op_is_in_percent() -> None:
@@ -49,3 +54,21 @@ def test_settings_are_typed_in_without_an_exponent() -> None:
     """Settings to type in are written without an exponent: 1154 s, not 1.15e+03 s."""
     assert settings(7.8, 1153.956, "%/m", "s") == "Kp 7.8 %/m, Ti 1154 s"
     assert settings(5209.5, 0.0, "% band", "s") == "Kp 5210 % band, no integral action"
+
+
+def test_new_settings_without_present_ones_have_no_arrow() -> None:
+    """If loops.csv states no Kp and Ti, an order and a list give the new ones alone, without "none"."""
+    row = row_of({"loop": "A", **stated(LoopSpec("A")), "kp_new": 0.17, "ti_new": 24.7})
+    assert changed_settings(row) == "Kp 0.17 %/%, Ti 24.7 s"
+
+
+def test_errors_of_a_settings_page_are_in_the_unit_of_pv() -> None:
+    """Without a stated range, an error of 1 % of a recorded span of 7 units is 0.07 in the own unit of PV."""
+    loop = Loop(Fopdt(1.0, 30.0, 3.0), Pid(2.0, 20.0), Backlash(2.0))
+    load = 0.5 * np.sin(np.arange(9000) / 300.0)
+    found = compared(loop, load, Pid(1.0, 40.0), 120.0, 7.0, Config().tuning)
+    assert found is not None
+    page = settings_page("A", "2026-03-02", found, LoopSpec("A"))
+    now = next(p for s in page.sections for b in s.blocks if isinstance(b, Panels) for p in b.plots)
+    assert now.y_label == "SP \u2212 PV [own unit]"
+    assert np.abs(now.lines[0].y).max() == pytest.approx(0.07 * np.abs(found.shown["now"].error).max())
