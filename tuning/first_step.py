@@ -26,7 +26,7 @@ def calmer_step(old: Pid, seen: ObservedRinging, limits: TuningLimits = LIMITS) 
 def calmest(old: Pid, tried: Sequence[Step], limits: TuningLimits) -> Step | None:
     """The most robust step within the allowed increase in error; among equals that of least error. Its
     gain is higher only if there is no other step."""
-    within = [x for x in tried if x.error <= limits.tight_price]
+    within = [x for x in tried if x.error <= limits.tight_error_growth]
 
     def rank(x: Step) -> tuple[bool, float, float]:
         return abs(x.new.kp) > abs(old.kp), max(x.ms, limits.ms_most_sample), x.error

@@ -187,7 +187,9 @@ def _first_step(
     known |= {"new": settings(best.new), "size": 100.0 * (best.error - 1.0)}
     if process is not None:
         why = WHY["first_step_alone"].format(
-            **known, most=100.0 * (limits.tight_price - 1.0), pi=settings(simc(process, scan_s=old.scan_s))
+            **known,
+            most=100.0 * (limits.tight_error_growth - 1.0),
+            pi=settings(simc(process, scan_s=old.scan_s)),
         )
         return Proposal(Action.RETUNE, why, best.new, ms_before=now)
     known["left"] = sensitivity_at(old, best.new, seen.period_s)
@@ -382,7 +384,7 @@ def _confirmed(
     """The best worthwhile candidate whose simulated limit cycle is none or smaller, on samples too."""
     first, limits = table.loops[0], table.limits
     worth = [c for c in candidates if _worth(c, first.controller, limits)]
-    distinct = _distinct(worth, limits.apart)[: limits.confirmed]
+    distinct = _distinct(worth, limits.distinct)[: limits.confirmed]
     samples = (
         [(one, confirm(one)) for one in table.loops[1 : 1 + limits.samples_confirmed]] if distinct else []
     )

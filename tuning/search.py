@@ -149,7 +149,7 @@ def _harmless(table: Bench, controller: Pid, ms: float) -> Candidate | None:
     """A candidate that raises the error neither on the first loop nor in the mean, and is worse on none of the loops
     consistent with the data; it is dropped at the first loop on which it is."""
     limits, ratios = table.limits, list[tuple[float, float]]()
-    most = limits.error_growth_play if is_backlash(table.loops[0].valve) else limits.error_growth_sample
+    most = limits.error_growth_backlash if is_backlash(table.loops[0].valve) else limits.error_growth_sample
     for k in range(len(table.loops)):
         travel, error = _ratios(table, controller, k)
         if k == 0 and not error <= limits.error_growth:
@@ -268,7 +268,7 @@ def _grid(loop: Loop, most: Rejection, limits: TuningLimits) -> tuple[Floats, Fl
     if now.kp == 0.0:
         return np.zeros(1), abs(now.ti_s) * np.geomspace(1.0 / ALONE, ALONE, TIMES)
     high = min(limits.gain_up * abs(now.kp), 2.0 * abs(nominal.kp))
-    down = limits.gain_down_play if is_backlash(loop.valve) else limits.gain_down_stick
+    down = limits.gain_down_backlash if is_backlash(loop.valve) else limits.gain_down_stick
     low = min(limits.gain_down * abs(now.kp), down * abs(nominal.kp))
     gains = np.geomspace(low, high, GAINS)
     if math.isinf(integral_s(now)):

@@ -321,7 +321,7 @@ def _of_cycle(now: Belief, own: NightDecision, limits: BeliefLimits) -> NightDec
     cause, confidence = now.cycle.cause, now.cycle.chances(limits.between)
     if cause is Cause.VALVE and not worn:
         cause = Cause.UNDECIDED
-    surely = now.valve.worn_pct(limits) >= limits.beside_pct
+    surely = now.valve.worn_pct(limits) >= limits.other_cause_pct
     fault = now.valve.fault(now.told.fault) if worn and (cause is Cause.VALVE or surely) else Fault.NONE
     if cause is Cause.UNDECIDED and fault is Fault.NONE:
         fault = own.fault if own.fault is Fault.UNDECIDED else Fault.NONE

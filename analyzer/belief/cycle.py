@@ -147,7 +147,7 @@ def _cause_named(now: CycleBelief, row: Row, limits: BeliefLimits) -> Cause:
     if found[first] >= limits.named_pct:
         return first
     held = now.cause
-    return held if held in found and found[held] >= limits.held_pct else Cause.UNDECIDED
+    return held if held in found and found[held] >= limits.keep_pct else Cause.UNDECIDED
 
 
 @dataclass(frozen=True, slots=True)

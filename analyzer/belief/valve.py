@@ -111,7 +111,7 @@ def doubt(evidence: Witness, cause: Cause, oscillates: bool, config: Config) -> 
     """
     limits = config.belief
     if oscillates and cause is not Cause.VALVE:
-        error = limits.doubt_beside if cause is Cause.LOAD else limits.doubt_small
+        error = limits.doubt_load if cause is Cause.LOAD else limits.doubt_small
         return error, error, error
     width = float(WIDTHS[int(np.argmax(evidence["profile"]))])
     narrow = oscillates or width < config.cause.size * evidence["op_range"]
@@ -121,10 +121,10 @@ def doubt(evidence: Witness, cause: Cause, oscillates: bool, config: Config) -> 
 
 def weighed(evidence: Witness, wrong_by: float, against: float, limits: BeliefLimits) -> Floats:
     """Evidence of a night for each width [nat], beyond its possible error. Evidence at the threshold of a
-    fault counts as `conviction`; no night counts for more than `most`."""
+    fault counts as `clear_night`; no night counts for more than `most`."""
     found = np.asarray(evidence["profile"], dtype=np.float64) / max(evidence["needed"], 1e-9)
     found = np.maximum(found - wrong_by, 0.0) + np.minimum(found + against, 0.0)
-    found *= limits.conviction
+    found *= limits.clear_night
     top = float(found.max())
     if top > limits.most:
         found = np.where(found > 0.0, found * limits.most / top, found)

@@ -181,8 +181,8 @@ def parts_of(
     load = days if alike else simulated.load[name]
     if alike:
         most = max(abs(part.value) for part in simulated.change.values())
-        share = min(most / limits.beside_change, 1.0)  # nearly equal settings have nearly equal effects
-        sure = LogRatio(own.value, math.hypot(own.deviation, share * limits.beside_measured))
+        share = min(most / limits.full_change, 1.0)  # nearly equal settings have nearly equal effects
+        sure = LogRatio(own.value, math.hypot(own.deviation, share * limits.measured_deviation))
         weight = measured.deviation**-2, sure.deviation**-2
         own = LogRatio(
             (measured.value * weight[0] + sure.value * weight[1]) / sum(weight), sum(weight) ** -0.5

@@ -138,7 +138,7 @@ def equal_load(weeks: Weeks, limits: ComparisonLimits, figures: FigureLimits) ->
     ratio = table[..., 2] - table[..., 3]
     off = np.hypot(*missed)[[0, 0, 1, 1]]
     most = float(np.abs(np.median(change, axis=0)).max())
-    hardly = min(most / limits.beside_change, 1.0)  # for nearly equal settings errors of the model cancel
+    hardly = min(most / limits.full_change, 1.0)  # for nearly equal settings errors of the model cancel
     named = [
         {n: _part(x[:, i], share * off[i], limits) for i, n in enumerate(FIGURES)}
         for x, share in ((change, hardly), (load, 1.0), (own[:, 0], hardly))

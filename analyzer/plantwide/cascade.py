@@ -65,7 +65,7 @@ def _with_halves(own: Finding, halves: Sequence[Finding], limits: PlantLimits) -
     if len(halves) != 2 or own.remedy.action is not Action.RETUNE:
         return own
     size = [abs(h.number("half_slope") * h.number("split_slope")) for h in halves]
-    if not all(size) or max(size) < limits.halves_apart * min(size):
+    if not all(size) or max(size) < limits.halves_ratio * min(size):
         return own
     stronger, weaker = (halves[k] for k in sorted((0, 1), key=lambda k: -size[k]))
     times = max(size) / min(size)

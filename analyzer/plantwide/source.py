@@ -97,7 +97,7 @@ def candidates_of(lags: Lags, peers: Mapping[str, Finding], limits: PlantLimits)
         return ()
     signs = _signs_by_name(oscillations, [peers[w.loop] for w in oscillations], lags, limits)
     valves = any(s["valve"] > 0 for s in signs)
-    seen = 1.0 - (limits.unseen_beside_valve_pct if valves else limits.unseen_pct) / 100.0
+    seen = 1.0 - (limits.unseen_with_valve_pct if valves else limits.unseen_pct) / 100.0
     odds = np.array([sum(getattr(limits, f"sign_{k}") * v for k, v in s.items()) for s in signs])
     chance = np.exp(odds - odds.max())
     pct = 100.0 * seen * chance / chance.sum()

@@ -108,7 +108,9 @@ def overridden(x: Trends) -> Mask:
     """True where a move of SP or a limit of OP overrides the law, and at adjacent samples, shape (n,)."""
     least = x.limits.at_limit
     here = (
-        (np.abs(np.diff(x.sp, prepend=x.sp[0])) > x.limits.asked) | (x.op <= least) | (x.op >= 100.0 - least)
+        (np.abs(np.diff(x.sp, prepend=x.sp[0])) > x.limits.sp_kick)
+        | (x.op <= least)
+        | (x.op >= 100.0 - least)
     )
     return np.convolve(here, np.ones(3), mode="same") > 0
 

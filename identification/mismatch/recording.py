@@ -134,7 +134,7 @@ def held_move(pv: Floats, limits: RecorderLimits = LIMITS.recorder) -> float:
     """
     moves, gaps = np.abs(np.diff(pv)), np.diff(np.unique(pv))
     moves = moves[moves > 0.0]
-    if moves.size < limits.jumps or moves.size > (1.0 - limits.stands) * pv.size:
+    if moves.size < limits.jumps or moves.size > (1.0 - limits.constant_share) * pv.size:
         return 0.0
     jump = float(np.quantile(moves, 0.02))
     return jump if jump > limits.jump_steps * float(np.quantile(gaps, 0.1)) else 0.0

@@ -210,7 +210,7 @@ def test_tight_loop_gets_the_robust_settings_of_least_error_on_its_load():
 
 
 def test_robustness_costs_at_most_the_stated_error():
-    """Under a slow load, robust settings for a tight loop raise the error by at most tight_price. The reason
+    """Under a slow load, robust settings for a tight loop raise the error by at most tight_error_growth. The reason
     states this, and the loop is more robust."""
     process = Fopdt(1.5, 100, 8)
     nominal = simc(process, scan_s=1.0)
@@ -219,7 +219,7 @@ def test_robustness_costs_at_most_the_stated_error():
     p = recommend(loop, "tuning", load=slow)
     assert p.controller is not None
     (_, before), (_, after) = (figures(loop, pid, slow) for pid in (loop.controller, p.controller))
-    assert 1.0 < after / before <= 1.01 * LIMITS.tight_price
+    assert 1.0 < after / before <= 1.01 * LIMITS.tight_error_growth
     assert maximum_sensitivity(replace(loop, controller=p.controller)) < maximum_sensitivity(loop)
     assert "average absolute error" in p.reason
 
@@ -256,7 +256,7 @@ def test_gain_with_backlash_stays_near_the_present(proposals):
     """With backlash the gain stays within the stated factors, unless it was above the nominal gain."""
     for case, p in proposals[:6]:
         nominal = simc(case.loop.process, scan_s=1.0).kp
-        low = min(LIMITS.gain_down * abs(case.loop.controller.kp), LIMITS.gain_down_play * abs(nominal))
+        low = min(LIMITS.gain_down * abs(case.loop.controller.kp), LIMITS.gain_down_backlash * abs(nominal))
         assert low * 0.99 <= abs(p.controller.kp) <= LIMITS.gain_up * abs(case.loop.controller.kp) * 1.01
 
 

@@ -137,7 +137,7 @@ def _calmer(verdict: Verdict, config: Config) -> tuple[Pid | None, str]:
     if not m.ringing.rings(config.cause) or (valve > min(others) and m.evidence > 0.0):
         return None, ""
     step = calmer_step(m.controller, m.observed, config.tuning)
-    most = 100.0 * (config.tuning.tight_price - 1.0)
+    most = 100.0 * (config.tuning.tight_error_growth - 1.0)
     return (None, "") if step is None else (step.new, TEXTS["rings"].format(most))
 
 

@@ -199,9 +199,11 @@ def judge(
         return _quiet(m, limits, worn_valve)
     if m.ringing is None or any(math.isnan(x) for x in (m.evidence, m.jump, m.size, m.kurtosis)):
         return replace(not_assessed(None), measured=m)
-    if m.has_clock(limits) and m.evidence < limits.beside_evidence:
+    if m.has_clock(limits) and m.evidence < limits.joint_evidence:
         return _has_clock(m, oscillation, limits)
-    seen_as = Regularity(oscillation.rhythm.first, m.kurtosis, m.saturated >= limits.held, oscillation.cycles)
+    seen_as = Regularity(
+        oscillation.rhythm.first, m.kurtosis, m.saturated >= limits.at_limit, oscillation.cycles
+    )
     worn = _may_be_cause(m, m.ringing, limits, worn_valve)
     if m.ringing.is_tight(seen_as, m.evidence if worn else 0.0, limits):
         return _rings(m, m.ringing, limits)
@@ -265,7 +267,7 @@ def _may_be_cause(m: Measured, ringing: Ringing, limits: CauseLimits, worn_valve
     doubted = ringing.is_periodic(limits) and not each and fault_of(m, limits) is not Fault.STICTION
     if worn_valve is None or not (narrow or doubted):
         return not narrow
-    if ringing.valve_nat - max(ringing.line_nat, 0.0) >= limits.beside_evidence:
+    if ringing.valve_nat - max(ringing.line_nat, 0.0) >= limits.joint_evidence:
         return worn_valve.has_evidence  # OP of a tight loop travels several times its backlash
     return not narrow and worn_valve.is_seen
 
@@ -331,12 +333,12 @@ def _too_coarse(prepared: Prepared, oscillation: Oscillation, limits: CauseLimit
     """Requirement of a recording in which every regular cycle looks like a periodic load, because its samples or the
     steps of PV's grid do not show the third harmonic of a valve's; None if it is sufficient."""
     steps = oscillation.amplitude_pct / max(prepared.pv_step, 1e-12)
-    if steps < limits.steps_told:
+    if steps < limits.least_steps:
         figures = prepared.pv_step, oscillation.amplitude_pct
         return Requirement(MissingData.FINER, RequirementKind.FINER, figures)
     samples = oscillation.period_s / prepared.record.dt_s
-    if samples < limits.samples_told:
-        return Requirement(MissingData.FASTER, RequirementKind.OF_A_CAUSE, (limits.samples_told, samples))
+    if samples < limits.least_samples:
+        return Requirement(MissingData.FASTER, RequirementKind.OF_A_CAUSE, (limits.least_samples, samples))
     return None
 
 

@@ -68,8 +68,8 @@ class WornValve:
         if self._is_hidden:
             return False
         trials, limits = self.found.trials, self.limits
-        agree = trials is not None and trials.signs >= limits.beside_signs
-        return agree and self.found.evidence >= limits.beside_evidence
+        agree = trials is not None and trials.signs >= limits.joint_signs
+        return agree and self.found.evidence >= limits.joint_evidence
 
     @property
     def is_likelier(self) -> bool:
@@ -104,7 +104,7 @@ class WornValve:
             return True
         if self._is_thin or self.is_recorded_by_exception:
             return True
-        return self.period_s < limits.samples_told * self.record.dt_s and m.ringing.rings(limits)
+        return self.period_s < limits.least_samples * self.record.dt_s and m.ringing.rings(limits)
 
     @property
     def _is_thin(self) -> bool:
@@ -125,7 +125,7 @@ class WornValve:
         right_way = m.controller is None or m.controller.sign * backlash.gain > 0.0
         width = backlash.valve.stickband
         crossed = width <= self.limits.widest * backlash.p.op_range
-        return right_way and crossed and width >= self.limits.beside_size * m.problem.reach
+        return right_way and crossed and width >= self.limits.joint_size * m.problem.reach
 
     @cached_property
     def _problem(self) -> Problem:

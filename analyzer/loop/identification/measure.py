@@ -77,7 +77,7 @@ class Measured:
     def has_clock(self, limits: CauseLimits) -> bool:
         """Whether a clock outside the loop times the cycle: it keeps its phase over many periods, while OP does not
         reach a limit in each, which would fix the period of a loop's own cycle."""
-        known = self.kept.periods >= limits.kept_periods and self.saturated < limits.held
+        known = self.kept.periods >= limits.kept_periods and self.saturated < limits.at_limit
         return known and self.kept.share >= limits.kept_phase
 
 

@@ -57,7 +57,7 @@ def moves(record: LoopRecord, noise: float, limits: FigureLimits) -> tuple[Move,
     steps = np.flatnonzero(np.abs(np.diff(record.sp)) > 1e-6) + 1
     if not steps.size:
         return ()
-    separate = np.flatnonzero(np.diff(steps) >= limits.move_stands) + 1
+    separate = np.flatnonzero(np.diff(steps) >= limits.move_constant) + 1
     runs = np.split(steps, separate)
     firsts, lasts = (np.array([run[k] for run in runs]) for k in (0, -1))
     before, after = np.append(0, lasts[:-1]), np.append(firsts[1:], len(record))
@@ -79,7 +79,7 @@ def _move(record: LoopRecord, edges: np.ndarray, noise: float, limits: FigureLim
     before = record.error[first:at][record.usable[first:at]]
     bad = np.flatnonzero(~record.usable[at - 1 : last])
     until = at - 1 + int(bad[0]) if bad.size else last
-    if min(at - first, before.size, until - end) < limits.move_stands:
+    if min(at - first, before.size, until - end) < limits.move_constant:
         return None
     size = float(record.sp[end] - record.sp[at - 1])
     spread = robust_deviation(before - np.median(before))
@@ -99,7 +99,7 @@ def _answered(
     response = (record.pv[part] - begin) / size
     still = spread / abs(size)
     settled = _settled_from(
-        np.abs(response[ramp:] - 1.0) > max(2.0 * still, limits.move_settled), limits.move_stands
+        np.abs(response[ramp:] - 1.0) > max(2.0 * still, limits.move_settled), limits.move_constant
     )
     shown = response.size if settled is None else min(response.size, FOLLOWED * (settled + ramp) + 2)
     course = np.interp(np.linspace(0, shown - 1, POINTS), np.arange(shown), response[:shown])

@@ -228,7 +228,7 @@ def _plainly(seen: LawsCompared, stated: Pid, record: LoopRecord, limits: Settin
     if (limited or stated.ti_s < unseen) and seen.explained < limits.explained_unseen:
         return False
     factor = _apart(seen.found, stated, record.dt_s, limits.filtered)
-    return seen.residual_ratio * seen.explained >= limits.left and factor >= limits.factor
+    return seen.residual_ratio * seen.explained >= limits.residual_ratio and factor >= limits.factor
 
 
 def _apart(found: Pid, stated: Pid, dt_s: float, filtered: float) -> float:
