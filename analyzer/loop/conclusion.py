@@ -157,7 +157,7 @@ def _measured(a: Assessment, limits: AdviceLimits) -> Known:
 
 
 def _model_known(verdict: Verdict, limits: AdviceLimits) -> Mapping[str, float | None]:
-    """The reported constants; gain and time constant separately only if the latter is well inside the window."""
+    """The reported constants; gain and time constant separately only if the latter is well inside the fitted rows."""
     m = verdict.measured
     if m is None:
         return {}

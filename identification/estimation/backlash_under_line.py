@@ -88,7 +88,7 @@ def with_width(near: SmoothFit, problem: Problem, period_s: float) -> SmoothFit:
     return max((near, behind(float(best.x))), key=_likelihood)
 
 
-def in_window(found: BacklashUnderLine, problem: Problem, period_s: float) -> SmoothFit:
+def in_problem(found: BacklashUnderLine, problem: Problem, period_s: float) -> SmoothFit:
     """The joint model behind a faulty valve, fitted again in another problem, with its width refined."""
     process = found.worn.process
     begins = [(process.time_constant_s, max(process.dead_time_s - problem.half_block_s, 0.0))]

@@ -93,3 +93,21 @@ def test_printed_texts_are_checked(tmp_path: Path) -> None:
             line.startswith(f"tuning/{file}: {part}") for line, part in zip(lines, found, strict=True)
         ), lines
         (tmp_path / "tuning" / file).unlink()
+
+
+def test_docstrings_and_comments_are_checked(tmp_path: Path) -> None:
+    """A banned phrase in a docstring, in a string below a constant and in a comment is found with its line; names,
+    other strings and code in back quotes are not read."""
+    (tmp_path / "README.md").write_text(PLAIN, encoding="utf-8")
+    (tmp_path / "tuning").mkdir()
+    code = (
+        '"""A fault\n\nhangs on another."""\n\ntold = "It is told."\n"""It is told."""\nLIMIT = 1  # left over\n'
+        'def tell(said):\n    """`said` is a name."""\n'
+    )
+    (tmp_path / "tuning" / "some.py").write_text(code, encoding="utf-8")
+    found = [line.split(";")[0] for line in checked(tmp_path).stdout.splitlines()]
+    assert found == [
+        "tuning/some.py:3: 'hangs on'",
+        "tuning/some.py:6: 'told'",
+        "tuning/some.py:7: 'left over'",
+    ]

@@ -35,6 +35,7 @@ from tuning.recommend import Proposal, recommend
 from tuning.search import LoadedLoop
 
 TEXTS = sentences("settings")
+"""Sentences about settings that are given, or withheld."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ from analyzer.loop.identification.measure import Measured
 from identification.estimation.backlash_under_line import (
     BacklashUnderLine,
     fit_backlash_under_line,
-    in_window,
+    in_problem,
 )
 from identification.estimation.between_samples import with_scans
 from identification.estimation.model import Fitted
@@ -93,7 +93,7 @@ class WornValve:
         m, found = self.measured, self.found
         if found.backlash.valve.stickband > self.limits.widest * m.problem.reach:
             return as_fit(found.ideal, found.backlash.p), found.backlash
-        return m.linear, as_fit(in_window(found, m.problem, self.period_s), m.problem)
+        return m.linear, as_fit(in_problem(found, m.problem, self.period_s), m.problem)
 
     @property
     def _is_hidden(self) -> bool:
